@@ -118,12 +118,12 @@ def run(
 def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basins:
     """Number the attractors: one orbit, whichever of its strobes a start came to."""
     flow, weights = setting.flow(), plan.subject.weights
-    known: list[tuple[str, bool | None, Array]] = []
+    distinct: list[tuple[str, bool | None, Array]] = []
     numbers = np.empty(len(cells), dtype=int)
     for k, cell in enumerate(cells):
         x = np.array(cell.strobe)
         label = (cell.response, cell.symmetric)
-        for number, (response, symmetric, laps) in enumerate(known):
+        for number, (response, symmetric, laps) in enumerate(distinct):
             if (response, symmetric) != label:
                 continue
             near = _near(laps, x, weights)
@@ -133,19 +133,19 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
         else:
             periodic = cell.status is OrbitStatus.PERIODIC
             laps = flow.run(x, cell.n).strobes[:-1] if periodic else x[None]
-            numbers[k] = len(known)
-            known.append((*label, laps))
-    counted = np.bincount(numbers, minlength=len(known))
+            numbers[k] = len(distinct)
+            distinct.append((*label, laps))
+    counted = np.bincount(numbers, minlength=len(distinct))
     order = np.argsort(-counted, kind="stable")
-    rank = np.empty(len(known), dtype=int)
-    rank[order] = np.arange(len(known))
-    twins = {int(rank[k]): _twin(flow, known, k, weights) for k in range(len(known))}
+    rank = np.empty(len(distinct), dtype=int)
+    rank[order] = np.arange(len(distinct))
+    twins = {int(rank[k]): _twin(flow, distinct, k, weights) for k in range(len(distinct))}
     attractors = tuple(
         Attractor(
             number,
-            known[k][0],
-            known[k][1],
-            tuple(float(v) for v in known[k][2][0]),
+            distinct[k][0],
+            distinct[k][1],
+            tuple(float(v) for v in distinct[k][2][0]),
             None if twins[number] is None else int(rank[twins[number]]),
             float(counted[k] / len(cells)),
         )
@@ -164,15 +164,15 @@ def _near(laps: Array, x: Array, weights: Array) -> Mask:
 
 
 def _twin(
-    flow: Flow, known: list[tuple[str, bool | None, Array]], k: int, weights: Array
+    flow: Flow, distinct: list[tuple[str, bool | None, Array]], k: int, weights: Array
 ) -> int | None:
     """Index of the mirror twin of attractor k among those that are known."""
-    _, symmetric, laps = known[k]
+    _, symmetric, laps = distinct[k]
     if flow.system.mirror is None or symmetric is not False:
         return None
     n = len(laps)
     image = flow.run(laps[0], n, points=2).strobes[1:-1:2] @ flow.system.mirror.T
-    for other, (_, _, strobes) in enumerate(known):
+    for other, (_, _, strobes) in enumerate(distinct):
         if len(strobes) == n and other != k and _near(strobes, image[0], weights).any():
             return other
     return None

@@ -41,16 +41,16 @@ class Survey:
 
 def survey(
     family: Family,
-    known: Sequence[tuple[float, Orbit]],
+    orbits: Sequence[tuple[float, Orbit]],
     low: float,
     high: float,
     *,
     depth: int = DEPTH,
     progress: Callable[[], None] = lambda: None,
 ) -> Survey:
-    """Follow known orbits both ways, and what leaves them where stability changes.
+    """Follow orbits both ways, and the branches that leave them where stability changes.
 
-    known : values of the parameter with a periodic orbit found there, stable or not; those that
+    orbits : values of the parameter with a periodic orbit found there, stable or not; those that
     lie on a branch already followed add none. low, high : ends of the interval. depth : branch
     switches in a row. progress : called once a branch.
     """
@@ -66,13 +66,16 @@ def survey(
         progress()
         return number
 
-    def known_before(child: Branch, at: int = -1) -> bool:
-        """By its point of this number; of its first points the last is off the parent."""
-        curve = child.curve
-        seen = images(curve, child.points[at].solved)
-        return any(follows(b, curve.n, curve.symmetric, seen) for b in branches)
+    def is_followed(child: Branch, at: int = -1) -> bool:
+        """Whether a followed branch passes the child's point of number ``at``.
 
-    for value, orbit in known:
+        The last of the child's first points lies off its parent.
+        """
+        curve = child.curve
+        orbit_images = images(curve, child.points[at].solved)
+        return any(follows(b, curve.n, curve.symmetric, orbit_images) for b in branches)
+
+    for value, orbit in orbits:
         if orbit.status is not OrbitStatus.PERIODIC or not low <= value <= high:
             continue
         if any(passes(b, value, orbit) for b in branches):
@@ -87,21 +90,21 @@ def survey(
             if deep == depth:
                 continue
             lost: list[Branch] = []
-            for where in [p for p in points if p.branch == number]:
-                if not _leads(where):
+            for bifurcation in [p for p in points if p.branch == number]:
+                if not _leads(bifurcation):
                     continue
-                child = switch(branches[number], where, low, high, known=known_before)
+                child = switch(branches[number], bifurcation, low, high, is_followed=is_followed)
                 if child is None:
                     continue
                 if child.ends[1] is End.LOST:
                     lost.append(child)
                 else:
                     queue.append((add(close(child, points), number), deep + 1))
-            # What was lost on the way may have been followed whole from its other end.
+            # A branch that was lost on the way may have been followed from its other end.
             queue.extend(
                 (add(child, number), deep + 1)
                 for child in lost
-                if not known_before(child, len(child.points) // 2)
+                if not is_followed(child, len(child.points) // 2)
             )
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
@@ -129,21 +132,21 @@ def passes(branch: Branch, value: float, orbit: Orbit, tolerance: float = 1e-6) 
     return False
 
 
-def follows(branch: Branch, n: int, symmetric: bool, seen: Array) -> bool:
+def follows(branch: Branch, n: int, symmetric: bool, orbit_images: Array) -> bool:
     """Whether a branch of such orbits passes one of these ``images``."""
     curve = branch.curve
     if (curve.n, curve.symmetric) != (n, symmetric):
         return False
-    return place(curve, [p.solved for p in branch.points], seen) is not None
+    return place(curve, [p.solved for p in branch.points], orbit_images) is not None
 
 
 def _least(laps: Array, x: Array, curve: Curve) -> float:
     return float((np.abs(laps - x) / curve.scale[:-1]).max(axis=1).min())
 
 
-def _leads(where: Bifurcation) -> bool:
-    """Whether another branch leaves here and the change concerns a stable orbit."""
+def _leads(bifurcation: Bifurcation) -> bool:
+    """Whether another branch leaves at this point and the change concerns a stable orbit."""
     return (
-        where.kind in (PointKind.PITCHFORK, PointKind.DOUBLING)
-        and where.stable[0] != where.stable[1]
+        bifurcation.kind in (PointKind.PITCHFORK, PointKind.DOUBLING)
+        and bifurcation.stable[0] != bifurcation.stable[1]
     )

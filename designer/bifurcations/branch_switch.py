@@ -30,11 +30,11 @@ CRITICAL = 1e-9
 
 def switch(
     parent: Branch,
-    where: Bifurcation,
+    bifurcation: Bifurcation,
     low: float,
     high: float,
     *,
-    known: Callable[[Branch], bool] = lambda _: False,
+    is_followed: Callable[[Branch], bool] = lambda _: False,
 ) -> Branch | None:
     """The branch that leaves ``parent`` at a pitchfork or a period doubling, followed to its end.
 
@@ -42,48 +42,48 @@ def switch(
     doubling the orbits of twice the period; they set out along the eigenvector of the multiplier
     -1. The first point is the one it leaves at. The branch is measured in the size of the orbit
     that it leaves, so it is the same wherever the parent was begun. None where none is found, or
-    its period passes ``MAX_PERIOD``, or its first points are ``known``.
+    its period passes ``MAX_PERIOD``, or ``is_followed`` is true of its first points.
     """
-    out = _setting_out(parent, where)
+    out = _setting_out(parent, bifurcation)
     if out is None:
         return None
     first, border = out
-    if known(first):
+    if is_followed(first):
         return None
     origin = Branch(first.curve, first.points[-1:], first.ends)
     grown = follow(origin, low, high, 1.0, border=border)
     return Branch(first.curve, first.points[:-1] + grown.points, (End.JOINED, grown.ends[1]))
 
 
-def birth(parent: Branch, where: Bifurcation) -> Birth | None:
+def birth(parent: Branch, bifurcation: Bifurcation) -> Birth | None:
     """The orbits that leave ``parent`` at a pitchfork or a period doubling, right beside it.
 
     None at other points, and where none are found.
     """
-    out = _setting_out(parent, where)
+    out = _setting_out(parent, bifurcation)
     if out is None:
         return None
     first = out[0]
     for p in first.points[1:]:
-        off = p.value - where.value
-        if abs(off) > where.error and abs(p.orbit.radius - 1.0) > CRITICAL:
+        off = p.value - bifurcation.value
+        if abs(off) > bifurcation.error and abs(p.orbit.radius - 1.0) > CRITICAL:
             return Birth(p.response, first.curve.symmetric, 1 if off > 0.0 else -1, p.stable)
     return None
 
 
-def _setting_out(parent: Branch, where: Bifurcation) -> tuple[Branch, Array] | None:
+def _setting_out(parent: Branch, bifurcation: Bifurcation) -> tuple[Branch, Array] | None:
     """The first points of the branch that leaves ``parent`` at a point, from the point itself on,
     and the direction they set out in; None where there are none."""
     curve = parent.curve
-    x, value = where.point.solved.x, where.value
-    doubled = where.kind is PointKind.DOUBLING
-    if where.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING):
+    x, value = bifurcation.point.solved.x, bifurcation.value
+    doubled = bifurcation.kind is PointKind.DOUBLING
+    if bifurcation.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING):
         return None
     n = 2 * curve.n if doubled else curve.n
     if n > MAX_PERIOD:
         return None
     other = Curve.through(curve.family, x, value, n, False)
-    border = np.append(_leaving(where.point.solved.jacobian, other.scale[:-1]), 0.0)
+    border = np.append(_leaving(bifurcation.point.solved.jacobian, other.scale[:-1]), 0.0)
     centre = np.append(x, value)
     for reach in ASIDE:
         solved = other.correct(centre + reach * other.scale * border, border)
@@ -94,7 +94,7 @@ def _setting_out(parent: Branch, where: Bifurcation) -> tuple[Branch, Array] | N
             continue
         if _parting(other, point) < 0.5 * reach:
             continue  # fell back onto the parent
-        root = _meeting(other, where, point)
+        root = _meeting(other, bifurcation, point)
         points = None if root is None else _led(other, root, point)
         if points is None:
             continue  # no orbit of this branch, or one beyond more than can be told apart
@@ -110,10 +110,10 @@ def close(branch: Branch, points: Sequence[Bifurcation]) -> Branch:
     if branch.ends[1] is not End.JOINED:
         return branch
     last = branch.points[-1]
-    for where in sorted(points, key=lambda p: abs(p.value - last.value)):
-        if abs(where.value - last.value) > REACH * float(branch.curve.scale[-1]):
+    for bifurcation in sorted(points, key=lambda p: abs(p.value - last.value)):
+        if abs(bifurcation.value - last.value) > REACH * float(branch.curve.scale[-1]):
             break
-        root = _meeting(branch.curve, where, last)
+        root = _meeting(branch.curve, bifurcation, last)
         if root is not None:
             more = (_led(branch.curve, root, last) or (root, last))[-2::-1]
             return Branch(branch.curve, branch.points + more, branch.ends)
@@ -136,22 +136,22 @@ def _led(curve: Curve, root: BranchPoint, near: BranchPoint) -> tuple[BranchPoin
     return (replace(root, solved=replace(root.solved, tangent=tangent)), *after)
 
 
-def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint | None:
+def _meeting(curve: Curve, bifurcation: Bifurcation, near: BranchPoint) -> BranchPoint | None:
     """The orbit of a bifurcation point as one of a curve that leaves there, or None if ``near``,
     the curve's point next to it, is far from it in all of its periods and their mirror images."""
-    flow = curve.family.flow(where.value)
-    n = where.point.orbit.n
-    wanted = n if where.kind is PointKind.PITCHFORK else 2 * n
-    if where.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING) or wanted != curve.n:
+    flow = curve.family.flow(bifurcation.value)
+    n = bifurcation.point.orbit.n
+    wanted = n if bifurcation.kind is PointKind.PITCHFORK else 2 * n
+    if bifurcation.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING) or wanted != curve.n:
         return None
-    laps = list(flow.run(where.point.solved.x, n).strobes[:-1])
+    laps = list(flow.run(bifurcation.point.solved.x, n).strobes[:-1])
     if flow.system.mirror is not None:
-        laps += list(mirrored_strobes(flow, where.point.orbit))
+        laps += list(mirrored_strobes(flow, bifurcation.point.orbit))
     x = min(laps, key=lambda lap: float(np.abs((lap - near.solved.x) / curve.scale[:-1]).max()))
-    y = np.append(x, where.value)
+    y = np.append(x, bifurcation.value)
     step = (near.solved.y - y) / curve.scale
     length = float(np.linalg.norm(step))
-    image = curve.image(x, where.value)
+    image = curve.image(x, bifurcation.value)
     if image is None or not 0.0 < length < REACH:
         return None
     residual = float(np.abs((image[0] - x) / curve.scale[:-1]).max())

@@ -49,11 +49,11 @@ def changes(sweep: Sweep, point: Bifurcation) -> list[TrackChange]:
     """
     out: list[TrackChange] = []
     for track in sweep.plan.tracks:
-        shown = _on(sweep, track, point)
-        if shown is None:
+        sides = _on(sweep, track, point)
+        if sides is None:
             continue
         name = track if sweep.plan.followed else RISING
-        out.append(TrackChange(name, *shown, _text(point, *shown)))
+        out.append(TrackChange(name, *sides, _text(point, *sides)))
         if not sweep.plan.followed:
             break
     return out or [_of_branch(point)]
@@ -79,12 +79,12 @@ def _on(sweep: Sweep, track: str, point: Bifurcation) -> tuple[str, str] | None:
         if not 0 <= index < len(steps):
             return None
         after = steps[index]
-        if after.status is OrbitStatus.NOT_SETTLED or _shown(after) == _shown(before):
+        if after.status is OrbitStatus.NOT_SETTLED or _step_label(after) == _step_label(before):
             continue
         caused = _leaves(point, before, after, step) or _arrives(point, before, after, step)
         if not caused and not sweep.plan.followed:
             caused = _begins(point, after, step)
-        return (_shown(before), _shown(after)) if caused else None
+        return (_step_label(before), _step_label(after)) if caused else None
     return None
 
 
@@ -135,7 +135,7 @@ def _is(step: Steady, point: Bifurcation, response: str) -> bool:
     return family(step.response) == family(response) and step.symmetric is point.symmetric
 
 
-def _shown(step: Steady) -> str:
+def _step_label(step: Steady) -> str:
     return label(step.response, step.symmetric)
 
 

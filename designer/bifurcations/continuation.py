@@ -183,16 +183,16 @@ def follow(
     away = parted(curve, first)  # else Newton's method may fall onto the parent near its end
     end = End.POINTS
     while len(points) < POINTS:
-        here = points[-1]
-        new, solved = None, _step(curve, here.solved, tangent, step)
+        current = points[-1]
+        new, solved = None, _step(curve, current.solved, tangent, step)
         if solved is not None and not low <= solved.value <= high:
             edge = low if solved.value < low else high
-            if here.value == edge:
+            if current.value == edge:
                 end = End.LIMIT
                 break
-            last = _onto(curve, here.solved, solved, edge)
+            last = _onto(curve, current.solved, solved, edge)
             point = None if last is None else at(curve, last)
-            inner = None if point is None else _between(curve, here, point)
+            inner = None if point is None else _between(curve, current, point)
             if point is not None and inner is not None:
                 points += [*inner, point]
                 end = End.LIMIT
@@ -207,19 +207,19 @@ def follow(
                 end = End.JOINED if fallen else End.LOST
                 break
             continue
-        if joined(curve, here, new):
+        if joined(curve, current, new):
             step *= 0.5
             if step < CLOSE:
                 end = End.JOINED
                 break
             continue
-        inner = _between(curve, here, new)
+        inner = _between(curve, current, new)
         back = inner is not None and _retraces(curve, points, new)
         if back and (closing := _closing(curve, points, new)):
             points += closing
             end = End.CLOSED
             break
-        if inner is None or back:  # it is not seen to lead there, or turns round on the spot
+        if inner is None or back:  # nothing shows that it leads there, or it turns back
             step *= 0.5
             if step < LEAST:
                 end = End.LOST
@@ -229,7 +229,7 @@ def follow(
         if until(new):
             end = End.STOPPED
             break
-        change = abs(_size(here) - _size(new))
+        change = abs(_size(current) - _size(new))
         turned = float(tangent @ solved.tangent)
         tangent = solved.tangent
         if solved.iterations <= 3 and change < 0.5 * JUMP and turned > 0.995:
@@ -245,41 +245,41 @@ def _retraces(curve: Curve, points: list[BranchPoint], new: BranchPoint) -> bool
 
 
 def _closing(curve: Curve, points: list[BranchPoint], new: BranchPoint) -> list[BranchPoint]:
-    """What leads from a branch's last point to its first, as the orbit is met there, on the way to
-    ``new``; nothing where the branch did not come back to its first point."""
-    here = points[-1]
-    step = curve.distance(here.solved, new.solved)
+    """The points that lead from a branch's last point to its first, on the way to ``new``; none
+    where the branch did not come back to its first point."""
+    current = points[-1]
+    step = curve.distance(current.solved, new.solved)
 
     def way(y: Array) -> float:
         """By y from the last point to the new one."""
-        ends = (here.solved.y, new.solved.y)
+        ends = (current.solved.y, new.solved.y)
         return float(sum(np.linalg.norm((end - y) / curve.scale) for end in ends))
 
     y = min(images(curve, points[0].solved), key=way)
-    border = (new.solved.y - here.solved.y) / curve.scale / step
+    border = (new.solved.y - current.solved.y) / curve.scale / step
     solved = curve.correct(y, border) if way(y) < LOOP * step else None
     last = None if solved is None else at(curve, solved)
-    return [] if last is None else [*(_between(curve, here, last) or ()), last]
+    return [] if last is None else [*(_between(curve, current, last) or ()), last]
 
 
-def _step(curve: Curve, here: Solved, tangent: Array, step: float) -> Solved | None:
+def _step(curve: Curve, current: Solved, tangent: Array, step: float) -> Solved | None:
     """A step along the tangent, if it ends where it aimed at and the curve did not turn much."""
-    guess = here.y + step * curve.scale * tangent
+    guess = current.y + step * curve.scale * tangent
     solved = curve.correct(guess, tangent)
     if solved is None:
         return None
     off = float(np.linalg.norm((solved.y - guess) / curve.scale))
-    if step < KINK and not curve.family.flow(here.value).system.continuous:
+    if step < KINK and not curve.family.flow(current.value).system.continuous:
         return solved if off < 2.0 * step and tangent @ solved.tangent > 0.0 else None
     return solved if off < 0.5 * step and tangent @ solved.tangent > TURN else None
 
 
-def _onto(curve: Curve, here: Solved, past: Solved, value: float) -> Solved | None:
+def _onto(curve: Curve, current: Solved, past: Solved, value: float) -> Solved | None:
     """The point of the branch at a value between two points."""
-    share = (value - here.value) / (past.value - here.value)
-    guess = here.y + share * (past.y - here.y)
-    solved = curve.near(guess[:-1], value, 1.0 if past.value > here.value else -1.0)
-    if solved is None or curve.distance(here, solved) > 2.0 * curve.distance(here, past):
+    share = (value - current.value) / (past.value - current.value)
+    guess = current.y + share * (past.y - current.y)
+    solved = curve.near(guess[:-1], value, 1.0 if past.value > current.value else -1.0)
+    if solved is None or curve.distance(current, solved) > 2.0 * curve.distance(current, past):
         return None
     return solved
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from designer.base.errors import InputError
 from designer.dynamics.flow import Flow
 
-KEPT = 8
+MOST_FLOWS = 8
 """Flows that a family remembers."""
 
 
@@ -28,7 +28,7 @@ class Family:
     """Upper end of the parameter's domain."""
     build: Callable[[float], Flow]
     """Makes the flow at a value."""
-    _kept: dict[float, Flow] = field(default_factory=dict, repr=False, compare=False)
+    _flows: dict[float, Flow] = field(default_factory=dict, repr=False, compare=False)
 
     def flow(self, value: float) -> Flow:
         """The flow at a value of the parameter.
@@ -37,16 +37,16 @@ class Family:
         ------
         InputError : the value lies outside the domain.
         """
-        known = self._kept.get(value)
-        if known is not None:
-            return known
+        flow = self._flows.get(value)
+        if flow is not None:
+            return flow
         if not self.contains(value):
             raise InputError(
                 None, self.parameter, value, f"a number between {self.low:g} and {self.high:g}"
             )
-        while len(self._kept) >= KEPT:
-            self._kept.pop(next(iter(self._kept)))
-        return self._kept.setdefault(value, self.build(value))
+        while len(self._flows) >= MOST_FLOWS:
+            self._flows.pop(next(iter(self._flows)))
+        return self._flows.setdefault(value, self.build(value))
 
     def contains(self, value: float) -> bool:
         """Whether the value lies inside the domain."""

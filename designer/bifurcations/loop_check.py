@@ -32,7 +32,7 @@ def images(curve: Curve, solved: Solved) -> Array:
     return np.column_stack([laps, np.full(len(laps), solved.value)])
 
 
-def place(curve: Curve, points: Sequence[Solved], seen: Array) -> int | None:
+def place(curve: Curve, points: Sequence[Solved], orbit_images: Array) -> int | None:
     """Number of the first point after which the branch passes one of the images, or None.
 
     points : neighbours on ``curve``. seen : ``images`` of an orbit of its period.
@@ -42,13 +42,13 @@ def place(curve: Curve, points: Sequence[Solved], seen: Array) -> int | None:
     track = np.array([p.y for p in points]) / curve.scale
     chords = np.diff(track, axis=0)
     squares = np.maximum((chords**2).sum(axis=1), 1e-300)
-    for image in seen / curve.scale:
+    for image in orbit_images / curve.scale:
         off = image - track[:-1]
         share = (off * chords).sum(axis=1) / squares
         aside = np.linalg.norm(off - share[:, None] * chords, axis=1)
         near = (aside <= BESIDE * np.sqrt(squares) + EQUAL) & (share >= 0.0) & (share <= 1.0)
         for i in map(int, np.flatnonzero(near)):
-            found = curve.between(points[i], points[i + 1], float(share[i]))
-            if found is not None and np.abs(found.y / curve.scale - image).max() < EQUAL:
+            solved = curve.between(points[i], points[i + 1], float(share[i]))
+            if solved is not None and np.abs(solved.y / curve.scale - image).max() < EQUAL:
                 return i
     return None

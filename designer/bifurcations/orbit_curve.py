@@ -180,10 +180,10 @@ class Curve:
             + length * ((s - 2.0 * s**2 + s**3) * ta + (s**3 - s**2) * tb)
         )
         centre = a.y + s * (b.y - a.y)
-        found = self.correct(guess, chord / length, centre=centre)
-        if found is None or np.linalg.norm((found.y - centre) / self.scale) > ASTRAY * length:
+        solved = self.correct(guess, chord / length, centre=centre)
+        if solved is None or np.linalg.norm((solved.y - centre) / self.scale) > ASTRAY * length:
             return None
-        return found
+        return solved
 
     def monodromy(self, solved: Solved) -> Array:
         """(states, states) of the n-period map."""

@@ -29,7 +29,7 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     whose = f" of {label(point.response, point.symmetric)}"
     if point.kind is PointKind.GRAZING:
         whose = f" at {point.stops}" if point.stops else ""
-    return f"{NAMES[point.kind]}{whose}{place}: {_what(point)}"
+    return f"{NAMES[point.kind]}{whose}{place}: {_change(point)}"
 
 
 def label(response: str, symmetric: bool | None) -> str:
@@ -44,7 +44,7 @@ def doubled(response: str) -> str:
     return response if counts is None else str(counts.doubled)
 
 
-def _what(point: Bifurcation) -> str:
+def _change(point: Bifurcation) -> str:
     if point.kind is PointKind.FOLD:
         return _fold(point)
     if point.kind is PointKind.GRAZING:
@@ -80,9 +80,9 @@ def _born(point: Bifurcation) -> str:
     response = point.response if born is None else born.response
     if point.kind is PointKind.DOUBLING and born is None:
         response = doubled(point.response)
-    where = ""
+    side = ""
     if born is not None:
-        where = f" {SIDES[born.side]}, {'stable' if born.stable else 'unstable'}"
+        side = f" {SIDES[born.side]}, {'stable' if born.stable else 'unstable'}"
     if point.kind is PointKind.PITCHFORK:
-        return f"its two asymmetric twins {response} are born{where}"
-    return f"{response} is born{where}"
+        return f"its two asymmetric twins {response} are born{side}"
+    return f"{response} is born{side}"

@@ -147,45 +147,45 @@ class Bifurcation:
 
 
 def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
-    """Every bifurcation point on a branch, in its order; ``number`` is what ``branch`` is called.
+    """Every bifurcation point on a branch, in its order. number : the branch's number, from 0.
 
-    What happens twice between two neighbouring points is not seen.
+    Of two bifurcations of one kind between two neighbouring points neither is found.
     """
-    found = []
+    points = []
     for index, (a, b) in enumerate(zip(branch.points, branch.points[1:], strict=False)):
         for kind, test in _tests(branch.curve, a, b):
             located = _locate(branch.curve, a, b, kind, test, index, number)
             if located is not None:
-                found.append(located)
-    found.sort(key=lambda p: p.position)
-    return [_beside(branch, where, found) for where in found]
+                points.append(located)
+    points.sort(key=lambda p: p.position)
+    return [_beside(branch, point, points) for point in points]
 
 
-def _beside(branch: Branch, where: Bifurcation, every: list[Bifurcation]) -> Bifurcation:
+def _beside(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bifurcation:
     """A point with the branch's responses and stability right beside it.
 
     Those are the neighbouring points' of the branch, unless something else happens before them, or
     they are where the branch meets another and their multipliers tell nothing.
     """
-    index = int(where.position)
+    index = int(point.position)
     ends = branch.points[index], branch.points[index + 1]
     beside = []
     for k, end in enumerate(ends):
         others = [
             p.position
             for p in every
-            if int(p.position) == index and (p.position - where.position) * (k - 0.5) > 0.0
+            if int(p.position) == index and (p.position - point.position) * (k - 0.5) > 0.0
         ]
         meets = branch.ends[k] is End.JOINED and index + k == k * (len(branch.points) - 1)
-        found = None
+        neighbour = None
         if others or meets:
-            edge = min(others, key=lambda s: abs(s - where.position), default=float(index + k))
-            share = 0.5 * (edge + where.position) - index
+            edge = min(others, key=lambda s: abs(s - point.position), default=float(index + k))
+            share = 0.5 * (edge + point.position) - index
             solved = branch.curve.between(ends[0].solved, ends[1].solved, share)
-            found = None if solved is None else at(branch.curve, solved)
-        beside.append(end if found is None else found)
+            neighbour = None if solved is None else at(branch.curve, solved)
+        beside.append(end if neighbour is None else neighbour)
     a, b = beside
-    return replace(where, before=a.response, after=b.response, stable=(a.stable, b.stable))
+    return replace(point, before=a.response, after=b.response, stable=(a.stable, b.stable))
 
 
 Test = Callable[[BranchPoint], float]
@@ -248,8 +248,8 @@ def _gap(curve: Curve, clearances: set[int]) -> Test:
     """Signed distance to its stop of the turning point that lies nearest to one."""
 
     def gap(p: BranchPoint) -> float:
-        found = heights(curve.family.flow(p.value), p.orbit, sorted(clearances))
-        return float(found[np.argmin(np.abs(found))])
+        distances = heights(curve.family.flow(p.value), p.orbit, sorted(clearances))
+        return float(distances[np.argmin(np.abs(distances))])
 
     return gap
 
@@ -264,18 +264,18 @@ def _locate(
     number: int,
 ) -> Bifurcation | None:
     """The root of a test function between two points of a branch; None where orbits fail."""
-    known: dict[float, BranchPoint] = {0.0: a, 1.0: b}
+    evaluated: dict[float, BranchPoint] = {0.0: a, 1.0: b}
 
     def point(s: float) -> BranchPoint:
-        if s not in known:
+        if s not in evaluated:
             solved = curve.between(a.solved, b.solved, s)
-            found = None if solved is None else at(curve, solved)
-            if found is None:
+            branch_point = None if solved is None else at(curve, solved)
+            if branch_point is None:
                 raise ArithmeticError(f"no orbit at {s} between two points")
-            known[s] = found
-        return known[s]
+            evaluated[s] = branch_point
+        return evaluated[s]
 
-    def left(p: BranchPoint) -> bool:
+    def on_first_side(p: BranchPoint) -> bool:
         """Whether a point lies on a's side."""
         return p.counts == a.counts if kind is PointKind.GRAZING else test(p) * test(a) > 0.0
 
@@ -283,7 +283,7 @@ def _locate(
         if test(a) * test(b) < 0.0:
             root = float(brentq(lambda s: test(point(s)), 0.0, 1.0, xtol=1e-15, rtol=1e-14))
         elif kind is PointKind.GRAZING:
-            root = _bisect(lambda s: left(point(s)))
+            root = _bisect(lambda s: on_first_side(point(s)))
         else:
             return None
         middle = point(root)
@@ -292,7 +292,7 @@ def _locate(
         ):
             return None  # a jump over zero: two complex multipliers that became real
         stalled = max(1.0, middle.solved.residual / CONVERGED)
-        error = _width(point, left, root, stalled * ROUNDING * float(curve.scale[-1]))
+        error = _width(point, on_first_side, root, stalled * ROUNDING * float(curve.scale[-1]))
     except ArithmeticError:
         return None
     return Bifurcation(

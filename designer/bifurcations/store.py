@@ -48,13 +48,13 @@ _MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
 """Of systems with more clearances than one."""
 
 
-def work_hash(said: Mapping[str, Any]) -> str:
+def work_hash(settings: Mapping[str, Any]) -> str:
     """Hash of what decides a result."""
-    text = json.dumps({"rules": RULES, **said}, sort_keys=True)
+    text = json.dumps({"rules": RULES, **settings}, sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
+def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None:
     """A whole sweep as one Parquet file, with the columns of the blocks: track after track, the
     values ascending.
 
@@ -62,13 +62,13 @@ def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
     ------
     InputError : it cannot be written.
     """
-    parameter = made.plan.parameter
+    parameter = sweep.plan.parameter
     rows = [
         row
-        for track, steps in made.steps.items()
-        for row in _rows(parameter, track, [float(v) for v in made.plan.values], steps)
+        for track, steps in sweep.steps.items()
+        for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
     ]
-    key = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
+    key = {"format": FORMAT, "work": work_hash(sweep.plan.as_dict())}
     store: KeyedStore[Rows] = KeyedStore(path.parent, ParquetForm(_sweep_schema(parameter), _MORE))
     store.write(path.name, key, rows, {"provenance": provenance})
 
@@ -193,8 +193,8 @@ class GridStore:
         """Keep a finished row."""
         rows = []
         for cell in cells:
-            said = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
-            rows.append({**said, **_columns(cell)})
+            coordinates = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
+            rows.append({**coordinates, **_columns(cell)})
         name = self.name(self.kind, row)
         self._store.write(name, self._key(row), rows, {"provenance": self.provenance})
 

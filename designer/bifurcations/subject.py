@@ -69,7 +69,7 @@ class Subject(Protocol):
         """One flow for each value of a parameter, the others as they stand."""
         ...
 
-    def held(self, swept: Mapping[str, float | None]) -> Mapping[str, float | None]:
+    def fixed(self, swept: Mapping[str, float | None]) -> Mapping[str, float | None]:
         """The parameters that are not swept, with their values; None where there is none."""
         ...
 

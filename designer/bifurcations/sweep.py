@@ -195,13 +195,13 @@ def run(
             progress()
         return out
 
-    found: dict[str, list[Steady]] = {track: [] for track in plan.tracks}
+    by_track: dict[str, list[Steady]] = {track: [] for track in plan.tracks}
     for blocks in parallel(work, tasks, jobs):
         for track, steps in blocks:
-            found[track] += steps
+            by_track[track] += steps
     return Sweep(
         plan,
-        {t: tuple(s[::-1] if t == DOWN else s) for t, s in found.items()},
+        {t: tuple(s[::-1] if t == DOWN else s) for t, s in by_track.items()},
     )
 
 
@@ -233,18 +233,18 @@ def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
     values = sweep.plan.values
     out: list[Window] = []
     running: dict[tuple[str, bool | None], int] = {}
-    shown: set[tuple[str, bool | None]]
+    responses: set[tuple[str, bool | None]]
     for i in range(len(values) + 1):
-        shown = set()
+        responses = set()
         if i < len(values):
-            seen = [sweep.steps[t][i] for t in tracks]
-            shown = {(s.response, s.symmetric) for s in seen}
-        for key in [k for k in running if k not in shown]:
+            steps = [sweep.steps[t][i] for t in tracks]
+            responses = {(s.response, s.symmetric) for s in steps}
+        for key in [k for k in running if k not in responses]:
             first = running.pop(key)
             low, high = float(values[first]), float(values[i - 1])
-            steps = [s for t in tracks for s in sweep.steps[t][first:i] if s.response == key[0]]
-            out.append(Window(low, high, *key, i - first, name, *_exponents(steps)))
-        for key in shown:
+            run = [s for t in tracks for s in sweep.steps[t][first:i] if s.response == key[0]]
+            out.append(Window(low, high, *key, i - first, name, *_exponents(run)))
+        for key in responses:
             running.setdefault(key, i)
     return sorted(out, key=lambda w: (w.low, w.high, w.response, str(w.symmetric)))
 

@@ -30,41 +30,41 @@ NAMES = {
 
 
 def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) -> str:
-    """What a picture shows: whose motion, over what, from which starts, and what is held.
+    """What a picture shows: whose motion, over what, from which starts, and the fixed parameters.
 
     name : the model's title, or "". width : characters of a line.
     """
     whose = plan.subject.whose
     if isinstance(plan, SweepPlan):
-        what = f"bifurcation diagram of the {whose} over {_name(plan.parameter)}, {_way(plan)}"
+        heading = f"bifurcation diagram of the {whose} over {_name(plan.parameter)}, {_way(plan)}"
         changed: Mapping[str, float | None] = {plan.parameter: None}
     elif isinstance(plan, MapPlan):
         over = f"{_name(plan.x)} and {_name(plan.y)}"
-        what = f"responses n-p-q of the {whose} over {over}, from rest"
+        heading = f"responses n-p-q of the {whose} over {over}, from rest"
         changed = {plan.x: None, plan.y: None}
     else:
-        what = f"basins of attraction of the {whose}, by the initial {_name(plan.x)} and "
-        what += f"{_name(plan.y)}, other states 0"
+        heading = f"basins of attraction of the {whose}, by the initial {_name(plan.x)} and "
+        heading += f"{_name(plan.y)}, other states 0"
         changed = plan.changes
-    lines = [name, what, "held: " + ", ".join(_held(plan.subject, changed))]
+    lines = [name, heading, "held: " + ", ".join(_fixed(plan.subject, changed))]
     return "\n".join(
         part for line in lines for part in textwrap.wrap(line, width, break_on_hyphens=False)
     )
 
 
 def _way(plan: SweepPlan) -> str:
-    """How the values are gone through."""
+    """In which order, or from which starts, the values are computed."""
     if plan.followed:
-        said = {DOWN: "followed down", UP: "followed up"}
-        return " and ".join(said[t] for t in plan.tracks)
+        directions = {DOWN: "followed down", UP: "followed up"}
+        return " and ".join(directions[t] for t in plan.tracks)
     count = len(plan.tracks)
     return "from rest at each value" if count == 1 else f"from {count} starts at each value"
 
 
-def _held(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[str]:
-    """The parameters that stand still, with their values. changed : None where one is swept."""
+def _fixed(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[str]:
+    """The fixed parameters with their values. changed : None where one is swept."""
     yield from subject.remarks()
-    for name, value in {**subject.held(changed), **changed}.items():
+    for name, value in {**subject.fixed(changed), **changed}.items():
         if value is not None:
             unit = subject.units.get(name, "")
             si = f" ({subject.si[name].text(value)})" if name in subject.si else ""

@@ -43,15 +43,15 @@ def locate(
     """The points, ascending; ``progress`` is called once a window."""
 
     def one(window: Window) -> list[Bifurcation]:
-        found = _ends(sweep, window, sweep.plan.subject.family(sweep.plan.parameter))
+        points = _ends(sweep, window, sweep.plan.subject.family(sweep.plan.parameter))
         progress()
-        return found
+        return points
 
-    every = [p for found in parallel(one, windows(sweep), jobs) for p in found]
+    every = [p for points in parallel(one, windows(sweep), jobs) for p in points]
     out: list[Bifurcation] = []
     for point in sorted(every, key=lambda p: (p.value, str(p.kind))):
-        known = [p for p in out if p.kind is point.kind]
-        if not any(abs(p.value - point.value) <= SAME * abs(point.value) for p in known):
+        same_kind = [p for p in out if p.kind is point.kind]
+        if not any(abs(p.value - point.value) <= SAME * abs(point.value) for p in same_kind):
             out.append(point)
     return out
 
@@ -66,12 +66,12 @@ def _ends(sweep: Sweep, window: Window, over: Family) -> list[Bifurcation]:
             if (step.response, step.symmetric) != (window.response, window.symmetric):
                 continue
             flow = over.flow(values[k])
-            found = attractors.shoot(flow, step.start, step.n)
-            if found is None:
+            solution = attractors.shoot(flow, step.start, step.n)
+            if solution is None:
                 continue
-            orbit = attractors.describe(flow, found[0], step.n, found[1])
+            orbit = attractors.describe(flow, solution[0], step.n, solution[1])
             margin = BEYOND * (values[1] - values[0])
             low, high = max(window.low - margin, values[0]), min(window.high + margin, values[-1])
-            made = branch_survey.survey(over, [(values[k], orbit)], low, high, depth=0)
-            return [p for p in made.points if values[0] <= p.value <= values[-1]]
+            survey = branch_survey.survey(over, [(values[k], orbit)], low, high, depth=0)
+            return [p for p in survey.points if values[0] <= p.value <= values[-1]]
     return []

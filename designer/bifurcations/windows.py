@@ -107,18 +107,19 @@ def _alike(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
     return [(run[0], run[-1]) for run in runs]
 
 
-def all_windows(found: Survey) -> list[BranchWindow]:
+def all_windows(survey: Survey) -> list[BranchWindow]:
     """The windows on every branch; one that reaches to the parent branch ends at its point."""
     out: list[BranchWindow] = []
-    for number, branch in enumerate(found.branches):
+    points = survey.points
+    for number, branch in enumerate(survey.branches):
         out += [
-            replace(w, low=_met(w.low, found.points), high=_met(w.high, found.points))
-            for w in windows(branch, found.on(number), number)
+            replace(w, low=_on_junction(w.low, points), high=_on_junction(w.high, points))
+            for w in windows(branch, survey.on(number), number)
         ]
     return sorted(out, key=lambda w: w.low.value)
 
 
-def _met(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
+def _on_junction(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
     """The bifurcation point that a branch was led on to where it joins another."""
     if end.why != End.JOINED:
         return end
@@ -142,9 +143,9 @@ def window(family: Family, orbit: Orbit, value: float, low: float, high: float) 
         return not p.stable or p.counts != counts
 
     branch = trace(origin, low, high, until=over)
-    for found in windows(branch, locate(branch)):
-        if found.low.value <= value <= found.high.value:
-            return found
+    for candidate in windows(branch, locate(branch)):
+        if candidate.low.value <= value <= candidate.high.value:
+            return candidate
     raise ArithmeticError(f"{orbit.response} at {family.parameter} = {value:g} is not stable")
 
 
@@ -165,10 +166,16 @@ def _unlocated(branch: Branch, outer: int, inner: int) -> WindowEnd:
     return WindowEnd(0.5 * (a.value + b.value), half, NOT_LOCATED, None, b.orbit)
 
 
-def _end(branch: Branch, where: Bifurcation | None, side: int) -> WindowEnd:
-    if where is None:
+def _end(branch: Branch, end: Bifurcation | None, side: int) -> WindowEnd:
+    if end is None:
         point, inner = branch.points[-side], side * (len(branch.points) - 3) + 1
         if branch.ends[side] is End.JOINED and branch.points[inner].counts != point.counts:
             return _unlocated(branch, -side, inner)
         return WindowEnd(point.value, 0.0, str(branch.ends[side]), None, point.orbit)
-    return WindowEnd(where.value, where.error, str(where.kind), where, where.point.orbit)
+    return WindowEnd(
+        end.value,
+        end.error,
+        str(end.kind),
+        end,
+        end.point.orbit,
+    )

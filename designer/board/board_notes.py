@@ -32,7 +32,7 @@ PROBE = 100e-12
 
 
 def markdown(
-    made: Synthesis, circuit: Circuit, choice: BoardChoice, components: Sequence[Component]
+    synthesis: Synthesis, circuit: Circuit, choice: BoardChoice, components: Sequence[Component]
 ) -> str:
     """The notes as Markdown; nothing in them is text of the model file."""
     parts = [
@@ -42,10 +42,10 @@ def markdown(
         _mounting(choice, components),
         "## Connections",
         _connections(circuit, components),
-        _supply(circuit, made.catalog),
+        _supply(circuit, synthesis.catalog),
         _outputs(circuit, choice),
-        *_protection(made, circuit, choice),
-        *_trim(made, circuit, choice),
+        *_protection(synthesis, circuit, choice),
+        *_trim(synthesis, circuit, choice),
         *_spare(circuit),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -80,9 +80,9 @@ def _mounting(choice: BoardChoice, components: Sequence[Component]) -> str:
 
 def _connections(circuit: Circuit, components: Sequence[Component]) -> str:
     rows = ["| connector | pin | net |", "|---|---|---|"]
-    held = {p.name for p in circuit.fittings if isinstance(p, Connector)}
+    connectors = {p.name for p in circuit.fittings if isinstance(p, Connector)}
     for component in components:
-        if component.reference in held:
+        if component.reference in connectors:
             for pin in component.pins:
                 net = "ground" if pin.net == "0" else pin.net
                 rows.append(f"| {component.reference}, {component.role} | {pin.number} | {net} |")
@@ -111,8 +111,8 @@ def _outputs(circuit: Circuit, choice: BoardChoice) -> str:
     )
 
 
-def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
-    opamp = made.catalog.opamp(circuit.opamp)
+def _protection(synthesis: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+    opamp = synthesis.catalog.opamp(circuit.opamp)
     most = None if opamp.input_current is None else opamp.input_current.max
     lines = []
     for node in driven_nodes(circuit):
@@ -126,7 +126,7 @@ def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[
             word = "below" if current < most else "above"
             text += f" That is {word} the {_q(most, 'A')} that an input of the op-amp stands."
         if choice.spec.input_protection:
-            level = protection_offset(circuit, node, choice, made.catalog, opamp.offset_limit)
+            level = protection_offset(circuit, node, choice, synthesis.catalog, opamp.offset_limit)
             text += (
                 f" The two diodes take it to ground. With {_q(opamp.offset_limit, 'V')} of input "
                 f"offset across them they leak as much as {_q(level, 'V')} of DC at the generator."
@@ -144,11 +144,11 @@ def _displacement(circuit: Circuit) -> tuple[str, str]:
     if not circuit.stops:
         return circuit.state_nets[0], circuit.state_nets[0]
     stop = circuit.stops[trimmed_clearance(circuit)]
-    own = circuit.state_nets[circuit.states.index(stop.state)]
-    return (own if stop.difference is None else stop.difference[0]), stop.output
+    state_net = circuit.state_nets[circuit.states.index(stop.state)]
+    return (state_net if stop.difference is None else stop.difference[0]), stop.output
 
 
-def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+def _trim(synthesis: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
     trimmers = [p for p in circuit.fittings if isinstance(p, Trimmer)]
     if not trimmers:
         return []

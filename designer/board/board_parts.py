@@ -105,7 +105,7 @@ def board_circuit(synthesis: Designed) -> tuple[Circuit, BoardChoice]:
     return fitted(synthesis.design.circuit, choice, synthesis.catalog), choice
 
 
-def shown(circuit: Circuit) -> tuple[str, ...]:
+def probed_nets(circuit: Circuit) -> tuple[str, ...]:
     """The nets with a probe: the circuit's outputs, and the displacement in each clearance between
     two masses."""
     between = [stop.difference[0] for stop in circuit.stops if stop.difference is not None]
@@ -192,7 +192,7 @@ def _supply(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
 def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
     """A resistor for each output, its pad behind it, and one connector for all."""
     behind = []
-    for i, net in enumerate(shown(circuit), start=1):
+    for i, net in enumerate(probed_nets(circuit), start=1):
         out = f"{net}_out"
         behind.append(out)
         value, role = choice.spec.probe_resistor, f"probe of {net}"
@@ -257,5 +257,5 @@ def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[F
     value = float(max((v for v in sold if v <= wanted), default=sold[0]))
     role = "DC trim"
     yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)
-    number = 901 + max(PROBES, len(shown(circuit)))
+    number = 901 + max(PROBES, len(probed_nets(circuit)))
     yield Resistor(f"R{number}", "trim", node, value, role, views)

@@ -123,19 +123,19 @@ def bill_csv(lines: Iterable[Line]) -> str:
     return csv_text(COLUMNS, (line.cells() for line in lines))
 
 
-def bill_of_materials(made: Designed) -> pd.DataFrame:
+def bill_of_materials(synthesis: Designed) -> pd.DataFrame:
     """What is to be bought for one board: the rows of ``bom.csv``, with numbers as numbers.
 
-    made : what ``synthesise`` or ``run`` gives. Designators stand in one text, and so does the
-    grade, which a part may lack.
+    synthesis : what ``synthesise`` or ``run`` returns. The designators of a row stand in one
+    text, and so does the grade, which a part may lack.
 
     Raises
     ------
     InputError : a case or a part that the catalogue does not have.
     Unreachable : a value that cannot be bought.
     """
-    circuit, choice = board_circuit(made)
-    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
+    circuit, choice = board_circuit(synthesis)
+    lines = bill(to_buy(components(circuit, synthesis.catalog, choice), choice))
     numbers = ("quantity", "price_class")
     rows = [{**line.cells(), **{n: getattr(line, n) for n in numbers}} for line in lines]
     return frame(rows, COLUMNS)

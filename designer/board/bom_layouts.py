@@ -105,8 +105,8 @@ def _layout(name: str, folders: Sequence[Path]) -> Layout:
         path = folder / LAYOUTS / f"{name}.toml"
         if path.is_file():
             return _read(name, path)
-    known = {p.stem for folder in folders for p in (folder / LAYOUTS).glob("*.toml")}
-    raise InputError(None, "board.bom", name, one_of(name, sorted(known)))
+    names = {p.stem for folder in folders for p in (folder / LAYOUTS).glob("*.toml")}
+    raise InputError(None, "board.bom", name, one_of(name, sorted(names)))
 
 
 def _read(name: str, path: Path) -> Layout:
@@ -114,8 +114,8 @@ def _read(name: str, path: Path) -> Layout:
     table = checked(_File, parse_toml(text, str(path)), str(path))
     for number, column in enumerate(table.columns, start=1):
         if (column.field is None) == (column.text is None):
-            given = "neither" if column.field is None else "both"
-            raise InputError(path, f"columns[{number}]", given, "field or text")
+            value = "neither" if column.field is None else "both"
+            raise InputError(path, f"columns[{number}]", value, "field or text")
     titles = [column.title for column in table.columns]
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:

@@ -321,11 +321,11 @@ def _ordered(sold: PartChoice) -> Bought:
     )
 
 
-def _better(grade: float, asked: float) -> str:
+def _better(grade: float, wanted: float) -> str:
     """What is said of a part that is bought at another grade than was asked for."""
-    if math.isclose(grade, asked, rel_tol=1e-9):
+    if math.isclose(grade, wanted, rel_tol=1e-9):
         return ""
-    return f"asked for at {100 * asked:g} %, at which nobody sells this value"
+    return f"asked for at {100 * wanted:g} %, at which nobody sells this value"
 
 
 TEST_POINT = "TestPoint:TestPoint_Pad_D1.5mm"
@@ -334,9 +334,9 @@ TEST_POINT = "TestPoint:TestPoint_Pad_D1.5mm"
 
 def rated(rating: Rating) -> str:
     """A rating in words."""
-    shown = []
+    phrases = []
     if rating.power is not None:
-        shown.append(format_quantity(rating.power, "W"))
+        phrases.append(format_quantity(rating.power, "W"))
     if rating.voltage is not None:
-        shown.append(format_quantity(rating.voltage, "V"))
-    return ", ".join(shown)
+        phrases.append(format_quantity(rating.voltage, "V"))
+    return ", ".join(phrases)

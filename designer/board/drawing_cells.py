@@ -94,14 +94,15 @@ class CellRows:
 Cell = Amplifier | CellRows
 
 
-def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
-    """The parts joined to chains; nets of ``shown``, and where other than two meet, are ends."""
+def chains(parts: Iterable[TwoPin], visible: frozenset[str]) -> list[Chain]:
+    """The parts joined to chains. ``visible`` nets are ends, and so are nets where one part ends or
+    more than two meet."""
     left = list(parts)
     counts: dict[str, int] = {}
     for part in left:
         for net in part.nets:
             counts[net] = counts.get(net, 0) + 1
-    inner = {net for net, count in counts.items() if count == 2 and net not in shown}
+    inner = {net for net, count in counts.items() if count == 2 and net not in visible}
     out = []
     while left:
         ends = [p for p in left if not set(p.nets) <= inner]
@@ -126,9 +127,9 @@ def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
     and what several of them share."""
     pins = {net for s in circuit.sections for net in s.nets}
     rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
-    shown = frozenset(pins | rails | {*circuit.stage_outputs})
+    visible = frozenset(pins | rails | {*circuit.stage_outputs})
     two_pin = [p for p in circuit.parts if not isinstance(p, Section)]
-    left = chains(two_pin, shown)
+    left = chains(two_pin, visible)
     stages = section_stages(circuit)
     cells = {s.name: _amplifier(circuit, s, stages[s.name], left) for s in circuit.sections}
     rows: list[tuple[Cell, ...]] = []
@@ -143,8 +144,8 @@ def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
     owners = stage_names(circuit)
     groups = [(owners[group[0].parts[0].name], net, group) for net, group in _groups(left)]
     for title in dict.fromkeys([*zones, *(stage for stage, _, _ in groups)]):
-        own = [CellRows(f"{stage} · {n}", tuple(g)) for stage, n, g in groups if stage == title]
-        rows.append((*own, *(cells[name] for name in zones.get(title, ()))))
+        chained = [CellRows(f"{stage} · {n}", tuple(g)) for stage, n, g in groups if stage == title]
+        rows.append((*chained, *(cells[name] for name in zones.get(title, ()))))
     return tuple(row for row in rows if row)
 
 
@@ -202,12 +203,12 @@ def board_cells(
     if not fittings:
         return ()
     pads = _pads(fittings)
-    shown: list[Chain | str] = []
+    outputs: list[Chain | str] = []
     drive: list[Chain | str] = []
     notes: list[str] = []
     for part in fittings:
         if isinstance(part, Resistor):
-            (shown if part.b in pads else drive).append(Chain(part.a, part.b, (part,)))
+            (outputs if part.b in pads else drive).append(Chain(part.a, part.b, (part,)))
         elif isinstance(part, Diode):
             drive.append(Chain(part.anode, part.cathode, (part,)))
         elif isinstance(part, Trimmer):
@@ -226,7 +227,7 @@ def board_cells(
     if tied:
         supply.append(f"spare, followers of ground: {', '.join(tied)}")
     cells = [
-        CellRows("board: outputs", tuple(shown), pads),
+        CellRows("board: outputs", tuple(outputs), pads),
         CellRows("board: generator", (*drive, *notes)),
         CellRows("board: connectors", tuple(supply)),
     ]
@@ -239,14 +240,14 @@ def board_cells(
 
 def _pads(fittings: Sequence[Fitting]) -> dict[str, list[str]]:
     """The test points and connector pins of each net."""
-    where: dict[str, list[str]] = {}
+    pads: dict[str, list[str]] = {}
     for part in fittings:
         if isinstance(part, TestPoint):
-            where.setdefault(part.net, []).append(part.name)
+            pads.setdefault(part.net, []).append(part.name)
         if isinstance(part, Connector):
             for way, net in enumerate(part.ways, start=1):
-                where.setdefault(net, []).append(f"{part.name}-{way}")
-    return where
+                pads.setdefault(net, []).append(f"{part.name}-{way}")
+    return pads
 
 
 def _net_name(net: str) -> str:

@@ -103,15 +103,15 @@ def shape(component: Component) -> SymbolShape:
 def _entry(
     component: Component, circuit: Circuit, stages: Mapping[str, str], library: str
 ) -> Entry:
-    drawn = shape(component)
-    where = {1: component.stage}
+    symbol = shape(component)
+    stage_of = {1: component.stage}
     if component.kind == "op-amp":
         units = [name for name in component.units if name != SUPPLY_UNIT]
-        where = {
+        stage_of = {
             i: stages.get(f"{component.reference}{name}", SUPPLY)
             for i, name in enumerate(units, start=1)
         } | {len(units) + 1: SUPPLY}
-    item = Item(component.reference, component.value, drawn, component.nets, where)
+    item = Item(component.reference, component.value, symbol, component.nets, stage_of)
     return Entry(item, (*_bought(component), *fields(component, circuit, library)), component)
 
 

@@ -139,8 +139,8 @@ class LayoutCell:
             self.open_pins.append(at)
         elif net in POWER:
             name = POWER[net]
-            made = Item(f"#PWR_{owner}", name, power(name), {"1": net}, {1: ""})
-            self.symbols.append(Placed(made, 1, *at))
+            item = Item(f"#PWR_{owner}", name, power(name), {"1": net}, {1: ""})
+            self.symbols.append(Placed(item, 1, *at))
         else:
             self.labels.append(NetLabel(net, at, left))
 
@@ -171,10 +171,10 @@ class Sheet:
         """The wires, cut wherever another wire, a pin or a label meets them."""
         pins = {s.point(p.number) for s in self.symbols for p in _unit_pins(s)}
         stops = pins | {label.at for label in self.labels}
-        whole = {wire for cell in self.cells for wire in cell.wires}
-        stops |= {end for wire in whole for end in wire}
+        wires = {wire for cell in self.cells for wire in cell.wires}
+        stops |= {end for wire in wires for end in wire}
         out: set[tuple[Point, Point]] = set()
-        for a, b in whole:
+        for a, b in wires:
             on = sorted(p for p in stops if _on(p, a, b))
             out |= set(pairwise(on))
         return tuple(sorted(out))
@@ -296,8 +296,8 @@ def _section(
         cell.wire((BUS, y - 6), (RETURN, y - 6), (RETURN, at_out[1]))
     elif node not in POWER:
         # Past the junction; above the bus where nothing leads on from there.
-        where = (BUS + 1, 0) if back else (BUS, min(levels))
-        cell.labels.append(NetLabel(node, where, left=False))
+        position = (BUS + 1, 0) if back else (BUS, min(levels))
+        cell.labels.append(NetLabel(node, position, left=False))
     cell.wire((BUS, min(levels)), (BUS, max(levels)))
     cell.height = max(PITCH * (len(inputs) - 1) + 4, y + 6)
     return cell

@@ -48,9 +48,9 @@ def project_name(title: str) -> str:
     return name or "board"
 
 
-def identifier(*what: str) -> str:
+def identifier(*names: str) -> str:
     """A UUID that depends on the names alone, so that the same thing keeps it."""
-    return str(uuid.uuid5(_SPACE, "\x1f".join(what)))
+    return str(uuid.uuid5(_SPACE, "\x1f".join(names)))
 
 
 def library_name(text: str) -> str:

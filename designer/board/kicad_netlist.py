@@ -44,14 +44,14 @@ def nets(components: Sequence[Component]) -> Pads:
 def _component(project: str, entry: Entry) -> Expression:
     fields = dict(entry.fields)
     reference, footprint = entry.item.reference, fields.pop("Footprint")
-    shown = {key: text for key, text in fields.items() if not key.startswith("Sim.")}
+    listed = {key: text for key, text in fields.items() if not key.startswith("Sim.")}
     return expression(
         "comp",
         ref=reference,
         value=entry.item.value,
         footprint=footprint,
         fields=tuple(
-            expression("field", expression("name", key), text) for key, text in shown.items()
+            expression("field", expression("name", key), text) for key, text in listed.items()
         ),
         sheetpath={"names": "/", "tstamps": "/"},
         tstamps=symbol_id(project, reference),

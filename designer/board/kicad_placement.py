@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from designer.board.board_parts import shown
+from designer.board.board_parts import probed_nets
 from designer.board.component import Component
 from designer.board.footprints import FootprintShape, footprint
 from designer.circuit.netlist import GROUND, Circuit, Section
@@ -276,11 +276,14 @@ def _sides(
     outgoing: list[PlacedComponent] = []
     simulated = set(circuit.nets) | {GROUND}
     for spot in spots:
-        own = {net for net in spot.component.nets.values() if net and net not in simulated}
+        outside = {net for net in spot.component.nets.values() if net and net not in simulated}
         drives = {
-            net for p in (*circuit.parts, *circuit.fittings) if own & set(p.nets) for net in p.nets
+            net
+            for p in (*circuit.parts, *circuit.fittings)
+            if outside & set(p.nets)
+            for net in p.nets
         }
-        out = bool(drives & set(shown(circuit)))
+        out = bool(drives & set(probed_nets(circuit)))
         (outgoing if out else incoming).append(spot)
     return incoming, outgoing
 

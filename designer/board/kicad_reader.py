@@ -17,7 +17,7 @@ from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import BOARD_VERSION, circuit_net
-from designer.board.outline import Outline, circle, drawn, read_outline
+from designer.board.outline import Outline, circle, pen_path, read_outline
 
 OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
@@ -302,7 +302,7 @@ def _around(
     left, top, right, bottom = anchor
     primitives = pad.find("primitives")
     for each in () if primitives is None else primitives.children:
-        points = drawn(each)
+        points = pen_path(each)
         if not points:
             return None
         width = each.find("width")

@@ -102,8 +102,8 @@ def board_rules(
     def rule(
         id_: str, constraint: str, value: float, nets: tuple[str, ...] = (), condition: str = ""
     ) -> CustomRule:
-        where = condition or " || ".join(f"A.NetName == '{net}'" for net in nets)
-        return CustomRule(id_, constraint, value, BY_ID[id_].least, where, nets)
+        selector = condition or " || ".join(f"A.NetName == '{net}'" for net in nets)
+        return CustomRule(id_, constraint, value, BY_ID[id_].least, selector, nets)
 
     conductors, leads = spacing(2.0 * circuit.supply)
     clearance = limit("clearance", max(conductors, MADE))

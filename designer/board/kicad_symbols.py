@@ -92,12 +92,12 @@ def two_pins(
     """A part of two pins in a row; left, right : number and name. body : its half length."""
     length = REACH - int(body)
     inner = [((-float(REACH - length), 0.0), (-body, 0.0)), ((body, 0.0), (REACH - length, 0.0))]
-    drawn = [tuple(line) for line in lines] + [p for p in inner if p[0] != p[1]]
+    strokes = [tuple(line) for line in lines] + [p for p in inner if p[0] != p[1]]
     pins = (
         ShapePin(*left, kind, -REACH, 0, 0, length),
         ShapePin(*right, kind, REACH, 0, 180, length),
     )
-    return SymbolShape(name, prefix, (SymbolUnit(pins, tuple(drawn), filled=False),))
+    return SymbolShape(name, prefix, (SymbolUnit(pins, tuple(strokes), filled=False),))
 
 
 def resistor() -> SymbolShape:

@@ -83,14 +83,14 @@ def read_outline(board: Expression) -> Outline:
     for each in board.children:
         if not any(layer.text() == LAYER for layer in each.all("layer")):
             continue
-        points = drawn(each)
+        points = pen_path(each)
         if not _closed(each):
             ends += points[:1] + points[-1:]
         sides += pairwise(points)
     return Outline(np.array(sides, dtype=float).reshape(-1, 2, 2), tuple(ends))
 
 
-def drawn(item: Expression) -> list[Point]:
+def pen_path(item: Expression) -> list[Point]:
     """The middle of what a drawn item's pen follows, as straight pieces; a closed one's first point
     again at the end. Nothing where it is none of the kinds that are read."""
     return _closed(item) or _open(item)

@@ -125,9 +125,9 @@ def section_pins(section: Section, opamp: OpAmp) -> tuple[Pin, ...]:
                 Pin(pin.inverting, "-", section.inverting, "input", unit),
                 Pin(pin.noninverting, "+", section.noninverting, "input", unit),
             )
-    known = ", ".join(pin.name for pin in opamp.pins)
+    names = ", ".join(pin.name for pin in opamp.pins)
     raise InputError(
-        None, "circuit.opamp", opamp.name, f"an op-amp with a section {unit}; it has {known}"
+        None, "circuit.opamp", opamp.name, f"an op-amp with a section {unit}; it has {names}"
     )
 
 

@@ -17,7 +17,7 @@ from .design_rule import (
     Scope as Scope,
     judged as judged,
     not_run as not_run,
-    shown as shown,
+    value_text as value_text,
 )
 from .design_rules import (
     BY_ID as BY_ID,

@@ -76,10 +76,10 @@ class Catalog:
         """The same catalogue for a board that takes these cases."""
         return replace(self, mounting=mounting)
 
-    def bought_from(self, asked: Mapping[Kind, Sequence[str]]) -> Catalog:
+    def bought_from(self, choice: Mapping[Kind, Sequence[str]]) -> Catalog:
         """The same catalogue with the choice of families that a model file states.
 
-        asked : by kind, the families that are bought from, or, each with ``FORBIDDEN`` in front,
+        choice : by kind, the families that are bought from, or, each with ``FORBIDDEN`` in front,
         those that are not; none: every one.
 
         Raises
@@ -87,14 +87,18 @@ class Catalog:
         InputError : no family of signal parts has that name; lists those that there are.
         """
         refused: set[str] = set()
-        for kind, names in asked.items():
-            known = [f.name for f in self.families if f.kind == kind and f.use == "signal"]
+        for kind, names in choice.items():
+            signal_families = [
+                f.name for f in self.families if f.kind == kind and f.use == "signal"
+            ]
             bare = [name.removeprefix(FORBIDDEN) for name in names]
             for name in bare:
-                if name not in known:
-                    raise InputError(None, f"circuit.{kind}_family", name, one_of(name, known))
+                if name not in signal_families:
+                    raise InputError(
+                        None, f"circuit.{kind}_family", name, one_of(name, signal_families)
+                    )
             forbids = any(name.startswith(FORBIDDEN) for name in names)
-            refused |= {n for n in known if names and (n in bare) is forbids}
+            refused |= {n for n in signal_families if names and (n in bare) is forbids}
         return replace(self, refused=frozenset(refused))
 
     def euro(self, price_class: int) -> float:
@@ -224,8 +228,8 @@ class Catalog:
         same = [t for t in self.trimmers if math.isclose(t.value, value, rel_tol=_SAME)]
         if same:
             return self._cased(same[0], f"trimmers of {format_quantity(value, 'Ω')}", same)
-        known = ", ".join(format_quantity(entry.value, "Ω") for entry in self.trimmers)
-        raise InputError(None, "trimmer", format_quantity(value, "Ω"), f"one of {known}")
+        values = ", ".join(format_quantity(entry.value, "Ω") for entry in self.trimmers)
+        raise InputError(None, "trimmer", format_quantity(value, "Ω"), f"one of {values}")
 
     def header(self, ways: int) -> Header:
         """The first pin header of so many ways; InputError where there is none."""
@@ -235,10 +239,10 @@ class Catalog:
         most = max((entry.ways[1] for entry in self.headers), default=0)
         raise InputError(None, "header", ways, f"a number of ways up to {most}")
 
-    def _cased(self, entry: _CasedT, what: str, others: Sequence[_CasedT]) -> _CasedT:
+    def _cased(self, entry: _CasedT, sort: str, others: Sequence[_CasedT]) -> _CasedT:
         """The entry in the first of its cases that the board takes.
 
-        what, others : parts of its sort, in words and as entries: what may be taken instead.
+        sort, others : parts that may be taken instead, in words and as entries.
 
         Raises
         ------
@@ -263,7 +267,7 @@ class Catalog:
             for other in others
             if other != entry and any(mounting_of(f) == self.mounting for f in _footprints(other))
         ]
-        expected = other_case(entry.name, self.mounting, sold, what, cased)
+        expected = other_case(entry.name, self.mounting, sold, sort, cased)
         raise InputError(None, "board.mounting", self.mounting, expected)
 
     def _families(self, kind: Kind, grade: float, use: Use = "signal") -> list[PartFamily]:
@@ -360,8 +364,8 @@ def _choice(family: PartFamily, value: float) -> PartChoice:
     )
 
 
-def _named(entries: Sequence[_NamedT], name: str, where: str) -> _NamedT:
+def _named(entries: Sequence[_NamedT], name: str, field: str) -> _NamedT:
     for entry in entries:
         if entry.name == name:
             return entry
-    raise InputError(None, where, name, one_of(name, [entry.name for entry in entries]))
+    raise InputError(None, field, name, one_of(name, [entry.name for entry in entries]))

@@ -48,7 +48,7 @@ class DesignRule:
 
     def bound(self, limit: float) -> str:
         """A limit in words."""
-        return f"at {'least' if self.least else 'most'} {shown(limit, self.unit)}"
+        return f"at {'least' if self.least else 'most'} {value_text(limit, self.unit)}"
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class NotRun(Exception):
 
 
 def judged(
-    rule: DesignRule, found: Iterable[Finding], override: Override | None = None
+    rule: DesignRule, findings: Iterable[Finding], override: Override | None = None
 ) -> RuleOutcome:
     """Pass or fail by the worst of what was found, under the model file's limit or the usual one.
 
@@ -140,30 +140,30 @@ def judged(
     ------
     NotRun : there is nothing that the rule applies to.
     """
-    ranked = [(_excess(rule, each, override), each) for each in found]
+    ranked = [(_excess(rule, each, override), each) for each in findings]
     if not ranked:
         raise NotRun("the design has nothing that this applies to")
     _, worst = max(ranked, key=lambda pair: pair[0])
     usual = usual_limit(rule, worst)
     limit = usual if override is None else override.limit
-    text = shown(worst.value, rule.unit)
+    text = value_text(worst.value, rule.unit)
     text += f" at {worst.where}" if worst.where else ""
     text += f"; {worst.more}" if worst.more else ""
     status = PASS if rule.keeps(worst.value, limit) else FAIL
     return RuleOutcome(rule, status, text, worst.value, limit, worst.where, override, usual)
 
 
-def usual_limit(rule: DesignRule, found: Finding) -> float:
+def usual_limit(rule: DesignRule, finding: Finding) -> float:
     """The limit of a rule where no model file changes it."""
-    limit = found.limit if found.limit is not None else rule.limit
+    limit = finding.limit if finding.limit is not None else rule.limit
     assert limit is not None, f"{rule.id} has no limit"
     return limit
 
 
-def _excess(rule: DesignRule, found: Finding, override: Override | None) -> float:
+def _excess(rule: DesignRule, finding: Finding, override: Override | None) -> float:
     """How far past its limit, in limits; a value that is no number is the worst."""
-    limit = usual_limit(rule, found) if override is None else override.limit
-    over = (limit - found.value) if rule.least else (found.value - limit)
+    limit = usual_limit(rule, finding) if override is None else override.limit
+    over = (limit - finding.value) if rule.least else (finding.value - limit)
     return float("inf") if over != over else over / (abs(limit) or 1.0)
 
 
@@ -173,7 +173,7 @@ def not_run(rule: DesignRule, why: str, override: Override | None = None) -> Rul
     return RuleOutcome(rule, NOT_RUN, why, limit=limit, override=override)
 
 
-def shown(value: float, unit: str) -> str:
+def value_text(value: float, unit: str) -> str:
     """A value with its unit, to three digits."""
     if value != value or abs(value) == float("inf"):
         return "no number"

@@ -111,8 +111,8 @@ def diode_model(diode: DiodeEntry) -> DiodeModel:
 
 
 def _no_diode(diode: DiodeEntry, volts: float, leakage: float) -> InputError:
-    found = f"{volts:g} V at {TEST_CURRENT:g} A beside {leakage:g} A of leakage"
-    return InputError(None, f"diode {diode.name}", found, "the figures of a diode")
+    figures = f"{volts:g} V at {TEST_CURRENT:g} A beside {leakage:g} A of leakage"
+    return InputError(None, f"diode {diode.name}", figures, "the figures of a diode")
 
 
 def card(model: DiodeModel, name: str, *, charge: bool) -> str:

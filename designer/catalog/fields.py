@@ -102,11 +102,11 @@ def figure(unit: str, *, signed: bool = False) -> Accepts:
 
 def _unknown(value: dict[str, object]) -> list[InputError]:
     """A problem for each key that a figure does not have."""
-    known = [field.name for field in fields(Figure)]
+    keys = [field.name for field in fields(Figure)]
     return [
-        InputError(None, str(key), f"unknown key {key!r}", one_of(str(key), known))
+        InputError(None, str(key), f"unknown key {key!r}", one_of(str(key), keys))
         for key in value
-        if key not in known
+        if key not in keys
     ]
 
 
@@ -115,9 +115,9 @@ def _without_source(value: dict[str, object]) -> list[InputError]:
     problems = []
     source, assumed = value.get("source", MISSING), value.get("assumed", False)
     if not isinstance(source, str) or not source.strip():
-        found = source if source is MISSING else shown(source)
+        stated = source if source is MISSING else shown(source)
         expected = "where the figure stands: title, revision and section of the data sheet"
-        problems.append(InputError(None, "source", found, expected))
+        problems.append(InputError(None, "source", stated, expected))
     if not isinstance(assumed, bool):
         problems.append(InputError(None, "assumed", shown(assumed), "true or false"))
     return problems

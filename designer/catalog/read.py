@@ -70,11 +70,11 @@ def read_folders(extra: Path | None = None) -> tuple[tuple[Entry, ...], str, tup
     """
     folders = _folders(extra)
     digest = hashlib.sha256()
-    held: dict[tuple[type[Entry], str], Entry] = {}
+    by_key: dict[tuple[type[Entry], str], Entry] = {}
     for folder in folders:
         for key, entry in _read_folder(folder, digest).items():
-            held.setdefault(key, entry)
-    return tuple(held.values()), digest.hexdigest(), folders
+            by_key.setdefault(key, entry)
+    return tuple(by_key.values()), digest.hexdigest(), folders
 
 
 def _folders(extra: Path | None) -> tuple[Path, ...]:
@@ -84,10 +84,10 @@ def _folders(extra: Path | None) -> tuple[Path, ...]:
     for origin, folder in named:
         if not folder.is_dir():
             raise InputError(None, origin, str(folder), "a folder of catalogue files")
-    own = Path(platformdirs.user_config_dir("designer", appauthor=False)) / "catalogs"
+    user_folder = Path(platformdirs.user_config_dir("designer", appauthor=False)) / "catalogs"
     return (
         *(folder for _, folder in named),
-        *([own] if own.is_dir() else []),
+        *([user_folder] if user_folder.is_dir() else []),
         _shipped(),
     )
 
@@ -103,7 +103,7 @@ def _shipped() -> Path:
 
 def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry], str], Entry]:
     """The entries of a folder, files in the order of their names; other files are left alone."""
-    held: dict[tuple[type[Entry], str], Entry] = {}
+    by_key: dict[tuple[type[Entry], str], Entry] = {}
     with reading(folder, "a folder of catalogue files", "the folder"):
         files = [path for path in folder.iterdir() if path.suffix in (".toml", ".csv")]
     for path in sorted(files, key=lambda each: each.name):
@@ -112,14 +112,14 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
         twice = []
         for entry in entries:
             key = type(entry), entry.name
-            if key in held:
+            if key in by_key:
                 expected = "names that this folder uses once"
                 twice.append(InputError(path, "name", entry.name, expected))
-            held[key] = entry
+            by_key[key] = entry
         _raise(twice)
     for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
         _digest(digest, f"{LAYOUTS}/{path.name}", read_bytes(path, "a layout that can be read"))
-    return held
+    return by_key
 
 
 def _digest(digest: hashlib._Hash, name: str, content: bytes) -> None:
@@ -256,12 +256,12 @@ class _File(FileTable):
 def _from_csv(text: str, file: str) -> tuple[Entry, ...]:
     """Part families, one a row; the columns are the keys of a TOML table, and ``format``."""
     rows = csv_rows(text, file)
-    known = ["format", *sorted(keys_of(FamilyTable))]
+    columns = ["format", *sorted(keys_of(FamilyTable))]
     _, header = next(rows, (1, []))
     problems = [
-        InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
+        InputError(file, "line 1", f"unknown column {name!r}", one_of(name, columns))
         for name in header
-        if name not in known
+        if name not in columns
     ]
     _raise(problems)
     families = []

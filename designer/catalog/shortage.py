@@ -67,12 +67,12 @@ class Offer:
 
 def _listed(families: Sequence[PartFamily]) -> str:
     """Families with their grades and the ranges of their values."""
-    shown = []
+    phrases = []
     for f in families[:MOST]:
         low, high = (format_quantity(end, UNITS[f.kind]) for end in f.range)
-        shown.append(f"{f.name} ({100 * f.grade:g} %, {low} to {high})")
+        phrases.append(f"{f.name} ({100 * f.grade:g} %, {low} to {high})")
     more = f" and {len(families) - MOST} more" if len(families) > MOST else ""
-    return ", ".join(shown) + more
+    return ", ".join(phrases) + more
 
 
 def no_values(
@@ -107,10 +107,10 @@ def _nothing(others: Offer) -> Unreachable:
     would = [f for f in others.families if others.mounting in ("mixed", f.mounting)]
     if would:
         named = [f for f in others.families if f.name not in refused]
-        found = f"nothing but {_listed(named)}" if named else "every family forbidden"
+        text = f"nothing but {_listed(named)}" if named else "every family forbidden"
         expected = f"families that the board takes, such as {_listed(would)}"
         reason = others.reason(named)
-        return Unreachable(None, f"circuit.{kind}_family", found, expected + reason)
+        return Unreachable(None, f"circuit.{kind}_family", text, expected + reason)
     if others.families:
         expected = f'"mixed", or {kind}s in the catalogue that have such a case'
         reason = others.reason(others.families)
@@ -127,16 +127,16 @@ def no_part(
     at any grade.
     """
     near = sorted(offer.values, key=lambda each: abs(math.log(each / value)))[:2]
-    shown = " or ".join(format_quantity(each, offer.unit) for each in sorted(near))
+    nearest = " or ".join(format_quantity(each, offer.unit) for each in sorted(near))
     if not others.values:
         return _nothing(others)
     expected = (
-        f"a value that can be bought at this grade, such as {shown}"
+        f"a value that can be bought at this grade, such as {nearest}"
         if near
         else f"a grade that can be bought: {best_grade(others)}"
     )
-    found = f"{format_quantity(value, offer.unit)} at {offer.grade:.4g}"
-    return Unreachable(None, offer.kind, found, expected + offer.reason(holding))
+    text = f"{format_quantity(value, offer.unit)} at {offer.grade:.4g}"
+    return Unreachable(None, offer.kind, text, expected + offer.reason(holding))
 
 
 def best_grade(offer: Offer) -> str:
@@ -144,11 +144,11 @@ def best_grade(offer: Offer) -> str:
     return f"{min(f.grade for f in offer.families if not offer.bars(f)):.4g} or more"
 
 
-def other_case(name: str, mounting: Mounting, sold: str, what: str, others: Sequence[str]) -> str:
+def other_case(name: str, mounting: Mounting, sold: str, sort: str, others: Sequence[str]) -> str:
     """What would do where a part is sold in no case that the board takes.
 
-    sold : the mounting that it is sold in. what : parts of its sort, in words; others : the names
+    sold : the mounting that it is sold in. sort : parts of its sort, in words; others : the names
     of those that have such a case.
     """
-    instead = f"{what} that have one: {', '.join(others) or 'none'}"
+    instead = f"{sort} that have one: {', '.join(others) or 'none'}"
     return f'"{sold}" or "mixed": {name} has no {CASES[mounting]} case in the catalogue; {instead}'

@@ -156,7 +156,7 @@ class _Block:
 
 def _statements(text: str, path: Path) -> list[_Statement]:
     """Statements without comments, continuations joined, each one found harmless."""
-    found: list[_Statement] = []
+    statements: list[_Statement] = []
     for number, raw in enumerate(text.replace("\r\n", "\n").split("\n"), start=1):
         line = raw.strip(" \t")
         if line.startswith("*"):
@@ -165,15 +165,17 @@ def _statements(text: str, path: Path) -> list[_Statement]:
         if not line:
             continue
         if line.startswith("+"):
-            if not found:
+            if not statements:
                 raise _refused(path, number, line, "a continuation of nothing")
-            first = found.pop()
-            found.append(_Statement(first.line, f"{first.text} {line[1:].strip()}"))
+            first = statements.pop()
+            statements.append(_Statement(first.line, f"{first.text} {line[1:].strip()}"))
         else:
-            found.append(_Statement(number, line))
-    if len(found) > MOST_STATEMENTS:
-        raise InputError(path, "the file", f"{len(found)} statements", f"up to {MOST_STATEMENTS}")
-    for statement in found:
+            statements.append(_Statement(number, line))
+    if len(statements) > MOST_STATEMENTS:
+        raise InputError(
+            path, "the file", f"{len(statements)} statements", f"up to {MOST_STATEMENTS}"
+        )
+    for statement in statements:
         if len(statement.text) > LONGEST:
             raise InputError(
                 path,
@@ -181,9 +183,9 @@ def _statements(text: str, path: Path) -> list[_Statement]:
                 f"{len(statement.text)} characters",
                 f"a statement of up to {LONGEST} characters",
             )
-    for statement in found:
+    for statement in statements:
         _check(statement, path)
-    return found
+    return statements
 
 
 def _check(s: _Statement, path: Path) -> None:
@@ -240,10 +242,10 @@ def _headed(head: _Statement, inside: tuple[_Statement, ...], path: Path) -> _Bl
     return _Block(head.line, words[0], tuple(words[1:]), rest, inside)
 
 
-def _called(s: _Statement) -> tuple[str, int, int]:
-    """Name of the subcircuit that an X line calls, and where it stands in the text.
+def _callee(s: _Statement) -> tuple[str, int, int]:
+    """Name of the subcircuit that an X line calls, and its first and last position in the text.
 
-    A line without one names itself, which no subcircuit is called.
+    A line without a name gives its own text, which is the name of no subcircuit.
     """
     match = _PARAMETER.search(s.text)
     nodes = s.text[: match.start()] if match else s.text
@@ -256,7 +258,7 @@ def _called(s: _Statement) -> tuple[str, int, int]:
 def _renamed(s: _Statement, blocks: Mapping[str, _Block]) -> str:
     if s.word[0] != "x":
         return s.text
-    name, start, stop = _called(s)
+    name, start, stop = _callee(s)
     return s.text[:start] + _prefixed(blocks[name.lower()].name) + s.text[stop:]
 
 
@@ -270,7 +272,7 @@ def _check_calls(
         for s in block.inside:
             if s.word[0] != "x":
                 continue
-            name = _called(s)[0].lower()
+            name = _callee(s)[0].lower()
             if name not in blocks:
                 raise _refused(path, s.line, s.text, "a subcircuit that is not in this file")
             calls[key].append(name)
@@ -280,10 +282,10 @@ def _check_calls(
         raise _refused(path, block.line, block.name, "a subcircuit that calls itself")
     sizes: dict[str, tuple[int, int]] = {}
     for key in order:
-        block, called = blocks[key], [sizes[name] for name in calls[key]]
-        count = len(block.inside) + sum(n for n, _ in called)
+        block, callees = blocks[key], [sizes[name] for name in calls[key]]
+        count = len(block.inside) + sum(n for n, _ in callees)
         length = sum(_length(s.text, functions)[0] for s in block.inside if s.word != ".func")
-        length += _length(block.rest, functions)[0] + sum(n for _, n in called)
+        length += _length(block.rest, functions)[0] + sum(n for _, n in callees)
         if count > MOST_EXPANDED or length > MOST_CHARACTERS:
             most = f"{MOST_EXPANDED} statements or {MOST_CHARACTERS} characters"
             raise _refused(path, block.line, block.name, f"more than {most}, written out")
@@ -291,8 +293,9 @@ def _check_calls(
 
 
 def _functions(statements: Sequence[_Statement], path: Path) -> dict[str, tuple[int, int]]:
-    """How long calls of each function become: characters of its own, and how often it repeats its
-    arguments. No function leads back to itself: ngspice would expand it for ever."""
+    """The length of each function's call, written out: characters of its body, and how often it
+    repeats its arguments. A function that leads back to itself is refused: ngspice would expand it
+    for ever."""
     heads: dict[str, _Statement] = {}
     # Two subcircuits may each have one of this name: all that any of them uses counts.
     bodies: dict[str, list[tuple[str, set[str]]]] = {}
@@ -306,8 +309,8 @@ def _functions(statements: Sequence[_Statement], path: Path) -> dict[str, tuple[
             arguments = {word.strip() for word in match[2].lower().split(",")}
             bodies.setdefault(name, []).append((s.text[match.end() :], arguments))
     uses = {
-        name: [w for text, _ in found for w in _TOKEN.findall(text.lower()) if w in heads]
-        for name, found in bodies.items()
+        name: [w for text, _ in definitions for w in _TOKEN.findall(text.lower()) if w in heads]
+        for name, definitions in bodies.items()
     }
     order, circle = _ordered(uses)
     if circle is not None:
@@ -315,35 +318,35 @@ def _functions(statements: Sequence[_Statement], path: Path) -> dict[str, tuple[
         raise _refused(path, s.line, s.text, "a function that calls itself")
     sizes: dict[str, tuple[int, int]] = {}
     for name in order:
-        own, repeats = zip(
+        lengths, repeats = zip(
             *(_length(text, sizes, names) for text, names in bodies[name]), strict=True
         )
-        sizes[name] = (max(own), max(1, *repeats))
+        sizes[name] = (max(lengths), max(1, *repeats))
     return sizes
 
 
 def _length(
     text: str, functions: Mapping[str, tuple[int, int]], arguments: Collection[str] = ()
 ) -> tuple[int, int]:
-    """At most so many characters with all functions written out, and how often any of the
-    arguments stands in it. Both stop a little above `MOST_CHARACTERS`."""
+    """An upper bound of the text's length with all functions written out, and the number of times
+    that any of the arguments stands in it. Both stop a little above `MOST_CHARACTERS`."""
     most = MOST_CHARACTERS + 1
     open_: list[tuple[tuple[int, int], int, int]] = []
-    call, own, repeats, last = (0, 1), 0, 0, ""
+    call, length, repeats, last = (0, 1), 0, 0, ""
     for token in [*_TOKEN.findall(text.lower()), *")" * text.count("(")]:
         if token == "(":
-            open_.append((call, own, repeats))
-            call, own, repeats = functions.get(last, (0, 1)), 0, 0
+            open_.append((call, length, repeats))
+            call, length, repeats = functions.get(last, (0, 1)), 0, 0
         elif token == ")" and open_:
-            inner = (call[0] + call[1] * own, call[1] * repeats)
-            call, own, repeats = open_.pop()
-            own, repeats = min(own + inner[0], most), min(repeats + inner[1], most)
+            inner = (call[0] + call[1] * length, call[1] * repeats)
+            call, length, repeats = open_.pop()
+            length, repeats = min(length + inner[0], most), min(repeats + inner[1], most)
         elif token in arguments:
             repeats += 1
         else:
-            own += len(token)
+            length += len(token)
         last = token
-    return own, repeats
+    return length, repeats
 
 
 def _ordered(uses: Mapping[str, Collection[str]]) -> tuple[list[str], str | None]:

@@ -92,7 +92,7 @@ def network_slots(
     spread = spread_of(synthesis.modelfile, circuit, catalog)
     measured = synthesis.modelfile.measured
     excluded = {name for g in spread.groups if not g.reel for name in g.parts}
-    excluded |= {*(spread.grades.keys() - spread.asked.keys()), *spread.shapes}
+    excluded |= {*(spread.grades.keys() - spread.wanted_grades.keys()), *spread.shapes}
     excluded |= set() if measured is None else measured.values.keys()
     nodes = {s.inverting: k for k, s in enumerate(circuit.sections)}
 
@@ -143,7 +143,7 @@ def _grades(
     """The slot of one part; None where nothing better is sold. A dearer grade that is no better
     than a cheaper one is left out.
 
-    asked : the grade that is asked for; the part is as it is bought there.
+    wanted_grade : the grade that the model file asks for; the part is as it is bought there.
     """
     base = catalog.part(kind, part.value, wanted_grade)
     now = base.family.grade

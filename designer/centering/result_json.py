@@ -69,9 +69,10 @@ def confirmation_json(
     response_of: Sequence[int],
     responses: int,
 ) -> list[dict[str, Any]]:
-    """What ngspice's rung said of boards of the study, by response.
+    """How ngspice's rung judges boards of the study, by response.
 
-    asked : for each question the index of its response; one that was left out asked nothing.
+    response_of : for each question the index of its response; a response that was left out has no
+    question.
     """
     out: list[dict[str, Any]] = []
     for index in range(responses):

@@ -112,7 +112,7 @@ class BoardSubject:
     def _flow(self, change: Mapping[str, float]) -> Flow:
         return Flow(self.system, self.excitation(change).drive, fast=False)
 
-    def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
+    def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """The generator's settings; no frequency where ω is swept."""
         return {
             "frequency": None if "omega" in swept else self.frequency,

@@ -76,8 +76,8 @@ def _example(rule: CustomRule, size: float, at: Point, nets: list[str]) -> Itera
     if rule.constraint == "clearance" and (rule.nets or not rule.condition):
         down = y + TRACK + size
         # Not the nets whose length and whose vias count.
-        own = nets.index(rule.nets[:3][-1]) if rule.nets else nets.index(_A)
-        yield _segment((x, y), (x + 5.0, y), TRACK, own)
+        ruled_net = nets.index(rule.nets[:3][-1]) if rule.nets else nets.index(_A)
+        yield _segment((x, y), (x + 5.0, y), TRACK, ruled_net)
         yield _segment((x, down), (x + 5.0, down), TRACK, nets.index(_B))
     elif rule.constraint == "clearance":
         for number, (name, left) in enumerate(((_A, x), (_B, x + PAD + size))):

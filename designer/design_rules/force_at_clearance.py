@@ -64,8 +64,8 @@ class Statics:
         sections = [s.name for s in self.circuit.sections]
         drive, rest = moved[0], moved[1:]
         if drive == 0.0:
-            where = f"the mass at clearance {clearance}" if clearance else "the mass"
-            raise ArithmeticError(f"the generator does not move {where}")
+            mass_name = f"the mass at clearance {clearance}" if clearance else "the mass"
+            raise ArithmeticError(f"the generator does not move {mass_name}")
         volts = [float(m / drive) for m in rest]
         return Forces(
             clearance,
@@ -87,8 +87,8 @@ class Statics:
             sources[row, i] = -1.0
         for i, net in enumerate(self._nets, sections):
             sources[c.nets.index(net), i] = 1.0
-        known = np.hstack([right[:, : n + 1], sources, right[:, n + 1 :]])
-        y = np.asarray(np.linalg.solve(G, known), dtype=np.float64)
+        inputs = np.hstack([right[:, : n + 1], sources, right[:, n + 1 :]])
+        y = np.asarray(np.linalg.solve(G, inputs), dtype=np.float64)
         solved = self._equations.solution(y)
         solved.voltage[GROUND] = np.zeros(y.shape[1])
         rates = self._equations.rates(solved)

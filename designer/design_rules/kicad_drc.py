@@ -86,12 +86,12 @@ def kicad_version() -> str | None:
     if shutil.which(PROGRAM) is None:
         return None
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [PROGRAM, "--version"], capture_output=True, text=True, timeout=60, check=False
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return done.stdout.strip() or None
+    return process.stdout.strip() or None
 
 
 def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
@@ -137,14 +137,14 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
     (place / "board.kicad_dru").write_text(rules, encoding="utf-8")
     out = place / "report.json"
     options = ["--format", "json", "--units", "mm", "--severity-all", "--output", str(out)]
-    own = {"HOME": str(place), "KICAD_CONFIG_HOME": str(place / "config"), "LC_ALL": "C"}
+    environment = {"HOME": str(place), "KICAD_CONFIG_HOME": str(place / "config"), "LC_ALL": "C"}
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [PROGRAM, "pcb", "drc", *options, str(place / "board.kicad_pcb")],
             capture_output=True,
             text=True,
             errors="replace",
-            env={**os.environ, **own},
+            env={**os.environ, **environment},
             timeout=PATIENCE,
             check=False,
         )
@@ -152,7 +152,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
     except subprocess.TimeoutExpired:
         raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
     except OSError:
-        lines = (done.stderr or done.stdout).strip().splitlines()
+        lines = (process.stderr or process.stdout).strip().splitlines()
         raise CheckFailed(
             f"kicad-cli wrote no report: {lines[-1] if lines else 'no reason'}"
         ) from None
@@ -175,7 +175,7 @@ def violations(answer: Mapping[str, Any], rules: Sequence[CustomRule]) -> tuple[
         id_ = named[1] if named else _width_rule(each, rules)
         if id_ in by_id:
             value = float(actual[1]) if actual else float("nan")
-            out.append(Violation(id_, value, _where(each)))
+            out.append(Violation(id_, value, _place(each)))
     return tuple(out)
 
 
@@ -196,8 +196,8 @@ def _is_canary(each: Mapping[str, Any]) -> bool:
     named = _RULE.search(str(each.get("description", "")))
     if named is not None and named[1] == CANARY:
         return True
-    own = f"{canary().limit:.4f}"
-    return each.get("type") == "track_width" and limit is not None and limit[1] == own
+    limit_text = f"{canary().limit:.4f}"
+    return each.get("type") == "track_width" and limit is not None and limit[1] == limit_text
 
 
 def _unconnected(answer: Mapping[str, Any]) -> Mapping[str, int]:
@@ -210,7 +210,7 @@ def _unconnected(answer: Mapping[str, Any]) -> Mapping[str, int]:
 
 
 def _shorts(answer: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(_where(each) for each in answer["violations"] if each.get("type") in SHORTS)
+    return tuple(_place(each) for each in answer["violations"] if each.get("type") in SHORTS)
 
 
 def _nets(each: Mapping[str, Any]) -> list[str]:
@@ -219,7 +219,7 @@ def _nets(each: Mapping[str, Any]) -> list[str]:
     return [net for text in words for net in _NET.findall(text)]
 
 
-def _where(each: Mapping[str, Any]) -> str:
+def _place(each: Mapping[str, Any]) -> str:
     items = each.get("items", [])
     words = " and ".join(str(item.get("description", "")) for item in items[:2])
     at = items[0].get("pos", {}) if items else {}
@@ -232,5 +232,5 @@ def _with_canary(board: BoardFile) -> str:
     corners = [pad.at for footprint in board.footprints for pad in footprint.pads] or [(0.0, 0.0)]
     x = min(at[0] for at in corners) + ASIDE[0]
     y = min(at[1] for at in corners) + ASIDE[1]
-    whole = read(board.text, board.path)
-    return expression_text(Expression((*whole.items, canary_track(x, y))))
+    tree = read(board.text, board.path)
+    return expression_text(Expression((*tree.items, canary_track(x, y))))

@@ -27,7 +27,7 @@ from designer.catalog.design_rule import (
     RuleOutcome,
     judged,
     not_run,
-    shown,
+    value_text,
 )
 from designer.catalog.design_rules import RULES
 from designer.circuit.netlist import NEGATIVE, POSITIVE
@@ -105,21 +105,21 @@ def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> It
     for package in components:
         if package.kind != "op-amp":
             continue
-        own = [c.reference for c in components if c.near == package.reference]
+        capacitors = [c.reference for c in components if c.near == package.reference]
         for pad in board.pads(package.reference):
             if pad.net not in (POSITIVE, NEGATIVE):
                 continue
             near = [
                 (math.dist(pad.at, other.at), reference)
-                for reference in own
+                for reference in capacitors
                 for other in board.pads(reference)
                 if other.net == pad.net
             ]
             if not near:
                 raise NotRun(f"{package.reference} has no decoupling capacitor on {pad.net}")
             distance, reference = min(near)
-            where = f"{package.reference}.{pad.number}"
-            yield Finding(distance, where, more=f"to {reference}; {_READ}")
+            place = f"{package.reference}.{pad.number}"
+            yield Finding(distance, place, more=f"to {reference}; {_READ}")
 
 
 def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
@@ -130,11 +130,11 @@ def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator
         raise NotRun(f"the edge on {LAYER} is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)")
     for component in components:
         for pad in board.pads(component.reference):
-            where = f"{component.reference}.{pad.number}"
+            place = f"{component.reference}.{pad.number}"
             if not pad.corners:
-                raise NotRun(f"{where} has a shape that is not read")
+                raise NotRun(f"{place} has a shape that is not read")
             room = board.outline.room(np.array(pad.corners))
-            yield Finding(room, where, more=_READ)
+            yield Finding(room, place, more=_READ)
 
 
 def unconnected(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
@@ -210,7 +210,7 @@ def _broken(
     rule: DesignRule, custom: CustomRule, broken: Sequence[Violation], override: Override | None
 ) -> RuleOutcome:
     worst = (min if rule.least else max)(broken, key=lambda v: v.actual)
-    text = f"{shown(worst.actual, rule.unit)} at {worst.where}"
+    text = f"{value_text(worst.actual, rule.unit)} at {worst.where}"
     if len(broken) > 1:
         text += f"; {len(broken)} places in all"
     usual = _usual(rule, custom, override)

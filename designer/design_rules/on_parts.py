@@ -89,7 +89,7 @@ def _other_value(component: Component, there: PlacedFootprint) -> str:
             same = math.isclose(quantity, component.quantity, rel_tol=1e-6)
         except ValueError:
             same = False
-    return "" if same else f"is {_shown(there.value)}, not {component.value}"
+    return "" if same else f"is {_printable(there.value)}, not {component.value}"
 
 
 def _other_number(component: Component, there: PlacedFootprint) -> str:
@@ -98,16 +98,16 @@ def _other_number(component: Component, there: PlacedFootprint) -> str:
     # A substitute is written with its maker in front.
     if actual == wanted or (actual and component.bought.substitute.endswith(f" {actual}")):
         return ""
-    return f"is ordered as {_shown(actual)}, not {wanted}"
+    return f"is ordered as {_printable(actual)}, not {wanted}"
 
 
 def _other_footprint(component: Component, there: PlacedFootprint) -> str:
     library = component.footprint.rpartition(":")[0]
     name = footprint_name(component.footprint)
     if there.name != name:
-        return f"is in {_shown(there.name)}, not in {name}"
+        return f"is in {_printable(there.name)}, not in {name}"
     if there.library not in (LIBRARY, library):
-        return f"is of the library {_shown(there.library)}, not of {LIBRARY} or {library}"
+        return f"is of the library {_printable(there.library)}, not of {LIBRARY} or {library}"
     return ""
 
 
@@ -123,7 +123,7 @@ def _plain(text: str) -> str:
     return "".join(text.split()).casefold()
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     """A text of the board in a message: printable, of a bounded length."""
-    shown = "".join(ch if ch.isprintable() else "?" for ch in text[:LONGEST])
-    return f"{shown}…" if len(text) > LONGEST else shown or "nothing"
+    printable = "".join(ch if ch.isprintable() else "?" for ch in text[:LONGEST])
+    return f"{printable}…" if len(text) > LONGEST else printable or "nothing"

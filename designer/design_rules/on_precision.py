@@ -38,7 +38,7 @@ def offset(s: RuleSubject) -> Iterator[Finding]:
         }
         total = float(np.sqrt(sum(each**2 for each in share.values())))
         more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
-        yield Finding(total, _most(share), more=_told(s, at, more))
+        yield Finding(total, _most(share), more=_with_clearance(s, at, more))
 
 
 def bias(s: RuleSubject) -> Iterator[Finding]:
@@ -51,7 +51,9 @@ def bias(s: RuleSubject) -> Iterator[Finding]:
             for section in s.circuit.sections
         }
         total = sum(share.values()) * limit / s.drive
-        yield Finding(total, _most(share), more=_told(s, at, f"{limit:.3g} A at each input"))
+        yield Finding(
+            total, _most(share), more=_with_clearance(s, at, f"{limit:.3g} A at each input")
+        )
 
 
 def noise(s: RuleSubject) -> Iterator[Finding]:
@@ -64,7 +66,7 @@ def noise(s: RuleSubject) -> Iterator[Finding]:
         amplifiers = sum((at.offset[a.name] * density) ** 2 for a in s.circuit.sections)
         warm = sum((at.between(r.a, r.b) * thermal(r.value)) ** 2 for r in resistors)
         total = float(np.sqrt(amplifiers * (white + flicker) + warm * white)) / s.drive
-        yield Finding(total, more=_told(s, at, f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz"))
+        yield Finding(total, more=_with_clearance(s, at, f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz"))
 
 
 def leakage(s: RuleSubject) -> Iterator[Finding]:
@@ -89,8 +91,10 @@ def leakage(s: RuleSubject) -> Iterator[Finding]:
                 more += ", and through the diodes"
             if any(node in pair for pair in opposed):
                 more += "; the protection's diodes see no voltage"
-            where = f"{section.name}, node {node}"
-            yield Finding((over_board + through) / s.drive, where, more=_told(s, at, more))
+            place = f"{section.name}, node {node}"
+            yield Finding(
+                (over_board + through) / s.drive, place, more=_with_clearance(s, at, more)
+            )
 
 
 def absorption(s: RuleSubject) -> Iterator[Finding]:
@@ -98,13 +102,13 @@ def absorption(s: RuleSubject) -> Iterator[Finding]:
     circuit = s.circuit
     for capacitor in circuit.capacitors:
         words = s.dielectrics.get(capacitor.name, "")
-        known = [share for word, share in ABSORPTION.items() if word.lower() in words.lower()]
-        share = known[0] if known else UNKNOWN
+        shares = [share for word, share in ABSORPTION.items() if word.lower() in words.lower()]
+        share = shares[0] if shares else UNKNOWN
         current = share * capacitor.value * circuit.saturation / RETURNS
         more = f"{100 * share:g} % of {circuit.saturation:g} V, {words or 'dielectric not known'}"
         for at in s.forces:
             force = abs(at.between(capacitor.plus, capacitor.minus)) * current / s.drive
-            yield Finding(force, capacitor.name, more=_told(s, at, more))
+            yield Finding(force, capacitor.name, more=_with_clearance(s, at, more))
 
 
 def stiffness(s: RuleSubject) -> Iterator[Finding]:
@@ -146,8 +150,8 @@ def _relative_stiffness(s: RuleSubject) -> Array:
     )
 
 
-def _told(s: RuleSubject, at: Forces, more: str) -> str:
-    """What a reader should know, with the clearance where there are several."""
+def _with_clearance(s: RuleSubject, at: Forces, more: str) -> str:
+    """The text, with the name of the clearance in front where there are several."""
     return f"clearance {at.clearance}: {more}" if len(s.forces) > 1 else more
 
 

@@ -23,11 +23,11 @@ HEAVY, LIGHT = 2e3, 10e3
 
 def swing(s: RuleSubject) -> Iterator[Finding]:
     """Peaks of every output but those that reach their limits in contact."""
-    met, meant = s.operating, saturating(s.circuit)
+    peaks, exempt = s.operating, saturating(s.circuit)
     for section in s.circuit.sections:
-        if section.name not in meant:
-            peak = max(met.high[section.output], met.low[section.output], key=lambda p: p.value)
-            limit = guaranteed_swing(s.opamp, s.circuit, met.source[section.name].value)
+        if section.name not in exempt:
+            peak = max(peaks.high[section.output], peaks.low[section.output], key=lambda p: p.value)
+            limit = guaranteed_swing(s.opamp, s.circuit, peaks.source[section.name].value)
             yield Finding(peak.value, _at(section.name, peak), limit)
 
 
@@ -93,9 +93,9 @@ def power_stuck(s: RuleSubject) -> Iterator[Finding]:
     return _power(s, s.stuck)
 
 
-def _power(s: RuleSubject, met: Operating) -> Iterator[Finding]:
+def _power(s: RuleSubject, peaks: Operating) -> Iterator[Finding]:
     for name, rating in s.watts.items():
-        peak = met.power.get(name)
+        peak = peaks.power.get(name)
         if peak is not None:
             more = f"{1e3 * peak.value:.3g} mW of {1e3 * rating:.3g} mW"
             yield Finding(peak.value / rating, _at(name, peak), more=more)
@@ -103,9 +103,9 @@ def _power(s: RuleSubject, met: Operating) -> Iterator[Finding]:
 
 def capacitor_voltage(s: RuleSubject) -> Iterator[Finding]:
     """Voltage of each capacitor over its rating; those of the supply too."""
-    ratings, met = s.volts, s.operating.across
+    ratings, peaks = s.volts, s.operating.across
     supply = {POSITIVE: s.circuit.supply, NEGATIVE: -s.circuit.supply, GROUND: 0.0}
-    across = {name: met[name] for name in met if name in ratings}
+    across = {name: peaks[name] for name in peaks if name in ratings}
     for name, peak in s.stuck.across.items():
         if name in across and peak.value > across[name].value:
             across[name] = peak

@@ -80,11 +80,11 @@ def stuck(circuit: Circuit, run: Run) -> Operating:
             board = _stuck(circuit, section.name, sign)
             name = f"{section.name} at the {rail} rail"
             there = replace(run, name=name, start=np.zeros(len(circuit.states)), periods=REST)
-            met = operating(Reduction(circuit, board), [there], {})
+            point = operating(Reduction(circuit, board), [there], {})
             for kind in ("high", "low", "slew", "across", "power", "source"):
-                _raise_peaks(getattr(out, kind), getattr(met, kind).items())
-            out.runs += met.runs
-            out.left_out |= met.left_out
+                _raise_peaks(getattr(out, kind), getattr(point, kind).items())
+            out.runs += point.runs
+            out.left_out |= point.left_out
     return out
 
 
@@ -121,8 +121,8 @@ def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str) -> None:
 
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
     """(k, q) values of these rows (q, n + 2) on the strobes."""
-    known = np.column_stack([sampled.x, sampled.u, np.ones(len(sampled.u))])
-    return _by_mode(sampled, rows, known)
+    inputs = np.column_stack([sampled.x, sampled.u, np.ones(len(sampled.u))])
+    return _by_mode(sampled, rows, inputs)
 
 
 def _rates(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
@@ -133,15 +133,15 @@ def _rates(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
     return _by_mode(sampled, rows, np.column_stack([sampled.slope, moving, np.zeros(len(time))]))
 
 
-def _by_mode(sampled: Sampled, rows: Callable[[Solution], Array], known: Array) -> Array:
+def _by_mode(sampled: Sampled, rows: Callable[[Solution], Array], inputs: Array) -> Array:
     out: Array | None = None
     for i, key in enumerate(sampled.keys):
         inside = sampled.at == i
         if not inside.any():
             continue
-        value = known[inside] @ rows(sampled.reduction.solution(key)).T
+        value = inputs[inside] @ rows(sampled.reduction.solution(key)).T
         if out is None:
-            out = np.empty((len(known), value.shape[1]))
+            out = np.empty((len(inputs), value.shape[1]))
         out[inside] = value
     assert out is not None
     return out

@@ -27,12 +27,12 @@ from designer.synthesis.output_loads import Run
 
 @dataclass(frozen=True)
 class RuleSubject:
-    """What the rules look at.
+    """The design and the board that the rules check.
 
-    What takes time is computed when a rule first asks for it, and then kept.
+    Quantities that take time are computed when a rule first asks for them.
     """
 
-    made: Synthesis
+    synthesis: Synthesis
     """The design, with its model."""
     circuit: Circuit
     """The circuit with its fittings."""
@@ -41,15 +41,15 @@ class RuleSubject:
 
     @property
     def design(self) -> Design:
-        return self.made.design
+        return self.synthesis.design
 
     @property
     def catalog(self) -> Catalog:
-        return self.made.catalog
+        return self.synthesis.catalog
 
     @property
     def model_responses(self) -> Sequence[ModelResponse]:
-        return self.made.model_responses
+        return self.synthesis.model_responses
 
     @property
     def opamp(self) -> OpAmp:
@@ -110,14 +110,14 @@ class RuleSubject:
     @cached_property
     def resistor_grades(self) -> dict[str, float]:
         """Grade of each resistor as it is bought; where none is known, that of the model file."""
-        usual = self.made.modelfile.circuit.resistor_grade
-        known = {
+        usual = self.synthesis.modelfile.circuit.resistor_grade
+        bought_grades = {
             name: component.bought.grade
             for component in self.components
             if component.bought is not None and component.bought.grade is not None
             for name in component.parts
         }
-        return {r.name: known.get(r.name, usual) for r in self.circuit.resistors}
+        return {r.name: bought_grades.get(r.name, usual) for r in self.circuit.resistors}
 
     @cached_property
     def watts(self) -> dict[str, float]:
@@ -146,8 +146,8 @@ class RuleSubject:
         return out
 
 
-def _complete(met: Operating, where: str) -> Operating:
-    """What was met, if every run has an answer; NotRun else."""
-    for name, why in met.left_out.items():
-        raise NotRun(f"no answer of the exact circuit {where} {name}: {why}")
-    return met
+def _complete(point: Operating, place: str) -> Operating:
+    """The extremes over all runs; ``NotRun`` where a run has no answer."""
+    for name, why in point.left_out.items():
+        raise NotRun(f"no answer of the exact circuit {place} {name}: {why}")
+    return point

@@ -84,7 +84,7 @@ def synthesis_json(
 
 
 def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, float]]:
-    return {name: {"asked": g.asked, "bought": g.bought} for name, g in better.items()}
+    return {name: {"asked": g.wanted, "bought": g.bought} for name, g in better.items()}
 
 
 def _mechanism(omega: float, si: SiScales | None) -> dict[str, float]:

@@ -121,7 +121,7 @@ class ModelSubject:
         """One flow for each value of a parameter, the others as they stand."""
         return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)
 
-    def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
+    def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters, in the order in which a model file has them; those
         that stand for nothing left out."""
         known = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])

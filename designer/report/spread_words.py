@@ -37,7 +37,7 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         parts.append(f"temperature uniform from {low:g} to {high:g} °C")
     if spread.ageing:
         parts.append(f"ageing of {_ageing(spread)}")
-    better = sorted(spread.asked, key=natural_key)
+    better = sorted(spread.wanted_grades, key=natural_key)
     for grade in sorted({spread.grades[name] for name in better}):
         names = ", ".join(name for name in better if spread.grades[name] == grade)
         parts.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")

@@ -37,7 +37,7 @@ class Quantity:
         return self.part + _NAMES.get(self.group, f".{self.group}")
 
 
-def quantities(circuit: Circuit, drawn: Boards) -> tuple[Quantity, ...]:
+def quantities(circuit: Circuit, boards: Boards) -> tuple[Quantity, ...]:
     """What differs between these boards, in the circuit's order.
 
     The limits of sections that are not meant to reach them are left out: while nothing clips they
@@ -45,24 +45,24 @@ def quantities(circuit: Circuit, drawn: Boards) -> tuple[Quantity, ...]:
     """
     limiting = {s.name for s in circuit.sections if s.limits}
     nominal = Boards.of(circuit, [nominal_board(circuit)])
-    found = []
+    varying = []
     for group in _GROUPS:
-        columns: Mapping[str, Array] = getattr(drawn, group)
+        columns: Mapping[str, Array] = getattr(boards, group)
         for part, values in columns.items():
             if group in ("low", "high") and part not in limiting:
                 continue
             sigma = float(np.std(values))
             exact = _nominal(nominal, group, part)
             if sigma > 1e-12 * abs(exact):
-                found.append(Quantity(part, group, exact, sigma))
-    return tuple(found)
+                varying.append(Quantity(part, group, exact, sigma))
+    return tuple(varying)
 
 
 def column(boards: Boards, quantity: Quantity) -> Array:
     """(N,) this quantity on each board; nominal where the boards do not have it."""
     columns: Mapping[str, Array] = getattr(boards, quantity.group)
-    known = columns.get(quantity.part)
-    return np.full(len(boards), quantity.nominal) if known is None else known
+    values = columns.get(quantity.part)
+    return np.full(len(boards), quantity.nominal) if values is None else values
 
 
 def with_column(boards: Boards, quantity: Quantity, values: Array) -> Boards:

@@ -25,13 +25,13 @@ def check_measured(measured: MeasuredBoards, circuit: Circuit) -> None:
     check_measured_names(measured, circuit)
     nominal = _nominal(circuit)
     for name, values in measured.values.items():
-        where = f"line {measured.lines.get(name, 0)}"
+        line = f"line {measured.lines.get(name, 0)}"
         low, high, unit = nominal[name]
         for value in values:
             if not math.isnan(value) and not low <= value <= high:
                 ends = " to ".join(format_quantity(end, unit) for end in (low, high))
-                found = f"{name}, {format_quantity(value, unit)}"
-                raise InputError(measured.source, where, found, f"a value within {ends}")
+                text = f"{name}, {format_quantity(value, unit)}"
+                raise InputError(measured.source, line, text, f"a value within {ends}")
 
 
 def check_measured_names(
@@ -43,13 +43,13 @@ def check_measured_names(
     ------
     InputError : names the first of them.
     """
-    known = [*_nominal(circuit), *more]
+    measurable = [*_nominal(circuit), *more]
     for name in measured.values:
-        if name not in known:
-            hint = did_you_mean(name, known)
+        if name not in measurable:
+            hint = did_you_mean(name, measurable)
             expected = "a part of this design" + (f"; {hint}" if hint else "")
-            where = f"line {measured.lines.get(name, 0)}"
-            raise InputError(measured.source, where, name, expected)
+            line = f"line {measured.lines.get(name, 0)}"
+            raise InputError(measured.source, line, name, expected)
 
 
 def _nominal(circuit: Circuit) -> dict[str, tuple[float, float, str]]:
@@ -59,15 +59,15 @@ def _nominal(circuit: Circuit) -> dict[str, tuple[float, float, str]]:
         ends = sorted((value / _FACTOR, value * _FACTOR))
         return ends[0], ends[1], unit
 
-    found = {r.name: about(r.value, "Ω") for r in circuit.resistors}
-    found |= {c.name: about(c.value, "F") for c in circuit.capacitors}
-    found |= {r.name: about(r.volts, "V") for r in circuit.references}
-    found |= {rail.name: about(rail.volts, "V") for rail in circuit.rails}
+    ranges = {r.name: about(r.value, "Ω") for r in circuit.resistors}
+    ranges |= {c.name: about(c.value, "F") for c in circuit.capacitors}
+    ranges |= {r.name: about(r.volts, "V") for r in circuit.references}
+    ranges |= {rail.name: about(rail.volts, "V") for rail in circuit.rails}
     supply = circuit.supply
     for s in circuit.sections:
-        found[f"{s.name}.offset"] = (-supply, supply, "V")
-        found[f"{s.name}.low"] = (-_FACTOR * supply, 0.0, "V")
-        found[f"{s.name}.high"] = (0.0, _FACTOR * supply, "V")
-        found[f"{s.name}.bias"] = (-1e-3, 1e-3, "A")
-        found[f"{s.name}.gbw"] = (1.0, 1e12, "Hz")
-    return found
+        ranges[f"{s.name}.offset"] = (-supply, supply, "V")
+        ranges[f"{s.name}.low"] = (-_FACTOR * supply, 0.0, "V")
+        ranges[f"{s.name}.high"] = (0.0, _FACTOR * supply, "V")
+        ranges[f"{s.name}.bias"] = (-1e-3, 1e-3, "A")
+        ranges[f"{s.name}.gbw"] = (1.0, 1e12, "Hz")
+    return ranges

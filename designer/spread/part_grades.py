@@ -23,7 +23,7 @@ from designer.spread.part_rules import kind_of, spread_of
 class BetterGrade:
     """A part of which nobody sells the value at the grade that was asked for."""
 
-    asked: float
+    wanted: float
     """The grade that was asked for, a fraction."""
     bought: float
     """The grade that it is bought and drawn at, a fraction."""
@@ -35,8 +35,10 @@ def better_grades(
     """The parts that are bought, and drawn, at a better grade than was asked for, by name."""
     spread = spread_of(modelfile, circuit, catalog)
     return {
-        name: BetterGrade(asked, spread.grades[name])
-        for name, asked in sorted(spread.asked.items(), key=lambda item: natural_key(item[0]))
+        name: BetterGrade(wanted, spread.grades[name])
+        for name, wanted in sorted(
+            spread.wanted_grades.items(), key=lambda item: natural_key(item[0])
+        )
     }
 
 
@@ -46,7 +48,7 @@ def better_grades_text(better: Mapping[str, BetterGrade]) -> str:
     for name, grade in better.items():
         groups.setdefault(grade, []).append(name)
     listed = [
-        f"{' '.join(names)} ({100 * g.bought:g} % for {100 * g.asked:g} %)"
+        f"{' '.join(names)} ({100 * g.bought:g} % for {100 * g.wanted:g} %)"
         for g, names in groups.items()
     ]
     if not listed:
@@ -94,7 +96,7 @@ def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str
     of arrays are not bought one by one.
     """
     spread = spread_of(modelfile, circuit, catalog)
-    stated = {**spread.grades, **spread.asked}
+    stated = {**spread.grades, **spread.wanted_grades}
     inside = {name for a in arrays(modelfile, circuit, catalog) for name in a.parts}
     grades = {}
     parts: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)

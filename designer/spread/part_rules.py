@@ -42,7 +42,7 @@ def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Sprea
 
 
 def check_names(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
-    """Refuse what boards of no design of this circuit can be, before one is sought: unknown parts,
+    """Refuse, before a design is sought, what no design of this circuit can have: unknown parts,
     networks that cannot be, and an ageing of which the catalogue says nothing.
 
     circuit : of any values. Where resistors may become two parts, their names are known too, and
@@ -55,14 +55,16 @@ def check_names(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Non
     may = modelfile.circuit.composites
     halves = [f"{r.name}{half}" for r in circuit.resistors for half in "AB" if may]
     parts = [p.name for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)]
-    known = [*KINDS, *parts]
+    part_names = [*KINDS, *parts]
     rules = modelfile.spread
-    asked = [(f"part[{i}].names", rule.names) for i, rule in enumerate(rules.part, start=1)]
-    asked += [(f"network[{i}].parts", rule.parts) for i, rule in enumerate(rules.network, start=1)]
-    for field, names in asked:
+    named = [(f"part[{i}].names", rule.names) for i, rule in enumerate(rules.part, start=1)]
+    named += [(f"network[{i}].parts", rule.parts) for i, rule in enumerate(rules.network, start=1)]
+    for field, names in named:
         for name in names:
-            if name not in known and name not in halves:
-                raise InputError(modelfile.source, f"spread.{field}", name, one_of(name, known))
+            if name not in part_names and name not in halves:
+                raise InputError(
+                    modelfile.source, f"spread.{field}", name, one_of(name, part_names)
+                )
     if modelfile.measured is not None:
         check_measured_names(modelfile.measured, circuit, halves)
     if not may:
@@ -77,10 +79,10 @@ def check_names(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Non
 def _check_drifts(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
     """Refuse an ageing by the catalogue where it has no drift of any family of some part's kind."""
     rules = modelfile.spread
-    own = {name for rule in rules.part if rule.ageing is not None for name in rule.names}
+    with_ageing = {name for rule in rules.part if rule.ageing is not None for name in rule.names}
     for kind, parts in (("resistor", circuit.resistors), ("capacitor", circuit.capacitors)):
         families = [family for family in catalog.families if family.kind == kind]
-        aged = f"{kind}s" in own or all(part.name in own for part in parts)
+        aged = f"{kind}s" in with_ageing or all(part.name in with_ageing for part in parts)
         if families and not aged and all(family.drift is None for family in families):
             raise InputError(
                 modelfile.source,
@@ -98,12 +100,12 @@ class _Rules:
         self.parts: dict[str, Part] = {
             p.name: p for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)
         }
-        self.own = self._own()
+        self.own = self._own_rules()
         arrays = dict(self._of_arrays())
         self.own |= arrays
         self.elements = frozenset(arrays)
-        self.drawn = {name: self._drawn(part) for name, part in self.parts.items()}
-        self.asked = self._asked()
+        self.drawn = {name: self._drawn_grade(part) for name, part in self.parts.items()}
+        self.wanted_grades = self._wanted_grades()
 
     def spread(self) -> Spread:
         rules, choice = self.rules, self.choice
@@ -132,24 +134,24 @@ class _Rules:
             ageing=self.ageing(),
             groups=(*self.networks(), *self.reels()),
             measured=measured,
-            asked=self.asked,
+            wanted_grades=self.wanted_grades,
         )
 
-    def refuse(self, key: str, found: object, expected: str) -> InputError:
-        return InputError(self.file, f"spread.{key}", found, expected)
+    def refuse(self, key: str, value: object, expected: str) -> InputError:
+        return InputError(self.file, f"spread.{key}", value, expected)
 
-    def _own(self) -> dict[str, PartRule]:
-        """What each part has of its own; a later table adds to an earlier one."""
-        found: dict[str, PartRule] = {}
+    def _own_rules(self) -> dict[str, PartRule]:
+        """The rule of each part named in ``[[spread.part]]``; a later table adds to an earlier one."""
+        rules: dict[str, PartRule] = {}
         for number, rule in enumerate(self.rules.part, start=1):
             for name in self.named(rule.names, f"part[{number}].names"):
                 stated = {key: v for key in _OWN if (v := getattr(rule, key)) is not None}
-                own = replace(found.get(name, PartRule((name,))), **stated)
+                merged = replace(rules.get(name, PartRule((name,))), **stated)
                 part = self.parts[name]
-                shape, grade = self.shape(part, own), self.grade(part, own)
+                shape, grade = self.shape(part, merged), self.grade(part, merged)
                 check_binned(shape, grade, f"spread.part[{number}].law", self.file)
-                found[name] = own
-        return found
+                rules[name] = merged
+        return rules
 
     def _of_arrays(self) -> Iterator[tuple[str, PartRule]]:
         """What parts have as elements of arrays; a temperature coefficient and a drift of their own
@@ -181,8 +183,8 @@ class _Rules:
         try:
             sold = self.catalog.array(family, part.value).family
         except InputError as error:
-            found = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
-            raise self.refuse(f"network[{number}].family", found, error.expected) from None
+            value = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
+            raise self.refuse(f"network[{number}].family", value, error.expected) from None
         if sold.kind != kind_of(part):
             raise self.refuse(f"network[{number}].parts", name, f"{sold.kind}s, as {family} holds")
         return sold
@@ -220,31 +222,31 @@ class _Rules:
             return SpreadShape()
         return self.rules.resistors if isinstance(part, Resistor) else self.rules.capacitors
 
-    def _drawn(self, part: Part) -> float:
-        """The grade that a part is drawn at: of what is bought where its grade is asked for.
+    def _drawn_grade(self, part: Part) -> float:
+        """The grade that a part is drawn at: that of the part which is bought for the wanted grade.
 
         A grade at which, or better, nobody sells the value is drawn as it is asked for, and so is
         that of an array, whose elements are not bought one by one.
         """
-        asked = self.grade(part, self.own.get(part.name))
+        wanted = self.grade(part, self.own.get(part.name))
         if isinstance(part, Reference) or part.name in self.elements:
-            return asked
-        sold = self.catalog.sold(kind_of(part), part.value, asked)
-        if sold is None or math.isclose(sold.family.grade, asked, rel_tol=1e-9):
-            return asked
+            return wanted
+        sold = self.catalog.sold(kind_of(part), part.value, wanted)
+        if sold is None or math.isclose(sold.family.grade, wanted, rel_tol=1e-9):
+            return wanted
         return sold.family.grade
 
-    def _asked(self) -> dict[str, float]:
-        """The grade asked for, of the parts that are bought at a better one."""
-        asked = {n: self.grade(part, self.own.get(n)) for n, part in self.parts.items()}
-        return {name: grade for name, grade in asked.items() if grade != self.drawn[name]}
+    def _wanted_grades(self) -> dict[str, float]:
+        """The wanted grades of the parts that are bought at a better one."""
+        grades = {n: self.grade(part, self.own.get(n)) for n, part in self.parts.items()}
+        return {name: grade for name, grade in grades.items() if grade != self.drawn[name]}
 
     def grades(self) -> dict[str, float]:
         """Of the parts for which one is stated, and of those that are bought at a better one."""
         named = [name for name, rule in self.own.items() if rule.grade is not None]
         if self.rules.reference_grade is not None:
             named += [r.name for r in self.circuit.references]
-        return {name: self.drawn[name] for name in (*named, *self.asked)}
+        return {name: self.drawn[name] for name in (*named, *self.wanted_grades)}
 
     def shapes(self) -> dict[str, Distribution]:
         """Over the grade, of the parts for which one is stated.
@@ -252,28 +254,28 @@ class _Rules:
         A binned law is about the grade that was asked for: a part that is bought at a better one
         lies in what was picked out, if that reaches so far.
         """
-        found = {}
+        shapes = {}
         for name, part in self.parts.items():
             rule, grade = self.own.get(name), self.drawn[name]
             shape = self.shape(part, rule)
             stated = rule is not None and (rule.law is not None or rule.grade is not None)
-            if name in self.asked and shape.law == "binned":
-                found[name] = (SpreadShape() if shape.inner >= grade else shape).over(grade)
+            if name in self.wanted_grades and shape.law == "binned":
+                shapes[name] = (SpreadShape() if shape.inner >= grade else shape).over(grade)
             elif stated:
-                found[name] = shape.over(grade)
-        return found
+                shapes[name] = shape.over(grade)
+        return shapes
 
     def tempco(self) -> dict[str, Distribution]:
         """Of every part [1/K]: its own, or ± what the catalogue says of its family."""
-        found: dict[str, Distribution] = {}
+        laws: dict[str, Distribution] = {}
         for name, part in self.parts.items():
             rule = self.own.get(name)
             if rule is not None and rule.tempco is not None:
-                found[name] = Uniform(*rule.tempco)
+                laws[name] = Uniform(*rule.tempco)
             else:
                 width = self.catalogued(part, rule)
-                found[name] = Uniform(-width, width)
-        return found
+                laws[name] = Uniform(-width, width)
+        return laws
 
     def catalogued(self, part: Part, rule: PartRule | None) -> float:
         """The temperature coefficient [1/K] of a part as the bill of materials buys it."""
@@ -282,38 +284,41 @@ class _Rules:
         return self.family(part, rule, "temperature", "tempco").temperature_coefficient
 
     def drift(self, name: str, family: PartFamily) -> float:
-        """What the data sheet lets a part of this family change by."""
+        """The relative change that the data sheet allows a part of this family."""
         if family.drift is None:
-            found = f"{name}, {family.name}, of which the catalogue has no drift"
-            raise self.refuse("ageing", found, "a drift there, or an ageing in [[spread.part]]")
+            text = f"{name}, {family.name}, of which the catalogue has no drift"
+            raise self.refuse("ageing", text, "a drift there, or an ageing in [[spread.part]]")
         return family.drift
 
     def family(
-        self, part: Resistor | Capacitor, rule: PartRule | None, key: str, own: str
+        self, part: Resistor | Capacitor, rule: PartRule | None, key: str, figure: str
     ) -> PartFamily:
-        """The family that the bill of materials buys the part from; for the figure ``own``."""
+        """The family that the bill of materials buys the part from.
+
+        key, figure : the key and the figure that the family is wanted for, as an error names them.
+        """
         try:
             bought = self.catalog.part(kind_of(part), part.value, self.grade(part, rule))
         except Unreachable as error:
-            expected = f"{error.expected}; or {own} in [[spread.part]]"
+            expected = f"{error.expected}; or {figure} in [[spread.part]]"
             raise self.refuse(key, f"{part.name}, {error.found}", expected) from None
         return bought.family
 
     def ageing(self) -> dict[str, Distribution]:
         """Of the parts that age: resistors and capacitors by the file's figure, or their own."""
-        found: dict[str, Distribution] = {}
+        laws: dict[str, Distribution] = {}
         for name, part in self.parts.items():
             rule = self.own.get(name)
             if rule is not None and rule.ageing is not None:
-                found[name] = Uniform(*rule.ageing)
+                laws[name] = Uniform(*rule.ageing)
             elif self.rules.ageing is None or isinstance(part, Reference):
                 continue
             elif self.rules.ageing == "catalogue":
                 width = self.drift(name, self.family(part, rule, "ageing", "ageing"))
-                found[name] = Uniform(-width, width)
+                laws[name] = Uniform(-width, width)
             else:
-                found[name] = Uniform(*self.rules.ageing)
-        return found
+                laws[name] = Uniform(*self.rules.ageing)
+        return laws
 
     def networks(self) -> tuple[Group, ...]:
         groups: list[Group] = []
@@ -344,11 +349,11 @@ class _Rules:
         """Parts of one kind and value come from one reel, but for those in a network and those
         that were picked."""
         share = self.rules.reels
-        taken = {name for group in self.networks() for name in group.parts}
+        excluded = {name for group in self.networks() for name in group.parts}
         reels: dict[str, list[str]] = {}
         for letter, parts in (("R", self.circuit.resistors), ("C", self.circuit.capacitors)):
             for part in parts:
-                if part.name not in taken and not self.picked(part.name):
+                if part.name not in excluded and not self.picked(part.name):
                     key = f"reel:{letter}:{format_quantity(part.value, digits=12)}"
                     reels.setdefault(key, []).append(part.name)
         return tuple(

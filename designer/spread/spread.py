@@ -101,7 +101,7 @@ class Spread:
     """Groups of parts that vary together."""
     measured: MeasuredBoards | None = None
     """Measured values of a bench's list, which go before anything drawn."""
-    asked: Mapping[str, float] = field(default_factory=dict)
+    wanted_grades: Mapping[str, float] = field(default_factory=dict)
     """The grade that was asked for, by part, where nobody sells the value at it; these parts are
     drawn at the better one in ``grades`` (``Catalog.part``)."""
 
@@ -119,8 +119,8 @@ class Spread:
             self.capacitor,
             self.offset_sigma,
             self.offset_limit,
-            grades={name: self.grades[name] for name in self.asked},
-            asked=self.asked,
+            grades={name: self.grades[name] for name in self.wanted_grades},
+            wanted_grades=self.wanted_grades,
         )
         return NAME if self == plain else "model file"
 
@@ -129,25 +129,27 @@ class Spread:
         return {"name": self.name} | {
             f.name: _plain(getattr(self, f.name))
             for f in dataclasses.fields(self)
-            if f.name != "asked"  # ``grades`` holds what is drawn
+            if f.name != "wanted_grades"  # ``grades`` holds what is drawn
         }
 
     def with_grades(self, resistor: float | None = None, capacitor: float | None = None) -> Spread:
         """The same spread with parts of another grade, whether it is sold or not; those with a
         grade of their own keep it."""
         usual = {"R": self.resistor, "C": self.capacitor}
-        given = {"R": resistor, "C": capacitor}
+        new_grades = {"R": resistor, "C": capacitor}
         moved = {
             name
-            for name, asked in self.asked.items()
-            if given[name[0]] is not None and asked == usual[name[0]]
+            for name, grade_wanted in self.wanted_grades.items()
+            if new_grades[name[0]] is not None and grade_wanted == usual[name[0]]
         }
         return replace(
             self,
             resistor=self.resistor if resistor is None else resistor,
             capacitor=self.capacitor if capacitor is None else capacitor,
             grades={name: grade for name, grade in self.grades.items() if name not in moved},
-            asked={name: grade for name, grade in self.asked.items() if name not in moved},
+            wanted_grades={
+                name: grade for name, grade in self.wanted_grades.items() if name not in moved
+            },
         )
 
     def coordinates(self, circuit: Circuit) -> tuple[str, ...]:
@@ -162,10 +164,10 @@ class Spread:
         parts = _varying(circuit)
         names = [p.name for p in parts]
         for s in circuit.sections:
-            names += [f"{s.name}.{what}" for what in ("offset", "low", "high")]
-            names += [f"{s.name}.bias"] * self._known(self.bias, f"{s.name}.bias")
-            names += [f"{s.name}.gbw"] * self._known(self.gain_bandwidth, f"{s.name}.gbw")
-        names += [r.name for r in circuit.rails if self._known(self.supply, r.name)]
+            names += [f"{s.name}.{quantity}" for quantity in ("offset", "low", "high")]
+            names += [f"{s.name}.bias"] * self._varies(self.bias, f"{s.name}.bias")
+            names += [f"{s.name}.gbw"] * self._varies(self.gain_bandwidth, f"{s.name}.gbw")
+        names += [r.name for r in circuit.rails if self._varies(self.supply, r.name)]
         if self.temperature is not None:
             names.append(TEMPERATURE)
         for suffix, laws in self._slow:
@@ -189,17 +191,17 @@ class Spread:
             raise ValueError(f"a cube of {cube.shape}; this circuit has {len(names)} coordinates")
         return _Draw(self, circuit, dict(zip(names, cube.T, strict=True)), len(cube)).boards()
 
-    def _known(self, spread: Distribution | float | None, name: str) -> bool:
+    def _varies(self, spread: Distribution | float | None, name: str) -> bool:
         """Whether this quantity of a board is drawn or was measured."""
         return bool(spread) or (self.measured is not None and name in self.measured.values)
 
     @property
     def _slow(self) -> tuple[tuple[str, Mapping[str, Distribution]], ...]:
-        """What a part does after it was measured, as a suffix of its name; by part."""
-        found = [(".ageing", self.ageing)] if self.ageing else []
+        """Slow changes of parts: the suffix of a part's name, and the distributions by part."""
+        laws = [(".ageing", self.ageing)] if self.ageing else []
         if self.temperature is not None:
-            found.insert(0, (".tempco", self.tempco))
-        return tuple(found)
+            laws.insert(0, (".tempco", self.tempco))
+        return tuple(laws)
 
     def shape_of(self, part: Passive | Reference) -> Distribution:
         """Of a part's relative deviation over its grade."""
@@ -240,8 +242,8 @@ def draw_many(
 
 def part_of(coordinate: str) -> str:
     """The part, section, rail or group that a coordinate belongs to: ``U1A.offset`` is U1A's."""
-    head, _, what = coordinate.rpartition(".")
-    return head if what in _WHAT else coordinate
+    head, _, quantity = coordinate.rpartition(".")
+    return head if quantity in _WHAT else coordinate
 
 
 class _Draw:
@@ -267,15 +269,15 @@ class _Draw:
         return Boards(
             circuit=c,
             values={p.name: self.value(p, p.value) for p in _passives(c)},
-            offset={s: self.drawn(f"{s}.offset", offset, 0.0) for s in sections},
+            offset={s: self.of_section(f"{s}.offset", offset, 0.0) for s in sections},
             low=low,
             high=high,
-            bias={s: self.drawn(f"{s}.bias", spread.bias, c.bias) for s in sections},
+            bias={s: self.of_section(f"{s}.bias", spread.bias, c.bias) for s in sections},
             reference={r.name: self.value(r, r.volts) for r in c.references},
             drop={d.name: self.same(d.model.drop) for d in c.diodes},
             supply=supply,
             gain_bandwidth={
-                s: self.drawn(f"{s}.gbw", spread.gain_bandwidth, c.gain_bandwidth)
+                s: self.of_section(f"{s}.gbw", spread.gain_bandwidth, c.gain_bandwidth)
                 for s in sections
                 if f"{s}.gbw" in self.u
             },
@@ -285,23 +287,23 @@ class _Draw:
     def same(self, value: float) -> Array:
         return np.full(self.count, value)
 
-    def drawn(self, name: str, law: Distribution | None, typical: float) -> Array:
-        """What a section has of its own, unless it was measured."""
-        return self.known(name, self.same(typical) if law is None else law.ppf(self.u[name]))
+    def of_section(self, name: str, law: Distribution | None, typical: float) -> Array:
+        """(N,) a quantity of each section by itself; the measured value where there is one."""
+        return self.or_measured(name, self.same(typical) if law is None else law.ppf(self.u[name]))
 
-    def known(self, name: str, drawn: Array) -> Array:
-        """The measured value, within its tolerance, where there is one."""
+    def or_measured(self, name: str, values: Array) -> Array:
+        """(N,) the measured value, within its tolerance, where there is one; ``values`` else."""
         if self.measured is None or name not in self.measured.values:
-            return drawn
+            return values
         value = np.array(self.measured.values[name])[self.which]
         width = np.array(self.measured.tolerances[name])[self.which]
-        return np.where(np.isnan(value), drawn, value + width * (2.0 * self.u[name] - 1.0))
+        return np.where(np.isnan(value), values, value + width * (2.0 * self.u[name] - 1.0))
 
     def value(self, part: Passive | Reference, sold: float) -> Array:
         """A part's value on the day: as made or measured, aged, at the board's temperature."""
         spread, name = self.spread, part.name
         off = spread.grade_of(part) * self.shared(name, "", spread.shape_of(part))
-        value = self.known(name, sold * (1.0 + off))
+        value = self.or_measured(name, sold * (1.0 + off))
         if name in spread.ageing:
             value = value * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
         if spread.temperature is not None and name in spread.tempco:
@@ -310,20 +312,20 @@ class _Draw:
             value = value * (1.0 + tempco * warmer)
         return value
 
-    def shared(self, name: str, what: str, law: Distribution) -> Array:
-        """A part's own draw; in a group mixed with the common one."""
-        own = law.ppf(self.u[name + what])
+    def shared(self, name: str, suffix: str, law: Distribution) -> Array:
+        """(N,) a part's own draw; in a group it is mixed with the group's common draw."""
+        part_draw = law.ppf(self.u[name + suffix])
         group = self.group.get(name)
         if group is None:
-            return own
-        common = law.ppf(self.u[group.name + what])
-        return group.share * common + (1.0 - group.share) * own
+            return part_draw
+        common = law.ppf(self.u[group.name + suffix])
+        return group.share * common + (1.0 - group.share) * part_draw
 
     def supply(self) -> dict[str, Array]:
         """By rail; without those that are exact."""
         law = Uniform(-self.spread.supply, self.spread.supply)
         return {
-            r.name: self.known(r.name, r.volts * (1.0 + law.ppf(self.u[r.name])))
+            r.name: self.or_measured(r.name, r.volts * (1.0 + law.ppf(self.u[r.name])))
             for r in self.circuit.rails
             if r.name in self.u
         }
@@ -338,7 +340,7 @@ class _Draw:
 
         def limit(name: str, rail: Array, sign: float) -> Array:
             wanted = c.saturation * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
-            return self.known(name, sign * np.minimum(wanted, rail))
+            return self.or_measured(name, sign * np.minimum(wanted, rail))
 
         low = {s.name: limit(f"{s.name}.low", below, -1.0) for s in c.sections}
         high = {s.name: limit(f"{s.name}.high", above, 1.0) for s in c.sections}

@@ -18,8 +18,8 @@ from designer.board.board_parts import (
     driven_nodes,
     fault_current,
     fitted,
+    probed_nets,
     protection_offset,
-    shown,
     trim_reach,
 )
 from designer.board.component import Component, components, joined
@@ -137,8 +137,8 @@ def test_outputs_are_shown_through_a_resistor_and_summing_nodes_are_not(circuit:
     nodes = {s.inverting for s in circuit.sections}
     probed = {p.net for p in of(board, TestPoint)}  # type: ignore[union-attr]
     assert not probed & nodes
-    assert probed == {f"{net}_out" for net in shown(circuit)} | {GROUND}
-    for net in shown(circuit):
+    assert probed == {f"{net}_out" for net in probed_nets(circuit)} | {GROUND}
+    for net in probed_nets(circuit):
         references = {reference for reference, _ in nets[f"{net}_out"]}
         assert len([r for r in references if r.startswith("R")]) == 1
         assert "J3" in references

@@ -41,10 +41,10 @@ def subject() -> RuleSubject:
 def test_the_trim_of_small_signals_is_the_largest_resistor_and_says_its_reach() -> None:
     """5 % of 1.2 V through 100 kΩ from 15 V asks for 25 MΩ; 10 MΩ reaches 0.15 V."""
     at = subject()
-    board, choice = board_circuit(at.made)
+    board, choice = board_circuit(at.synthesis)
     assert choice.trim == pytest.approx(0.05 * 1.2, rel=0.05)
     assert trim_reach(board) == pytest.approx(15.0 * 100e3 / 10e6, rel=1e-12)
-    notes = board_notes.markdown(at.made, board, choice, at.components)
+    notes = board_notes.markdown(at.synthesis, board, choice, at.components)
     assert "of up to ± 150mV at the generator" in notes
 
 

@@ -55,7 +55,7 @@ NOTHING: Mapping[str, int] = {}
 @cache
 def drawn() -> str:
     """The exported board of the design that pairs start from: placed, not routed."""
-    files = kicad_files.texts(base().made)
+    files = kicad_files.texts(base().synthesis)
     return next(text for name, text in files.items() if name.endswith(".kicad_pcb"))
 
 
@@ -152,7 +152,7 @@ def test_the_exported_board_is_of_its_design(tmp_path: Path) -> None:
 
 
 def test_a_board_of_another_design_is_told_apart(tmp_path: Path) -> None:
-    saturating = replace(base().made, design=replace(base().made.design, circuit=stage(
+    saturating = replace(base().synthesis, design=replace(base().synthesis.design, circuit=stage(
         "saturation", "both", {n: v if n[0] == "C" else 10e3 for n, v in EXACT.items()}
     )))  # fmt: skip
     files = kicad_files.texts(saturating)
@@ -532,7 +532,7 @@ def test_without_kicad_only_what_is_read_is_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    found = rules_job.checked(base().made, board_of(drawn(), tmp_path))
+    found = rules_job.checked(base().synthesis, board_of(drawn(), tmp_path))
     assert found.kicad is None
     of_board = {o.rule.id: o for o in found.outcomes if o.rule.scope == "board"}
     for id_ in (*BY_KICAD, *BY_REPORT):

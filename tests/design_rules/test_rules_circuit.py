@@ -172,7 +172,7 @@ def test_operating_values_are_the_loads_that_ngspice_confirms() -> None:
 
 def test_a_virtual_ground_leaves_ground_while_its_output_is_at_its_limit() -> None:
     """U3C at its limit: its input divides what is on either side of it."""
-    subject = RuleSubject(base().made, stage("saturation", "both", EXACT), base().components)
+    subject = RuleSubject(base().synthesis, stage("saturation", "both", EXACT), base().components)
     met = subject.operating
     r202, r203 = EXACT["R202"], EXACT["R203"]
     high, limit = met.high["w1"].value, subject.circuit.saturation
@@ -217,7 +217,7 @@ def test_protection_shares_the_fault_current() -> None:
 
 
 def test_without_responses_nothing_is_said_of_operation() -> None:
-    made = replace(base().made, model_responses=())
+    made = replace(base().synthesis, model_responses=())
     subject = RuleSubject(made, base().circuit, base().components)
     for id_ in ("swing", "power", "slew", "common-mode", "power-stuck"):
         found = run_rules.look(id_, subject)
@@ -269,7 +269,7 @@ def per_volt(subject: RuleSubject) -> float:
 @pytest.mark.parametrize("kind", ["rectifier", "saturation"])
 def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> None:
     circuit = base().circuit if kind == "rectifier" else stage("saturation", "both", EXACT)
-    subject = RuleSubject(base().made, circuit, base().components)
+    subject = RuleSubject(base().synthesis, circuit, base().components)
     forces = Statics(circuit).forces[0]
     rest, unit = shift(subject), per_volt(subject)
     for section in circuit.sections:

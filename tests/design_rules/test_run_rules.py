@@ -58,7 +58,7 @@ def written(path: Path, text: str) -> Path:
     folder.begin({"design": (inputs, ["model.toml", "design.json"])}, {})
     said = provenance(modelfile, CATALOG.hash)
     folder.write("model.toml", text)
-    made = base().made
+    made = base().synthesis
     folder.write(
         "design.json",
         dumps(synthesis_json(modelfile, made.design, made.model_responses, said, 0.0)),

@@ -72,12 +72,12 @@ def subject_of(circuit: Circuit, model: MechanicalModel, text: str) -> RuleSubje
 
 def with_circuit(circuit: Circuit) -> RuleSubject:
     """The same design on other parts."""
-    return RuleSubject(base().made, circuit, base().components)
+    return RuleSubject(base().synthesis, circuit, base().components)
 
 
 def with_components(change: Callable[[Component], Component]) -> RuleSubject:
     """The same design with every component changed."""
-    changed = RuleSubject(base().made, base().circuit, tuple(map(change, base().components)))
+    changed = RuleSubject(base().synthesis, base().circuit, tuple(map(change, base().components)))
     # The circuit is the same: what it does is not computed again.
     changed.__dict__.update({n: v for n, v in vars(base()).items() if n in OF_THE_CIRCUIT})
     return changed
@@ -199,7 +199,7 @@ def _leaking(share: float) -> RuleSubject:
 
 
 def _grade(grade: float) -> RuleSubject:
-    made = base().made
+    made = base().synthesis
     spec = replace(made.modelfile.circuit, resistor_grade=grade)
     made = replace(made, modelfile=replace(made.modelfile, circuit=spec))
     # The saturating stage: the rectifier leaves next to nothing.

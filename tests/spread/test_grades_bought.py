@@ -119,7 +119,7 @@ def test_the_grade_that_is_asked_for_is_bought_where_it_is_sold() -> None:
 def test_parts_of_a_better_grade_are_said_everywhere() -> None:
     file = file_of(FIVE)
     better = better_grades(file, MIXED, CATALOG)
-    assert {name: (g.asked, g.bought) for name, g in better.items()} == {
+    assert {name: (g.wanted, g.bought) for name, g in better.items()} == {
         "R50": (0.05, 0.01),
         "R203": (0.05, 0.01),
     }
@@ -177,7 +177,7 @@ def test_a_binned_law_keeps_what_the_grade_leaves() -> None:
 def test_another_grade_for_all_is_a_question_and_no_purchase() -> None:
     spread = spread_of(file_of(FIVE), MIXED, CATALOG)
     asked = spread.with_grades(resistor=0.02)
-    assert (asked.grades, asked.asked) == ({}, {})
+    assert (asked.grades, asked.wanted_grades) == ({}, {})
     assert spread.with_grades(capacitor=0.02).grades == spread.grades
     own = spread_of(upgraded_file(file_of(FIVE), Upgrades(grades={"R4": 0.001})), MIXED, CATALOG)
     assert own.with_grades(resistor=0.02).grades == {"R4": 0.001}
