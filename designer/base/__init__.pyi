@@ -175,7 +175,7 @@ from .reason import (
 )
 from .report_pieces import (
     CaseStore as CaseStore,
-    check_ours as check_ours,
+    check_report_folder as check_report_folder,
 )
 from .schema import (
     FIRST_FORMAT as FIRST_FORMAT,
@@ -191,17 +191,17 @@ from .schema import (
     keys_of as keys_of,
     line as line,
     lines as lines,
+    literal as literal,
     number as number,
     one_of as one_of,
     physical as physical,
     physical_span as physical_span,
     several as several,
-    shown as shown,
     span as span,
     such as such,
     text as text,
     validated as validated,
-    whole as whole,
+    whole_number as whole_number,
 )
 from .seal import (
     BLANK as BLANK,
@@ -236,10 +236,10 @@ from .toml_writer import (
 from .units import (
     VALUE_CODES as VALUE_CODES,
     decode_value as decode_value,
+    distinct_texts as distinct_texts,
     encode_value as encode_value,
     format_quantity as format_quantity,
     parse_quantity as parse_quantity,
-    told_apart as told_apart,
 )
 from .version import (
     __version__ as __version__,

@@ -66,15 +66,15 @@ class Folder:
         return self.path / name
 
     def state(self, stage: StageName, inputs: Mapping[str, Any]) -> State:
-        """What there is of a stage with these inputs."""
-        known = None if self.manifest is None else self.manifest.stages.get(stage)
-        if known is None:
+        """How far a stage with these inputs has come."""
+        entry = None if self.manifest is None else self.manifest.stages.get(stage)
+        if entry is None:
             return "new"
-        if known.hash == ManifestStage(dict(inputs)).hash:
-            return "same" if known.complete else "unfinished"
-        if not grown(known.inputs, inputs):
+        if entry.hash == ManifestStage(dict(inputs)).hash:
+            return "same" if entry.complete else "unfinished"
+        if not grown(entry.inputs, inputs):
             return "other"
-        return "more" if known.complete else "unfinished"
+        return "more" if entry.complete else "unfinished"
 
     def decide(
         self,
@@ -149,13 +149,15 @@ class Folder:
         self,
         wanted: Stages,
         provenance: Mapping[str, Any] | None = None,
-        kept: Mapping[str, Any] | None = None,
+        resume_data: Mapping[str, Any] | None = None,
     ) -> None:
         """Create the folder if need be, and mark these stages as unfinished.
 
-        provenance : None for the folder's own. kept : what they are to know again when they go on.
-        A stage that depends on one that begins
-        anew is forgotten; its files stay listed until ``finish`` removes them.
+        A stage that depends on one that begins anew is forgotten; its files stay listed until
+        ``finish`` removes them.
+
+        provenance : None for the folder's own. resume_data : data that the stages need when they go
+        on after an interruption.
         """
         manifest = self.manifest or Manifest()
         with writing(self.path):
@@ -170,9 +172,9 @@ class Folder:
             manifest.files = {
                 n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
             }
-            manifest.stages[stage] = ManifestStage(inputs, kept=dict(kept or {}))
+            manifest.stages[stage] = ManifestStage(inputs, resume_data=dict(resume_data or {}))
             manifest.files |= dict.fromkeys(names, (stage, None))
-        for name in manifest.files:  # what a killed process left behind
+        for name in manifest.files:  # remains of a killed process
             if name.endswith("/"):
                 for left in (self / name).glob(f".{BLOCKS}.part"):
                     left.unlink(missing_ok=True)
@@ -206,13 +208,13 @@ class Folder:
         self.manifest.files[name] = (stage, file_hash(name, data))
 
     def rewrite(self, name: str, content: str | bytes) -> None:
-        """Write a file of a finished stage anew, unless it is that already; at no time does the
-        manifest state a hash that is not the file's."""
+        """Write a file of a finished stage anew, unless it has this content already. At no time does
+        the manifest state a hash that is not the file's."""
         assert self.manifest is not None
-        stage, known = self.manifest.files[name]
+        stage, digest = self.manifest.files[name]
         data = content.encode("utf-8") if isinstance(content, str) else content
         path = self / name
-        if known == file_hash(name, data) and path.is_file() and path.read_bytes() == data:
+        if digest == file_hash(name, data) and path.is_file() and path.read_bytes() == data:
             return
         self.manifest.files[name] = (stage, None)
         self._save()
@@ -240,12 +242,12 @@ class Folder:
             else:  # planned and not needed: a study of no response has no samples
                 del manifest.files[name]
         manifest.stages[stage].complete = True
-        manifest.stages[stage].kept = {}
-        gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
+        manifest.stages[stage].resume_data = {}
+        obsolete = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
         for name in folders:
             del manifest.files[name]
-            gone += [n for n in self._there(name) if n not in manifest.files]
-        for name in gone:
+            obsolete += [n for n in self._there(name) if n not in manifest.files]
+        for name in obsolete:
             if not name.endswith("/"):
                 (self / name).unlink(missing_ok=True)
             manifest.files.pop(name, None)
@@ -255,16 +257,16 @@ class Folder:
         self._save()
 
     def watch(self) -> Callable[[], None]:
-        """A check that the folder is still the one that work began in: to be called before each
-        write of long work.
+        """A check that the folder is still the one that work began in. Long work calls it before
+        each write.
 
         It raises InputError where the folder is gone, or somebody has changed its manifest, its
         model or its design.
         """
         assert self.manifest is not None
-        ours = {name: stage.hash for name, stage in self.manifest.stages.items()}
+        hashes = {name: stage.hash for name, stage in self.manifest.stages.items()}
         digests = {name: self.manifest.files[name][1] for name in (MODEL, DESIGN)}
-        seen: list[object] = []
+        stats: list[object] = []
 
         def look() -> None:
             try:
@@ -272,7 +274,7 @@ class Folder:
                     (s.st_mtime_ns, s.st_size, s.st_ino)
                     for s in ((self / name).stat() for name in (MANIFEST, MODEL, DESIGN))
                 ]
-                if now == seen:
+                if now == stats:
                     return
                 for name, digest in digests.items():
                     if file_hash(name, (self / name).read_bytes()) != digest:
@@ -285,9 +287,9 @@ class Folder:
                     error.strerror or str(error),
                     "the design folder that this work began in: was it moved or deleted?",
                 ) from None
-            if manifest is None or {n: s.hash for n, s in manifest.stages.items()} != ours:
+            if manifest is None or {n: s.hash for n, s in manifest.stages.items()} != hashes:
                 raise self._changed_under_work(MANIFEST)
-            seen[:] = now
+            stats[:] = now
 
         return look
 
@@ -338,14 +340,14 @@ class Folder:
 
     def _refuse(self, stage: StageName, inputs: Mapping[str, Any]) -> None:
         assert self.manifest is not None
-        known = self.manifest.stages[stage].inputs
-        differ = sorted(k for k in {*known, *inputs} if known.get(k) != inputs.get(k))
-        shown = ", ".join(f"{k} {_short(known.get(k))}" for k in differ)
+        stored = self.manifest.stages[stage].inputs
+        differ = sorted(k for k in {*stored, *inputs} if stored.get(k) != inputs.get(k))
+        stored_text = ", ".join(f"{k} {_short(stored.get(k))}" for k in differ)
         wanted = ", ".join(f"{k} {_short(inputs.get(k))}" for k in differ)
         raise InputError(
             self / MANIFEST,
             f"stages.{stage}.inputs",
-            shown,
+            stored_text,
             f"{wanted}; or another folder, or --overwrite to replace what manifest.json lists",
         )
 
@@ -359,8 +361,8 @@ def _check_free(path: Path) -> None:
     """InputError unless a folder can be made here, or an empty one is here."""
     if path.is_dir():
         with writing(path):
-            taken = any(p.name != partial_of(path / MANIFEST).name for p in path.iterdir())
-        if taken:
+            occupied = any(p.name != partial_of(path / MANIFEST).name for p in path.iterdir())
+        if occupied:
             raise InputError(
                 path,
                 "--out",

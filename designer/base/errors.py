@@ -51,10 +51,10 @@ class InputError(DesignerError):
         self.field = field
         self.found = found
         self.expected = expected
-        where = f"{self.file}: " if self.file else ""
-        shown = found if isinstance(found, str) else repr(found)
-        stands = " is missing" if found is MISSING else f": found {_clip(shown)}"
-        super().__init__(f"{where}{field}{stands}, expected {expected}")
+        prefix = f"{self.file}: " if self.file else ""
+        text = found if isinstance(found, str) else repr(found)
+        stands = " is missing" if found is MISSING else f": found {_clip(text)}"
+        super().__init__(f"{prefix}{field}{stands}, expected {expected}")
 
 
 class InputErrors(InputError):
@@ -70,9 +70,9 @@ class InputErrors(InputError):
         first = problems[0]
         super().__init__(first.file, first.field, first.found, first.expected)
         self.problems = tuple(each for problem in problems for each in problems_in(problem))
-        shown = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
+        lines = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
         more = len(self.problems) - MOST_PROBLEMS
-        self.args = ("\n".join([*shown, *([f"and {more} more"] if more > 0 else [])]),)
+        self.args = ("\n".join([*lines, *([f"and {more} more"] if more > 0 else [])]),)
 
 
 def problems_in(error: InputError) -> tuple[InputError, ...]:

@@ -32,12 +32,15 @@ def flat_frame(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 def table_html(title: str, rows: Iterable[Mapping[str, Any]], note: str = "") -> str:
     """The rows as a table of HTML under a title, with a note below; every text is escaped."""
     listed = list(rows)
-    shown = list(islice(listed, MOST_ROWS))
-    heads = list(dict.fromkeys(name for row in shown for name in row))
-    lines = [_row("th", heads), *(_row("td", [row.get(name) for name in heads]) for row in shown)]
-    left = len(listed) - len(shown)
+    first_rows = list(islice(listed, MOST_ROWS))
+    heads = list(dict.fromkeys(name for row in first_rows for name in row))
+    lines = [
+        _row("th", heads),
+        *(_row("td", [row.get(name) for name in heads]) for row in first_rows),
+    ]
+    left = len(listed) - len(first_rows)
     notes = [text for text in (note, f"{left} more rows" if left else "") if text]
-    table = f"<table>{''.join(lines)}</table>" if shown else ""
+    table = f"<table>{''.join(lines)}</table>" if first_rows else ""
     return f"<p><b>{escape(title)}</b></p>{table}" + "".join(f"<p>{escape(n)}</p>" for n in notes)
 
 

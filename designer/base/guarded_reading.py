@@ -60,8 +60,8 @@ def reading(file: Path | str | None, expected: str, field: str = "the file") -> 
     try:
         yield
     except UNREADABLE as error:
-        found = MISSING if isinstance(error, FileNotFoundError) else reason(error)
-        raise InputError(file, field, found, expected) from None
+        problem = MISSING if isinstance(error, FileNotFoundError) else reason(error)
+        raise InputError(file, field, problem, expected) from None
 
 
 def read_bytes(
@@ -76,8 +76,8 @@ def read_bytes(
     with reading(path, expected, field):
         mode = path.stat().st_mode
         if not stat.S_ISREG(mode):
-            found = "a folder" if stat.S_ISDIR(mode) else "no regular file"
-            raise InputError(path, field, found, expected)
+            kind = "a folder" if stat.S_ISDIR(mode) else "no regular file"
+            raise InputError(path, field, kind, expected)
         with path.open("rb") as stream:
             content = stream.read(-1 if most is None else most + 1)
     if most is not None and len(content) > most:
@@ -118,7 +118,7 @@ def parse_json(
     """
     with reading(file, expected, field):
         text = content if isinstance(content, str) else decode(content, file)
-        return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_integer)
 
 
 def csv_rows(text: str, file: Path | str | None) -> Iterator[tuple[int, list[str]]]:
@@ -186,7 +186,7 @@ def _finite(text: str) -> float:
     return value
 
 
-def _whole(text: str) -> int:
+def _integer(text: str) -> int:
     if len(text) > MOST_DIGITS:
         raise ValueError("a number of too many digits")
     return int(text)
@@ -203,8 +203,8 @@ def parse_toml(text: str, file: str | None) -> dict[str, Any]:
         place = re.search(r" \(at line (\d+), column \d+\)$", message)
         content = text.splitlines()
         row = int(place[1]) if place else max(len(content), 1)
-        found = content[row - 1].strip() if row <= len(content) else ""
+        row_text = content[row - 1].strip() if row <= len(content) else ""
         reason = message[: place.start()] if place else message
         raise InputError(
-            file, f"line {row}", found or "the end of the file", f"valid TOML ({reason})"
+            file, f"line {row}", row_text or "the end of the file", f"valid TOML ({reason})"
         ) from None

@@ -63,9 +63,9 @@ class ManifestStage:
     """What decides the stage's files; equal inputs give equal files."""
     complete: bool = False
     """Whether all its files are written."""
-    kept: dict[str, Any] = field(default_factory=dict)
-    """What the stage found when it began and is to know again when it goes on; gone once it is
-    complete."""
+    resume_data: dict[str, Any] = field(default_factory=dict)
+    """Data that the stage computed when it began and needs when it goes on after an interruption;
+    empty once it is complete."""
 
     @property
     def hash(self) -> str:
@@ -102,7 +102,7 @@ class Manifest:
                 "inputs": s.inputs,
                 "inputs_sha256": s.hash,
                 "complete": s.complete,
-                **({"kept": s.kept} if s.kept else {}),
+                **({"kept": s.resume_data} if s.resume_data else {}),
             }
             for name, s in sorted(self.stages.items())
         }
@@ -116,18 +116,18 @@ class Manifest:
         }
 
 
-def grown(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+def grown(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
     """Whether the inputs differ by longer lists alone, and by what may give way (`REPLACED`)."""
-    if known.keys() != wanted.keys():
+    if stored.keys() != wanted.keys():
         return False
     return all(
-        mine == theirs
+        before == after
         or (
-            isinstance(mine, list)
-            and isinstance(theirs, list)
-            and all(each in theirs for each in _lasting(mine))
+            isinstance(before, list)
+            and isinstance(after, list)
+            and all(each in after for each in _lasting(before))
         )
-        for mine, theirs in ((known[key], wanted[key]) for key in known)
+        for before, after in ((stored[key], wanted[key]) for key in stored)
     )
 
 
@@ -168,9 +168,9 @@ def read_manifest(path: Path) -> Manifest | None:
     value = read_json(file)
     if value.get("tool") != "designer":
         raise InputError(file, "tool", value.get("tool"), '"designer": a manifest of this tool')
-    known, listed = (_object(value.get(field), file, field) for field in ("stages", "files"))
+    entries, listed = (_object(value.get(field), file, field) for field in ("stages", "files"))
     stages: dict[str, ManifestStage] = {
-        name: _stage(known[name], file, f"stages.{name}") for name in STAGES if name in known
+        name: _stage(entries[name], file, f"stages.{name}") for name in STAGES if name in entries
     }
     files = {}
     for name, entry in listed.items():
@@ -186,14 +186,14 @@ def read_manifest(path: Path) -> Manifest | None:
 def _stage(value: object, file: Path, field: str) -> ManifestStage:
     entry = _object(value, file, field)
     inputs = _object(entry.get("inputs"), file, f"{field}.inputs")
-    kept = _object(entry.get("kept", {}), file, f"{field}.kept")
+    resume_data = _object(entry.get("kept", {}), file, f"{field}.kept")
     complete = entry.get("complete")
     if not isinstance(complete, bool):
         raise InputError(file, f"{field}.complete", complete, "true or false")
     layers = inputs.get("layers", [])
     if not (isinstance(layers, list) and all(isinstance(each, str) for each in layers)):
         raise InputError(file, f"{field}.inputs.layers", layers, "a list of names")
-    return ManifestStage(inputs, complete, kept)
+    return ManifestStage(inputs, complete, resume_data)
 
 
 def _object(value: object, file: Path, field: str) -> dict[str, Any]:

@@ -40,8 +40,8 @@ class RefusedNetlist(ValueError):
 
     def __init__(self, reason: str, line: int | None = None, text: str = "") -> None:
         self.reason = reason
-        where = reason if line is None else f"line {line} is refused ({reason}): {text[:80]!r}"
-        super().__init__(f"netlist: {where}")
+        message = reason if line is None else f"line {line} is refused ({reason}): {text[:80]!r}"
+        super().__init__(f"netlist: {message}")
 
 
 def check_netlist(netlist: str) -> None:

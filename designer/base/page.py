@@ -188,10 +188,10 @@ def _item(head: str, text: str) -> str:
 def _picture(picture: Picture) -> list[str]:
     if not picture.file and not picture.sketch:
         return []
-    shown = f"![{plain(picture.label)}]({picture.file})"
+    image = f"![{plain(picture.label)}]({picture.file})"
     if picture.sketch:
-        shown = _verbatim(picture.sketch)
-    return [shown, str(plain(picture.caption))] if picture.caption else [shown]
+        image = _verbatim(picture.sketch)
+    return [image, str(plain(picture.caption))] if picture.caption else [image]
 
 
 def _verbatim(lines: Iterable[str]) -> str:

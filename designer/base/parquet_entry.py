@@ -31,12 +31,12 @@ class ParquetForm:
 
     def encode(self, head: Mapping[str, Any], value: Rows) -> bytes:
         """The file; equal heads and rows give equal bytes."""
-        known = {HEAD: json.dumps(head, sort_keys=True), SEAL: BLANK}
-        given = [f for f in self.optional if any(row.get(f.name) for row in value)]
-        schema = pa.schema([*self.schema, *given])
+        metadata = {HEAD: json.dumps(head, sort_keys=True), SEAL: BLANK}
+        present = [f for f in self.optional if any(row.get(f.name) for row in value)]
+        schema = pa.schema([*self.schema, *present])
         table = pa.Table.from_pylist([dict(row) for row in value], schema=schema)
         out = pa.BufferOutputStream()
-        pq.write_table(table.replace_schema_metadata(known), out)
+        pq.write_table(table.replace_schema_metadata(metadata), out)
         content: bytes = out.getvalue().to_pybytes()
         return content
 
@@ -55,8 +55,8 @@ class ParquetForm:
             raise ValueError(str(error)) from None
         if not isinstance(head, dict):
             raise TypeError("a head that is no object")
-        given = [f for f in self.optional if f.name in table.column_names]
-        if not table.schema.remove_metadata().equals(pa.schema([*self.schema, *given])):
+        present = [f for f in self.optional if f.name in table.column_names]
+        if not table.schema.remove_metadata().equals(pa.schema([*self.schema, *present])):
             raise ValueError("other columns")
         rows: Rows = table.to_pylist()
         return head, rows

@@ -291,25 +291,25 @@ class Terminal(Progress):
             self._open.pop()()
 
 
-def how_far(done: int, total: int | None, seconds: float) -> str:
+def how_far(count: int, total: int | None, seconds: float) -> str:
     """Steps, of how many if that is known, and their pace."""
-    steps = f"{done} steps" if total is None else f"{done}/{total}"
-    return f"{steps}, {pace(done, total, seconds)}"
+    steps = f"{count} steps" if total is None else f"{count}/{total}"
+    return f"{steps}, {pace(count, total, seconds)}"
 
 
-def pace(done: int, total: int | None, seconds: float) -> str:
+def pace(count: int, total: int | None, seconds: float) -> str:
     """Rate so far, and time left at that rate once a tenth of the steps is done."""
-    speed = done / seconds
-    if total is None or 10 * done < total:
+    speed = count / seconds
+    if total is None or 10 * count < total:
         return rate(speed)
-    return f"{rate(speed)}, {duration((total - done) / speed)} left"
+    return f"{rate(speed)}, {duration((total - count) / speed)} left"
 
 
 def duration(seconds: float) -> str:
     """Hours, minutes and seconds, such as "0:03:20"."""
-    whole = round(seconds)
-    hours, minutes = divmod(whole // 60, 60)
-    return f"{hours}:{minutes:02d}:{whole % 60:02d}"
+    rounded = round(seconds)
+    hours, minutes = divmod(rounded // 60, 60)
+    return f"{hours}:{minutes:02d}:{rounded % 60:02d}"
 
 
 def rate(speed: float) -> str:

@@ -49,10 +49,10 @@ class CaseStore:
         self._place, self._option = place or "--out", place or "--resume"
         self._keys: str | Mapping[str, str] = {}
         self._store: KeyedStore[dict[str, Any]] = KeyedStore(self._folder, _Json(), note)
-        begun = self._folder.is_dir() and any(self._folder.iterdir())
-        if begun and not resume:
+        has_pieces = self._folder.is_dir() and any(self._folder.iterdir())
+        if has_pieces and not resume:
             raise InputError(self._folder, self._place, "results", "an empty folder, or --resume")
-        if not begun:
+        if not has_pieces:
             self._check_free()
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -78,18 +78,18 @@ class CaseStore:
             self._check_free()
 
     def piece(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
-        """A piece as it was kept, or made now and kept.
+        """A piece from its file, or made now and written.
 
         Raises
         ------
-        InputError : what is there was made with other settings, or is no piece.
+        InputError : the file was made with other settings, or is no piece.
         """
         path = self._folder / f"{name}.json"
-        known = self._read(path)
-        if known is None:
-            known = dict(make())
-            self._store.write(path.name, {"key": self._key(name)}, known)
-        return known
+        content = self._read(path)
+        if content is None:
+            content = dict(make())
+            self._store.write(path.name, {"key": self._key(name)}, content)
+        return content
 
     def _key(self, name: str) -> str:
         return self._keys if isinstance(self._keys, str) else self._keys[name]
@@ -97,17 +97,17 @@ class CaseStore:
     def _check_free(self) -> None:
         for name in self._files:
             if (self._out / name).exists():
-                found = "a file that the report would replace, and no piece of it to go on with"
-                raise InputError(self._out / name, self._place, found, "a folder without it")
+                text = "a file that the report would replace, and no piece of it to go on with"
+                raise InputError(self._out / name, self._place, text, "a folder without it")
 
     def _read(self, path: Path) -> dict[str, Any] | None:
         key = self._key(path.stem)
         if read_key(path, self._option) not in (None, key):
-            found = "a piece of other settings"
+            text = "a piece of other settings"
             raise InputError(
                 path,
                 self._option,
-                found,
+                text,
                 "the same settings, or another folder; to make the report anew in this one, "
                 f"delete {self._folder} and what was made beside it",
             )
@@ -118,53 +118,53 @@ class _Json:
     """A JSON object with its key first and its seal last (``keyed_store.Form``)."""
 
     def encode(self, head: Mapping[str, Any], value: Mapping[str, Any]) -> bytes:
-        known = {**head, **value, SEAL: BLANK}
-        text = json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False)
+        document = {**head, **value, SEAL: BLANK}
+        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
         return f"{text}\n".encode()
 
     def decode(self, content: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
-        known = parse_json(content, None)
-        head = {"key": known.pop("key")}
-        known.pop(SEAL, None)
-        return head, known
+        document = parse_json(content, None)
+        head = {"key": document.pop("key")}
+        document.pop(SEAL, None)
+        return head, document
 
 
 _BEGINS = b'{\n "key": '
 """How a piece begins; cut off or not."""
 
 
-def read_key(path: Path, option: str, what: str = "a piece of this report") -> str | None:
+def read_key(path: Path, option: str, expected: str = "a piece of this report") -> str | None:
     """The key of a piece; None where there is no file, or one that was damaged or cut off.
 
     Raises
     ------
-    InputError : it cannot be read, or is no piece; in the name of ``option``.
+    InputError : it cannot be read, or is no piece; its field is ``option``.
     """
     if not path.exists():
         return None
-    content = read_bytes(path, what, option)
+    content = read_bytes(path, expected, option)
     if intact(content) is False:
         return None
     try:
-        known = parse_json(content, path, what, option)
+        document = parse_json(content, path, expected, option)
     except InputError as error:
         if content.startswith(_BEGINS) or _BEGINS.startswith(content):
             return None
-        raise InputError(path, option, error.found, what) from None
-    if not isinstance(known, dict) or not isinstance(known.get("key"), str):
-        found = "no key" if isinstance(known, dict) else type(known).__name__
-        raise InputError(path, option, found, what)
-    return str(known["key"])
+        raise InputError(path, option, error.found, expected) from None
+    if not isinstance(document, dict) or not isinstance(document.get("key"), str):
+        text = "no key" if isinstance(document, dict) else type(document).__name__
+        raise InputError(path, option, text, expected)
+    return str(document["key"])
 
 
-def check_ours(out: Path, names: Collection[str], data: str, command: str) -> None:
+def check_report_folder(out: Path, names: Collection[str], data: str, command: str) -> None:
     """Refuse a folder that is neither empty nor holds an earlier report and nothing else.
 
     names : of the report's files. data : of these, the JSON file whose "command" is ``command``.
 
     Raises
     ------
-    InputError : files of others are there.
+    InputError : the folder holds other files.
     OSError : the folder cannot be read.
     """
     there = sorted(path.name for path in out.iterdir())

@@ -138,7 +138,7 @@ def fraction(example: str, *, zero: bool = False) -> Accepts:
     )
 
 
-def whole(expected: str, least: float, most: float = math.inf) -> Accepts:
+def whole_number(expected: str, least: float, most: float = math.inf) -> Accepts:
     """A whole number from ``least`` to ``most``."""
     json = {"type": "integer", "minimum": least, **({"maximum": most} if most < math.inf else {})}
     return such(expected, lambda value: type(value) is int and least <= value <= most, json)
@@ -257,21 +257,21 @@ def lines(expected: str) -> Accepts:
     return several(expected, line(""), again=True)
 
 
-FIRST_FORMAT = whole("1, the format that this version reads", 1, 1)
+FIRST_FORMAT = whole_number("1, the format that this version reads", 1, 1)
 """The format number of a file."""
 
 
-def did_you_mean(found: str, known: Iterable[str]) -> str:
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """A hint such as ``did you mean "zeta"?``, or nothing."""
-    folded = {name.casefold(): name for name in known}
-    close = difflib.get_close_matches(found.casefold()[:100], folded, n=1, cutoff=0.6)
+    folded = {name.casefold(): name for name in choices}
+    close = difflib.get_close_matches(word.casefold()[:100], folded, n=1, cutoff=0.6)
     return f'did you mean "{folded[close[0]]}"?' if close else ""
 
 
-def one_of(found: str, known: Iterable[str]) -> str:
-    """The known names in words, with a hint at the one that was probably meant."""
-    names = list(known)
-    hint = did_you_mean(found, names)
+def one_of(word: str, choices: Iterable[str]) -> str:
+    """The choices in words, with a hint at the one that was probably meant."""
+    names = list(choices)
+    hint = did_you_mean(word, names)
     return "one of " + ", ".join(names) + (f"; {hint}" if hint else "")
 
 
@@ -297,9 +297,9 @@ def validated(
     """``data`` as a record; or None, and an ``InputError`` for each thing that does not fit.
 
     Unknown keys come first: a misspelt key is also a missing one, and its spelling is the cause. A
-    key that is missing because it is misspelt is not said again.
+    key that is missing because it is misspelt is named once.
 
-    within : what is put in front of the field's name. folder : where files lie that it names.
+    within : a prefix of the field's name. folder : the folder of the files that fields name.
     """
     try:
         record: TableT = _adapter(table).validate_python(data, context=folder)
@@ -312,9 +312,9 @@ def validated(
         place = problem["loc"]
         field = _dotted((within, *place) if within else place)
         if problem["type"] == _UNKNOWN:
-            known = sorted(keys_of(_table_at(table, place[:-1])))
-            expected = one_of(str(place[-1]), known)
-            misspelt |= {(*place[:-1], name) for name in known if f'mean "{name}"?' in expected}
+            keys = sorted(keys_of(_table_at(table, place[:-1])))
+            expected = one_of(str(place[-1]), keys)
+            misspelt |= {(*place[:-1], name) for name in keys if f'mean "{name}"?' in expected}
             out.append(InputError(file, field, f"unknown key {place[-1]!r}", expected))
         elif problem["type"] == "missing":
             if place not in misspelt:
@@ -336,7 +336,7 @@ def _wrong(
     """The value of a field that is not what it accepts."""
     error = problem["ctx"]["error"] if problem["type"] == "value_error" else expected
     if not isinstance(error, FieldProblems):
-        return [InputError(file, field, shown(problem["input"]), str(error))]
+        return [InputError(file, field, literal(problem["input"]), str(error))]
     return [
         p
         if p.file is not None
@@ -345,8 +345,8 @@ def _wrong(
     ]
 
 
-def shown(value: object) -> str:
-    """``value`` as the writer of the file knows it."""
+def literal(value: object) -> str:
+    """``value`` as it would stand in the file."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -357,12 +357,12 @@ def shown(value: object) -> str:
         return "a very large integer"
 
 
-def check_values(record: FileTable, where: str) -> None:
-    """Hold a record that was made in code to what the keys of its table accept.
+def check_values(record: FileTable, prefix: str) -> None:
+    """Check a record that was made in code against what the keys of its table accept.
 
     Raises
     ------
-    InputError : names ``where`` and the first field that is not what its key would be read as.
+    InputError : names the first field that its key would not be read as, ``prefix`` in front.
     """
     for name, accepts in _accepted(type(record)):
         value = getattr(record, name)
@@ -371,7 +371,7 @@ def check_values(record: FileTable, where: str) -> None:
         except ValueError:
             same = False
         if not same:
-            raise InputError(None, f"{where}.{name}", value, accepts.expected)
+            raise InputError(None, f"{prefix}.{name}", value, accepts.expected)
 
 
 def _find_accepted(table: type[FileTable]) -> tuple[tuple[str, Accepts], ...]:
@@ -427,7 +427,7 @@ def _nested(annotation: object) -> type[FileTable] | None:
 
 
 def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
-    """In words, what the field at a place accepts."""
+    """The values that the field at a place accepts, in words."""
     keys = [part for part in place if isinstance(part, str)]
     if not keys:
         return "a table"
@@ -439,11 +439,11 @@ def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
     nested = _nested(kind)
     assert nested is not None
     listed = get_origin(kind) is tuple
-    what = "tables" if listed and isinstance(place[-1], str) else "a table"
+    noun = "tables" if listed and isinstance(place[-1], str) else "a table"
     if len(keys_of(nested)) > _MOST_KEYS:
         header = ".".join(keys)
-        return f"{what} [[{header}]]" if listed else f"{what} [{header}]"
-    return f"{what.replace('tables', 'a list of tables')} of {', '.join(keys_of(nested))}"
+        return f"{noun} [[{header}]]" if listed else f"{noun} [{header}]"
+    return f"{noun.replace('tables', 'a list of tables')} of {', '.join(keys_of(nested))}"
 
 
 _MOST_KEYS = 5  # a table of more is named by its header

@@ -96,10 +96,10 @@ class Expression:
 
     def get(self, name: str) -> Expression:
         """The first list of this name; InputError where there is none."""
-        found = self.find(name)
-        if found is None:
+        child = self.find(name)
+        if child is None:
             raise self.error("no such list", f"({name} …)")
-        return found
+        return child
 
     def text(self, index: int = 0) -> str:
         """The atom at this place after the name; InputError where there is none."""
@@ -216,27 +216,27 @@ def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     return tuple(finished)
 
 
-def expression_text(made: Expression) -> str:
+def expression_text(tree: Expression) -> str:
     """The expression as text that ends in a newline: lists of atoms on one line, others indented.
 
     Raises
     ------
     ValueError : a bare atom that would not be read as one.
     """
-    return "\n".join(_lines(made, 0)) + "\n"
+    return "\n".join(_lines(tree, 0)) + "\n"
 
 
-def write_all(made: Iterable[Expression]) -> str:
+def write_all(trees: Iterable[Expression]) -> str:
     """Several expressions, a blank line between them."""
-    return "\n".join(expression_text(each) for each in made)
+    return "\n".join(expression_text(each) for each in trees)
 
 
-def _lines(made: Expression, depth: int) -> Iterator[str]:
+def _lines(tree: Expression, depth: int) -> Iterator[str]:
     """Atoms stay on the line of their list; each list in it has lines of its own."""
     tabs = "\t" * depth
     line = tabs + "("
     began = True
-    for item in made.items:
+    for item in tree.items:
         if isinstance(item, Atom):
             line += ("" if began else " ") + _atom(item)
         else:
@@ -244,7 +244,7 @@ def _lines(made: Expression, depth: int) -> Iterator[str]:
             *before, line = _lines(item, depth + 1)
             yield from before
         began = False
-    if made.children:
+    if tree.children:
         yield line
         line = tabs
     yield line + ")"

@@ -86,7 +86,7 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
 
 
-def told_apart(values: Sequence[float], digits: int, most: int = 12) -> list[str]:
+def distinct_texts(values: Sequence[float], digits: int, most: int = 12) -> list[str]:
     """Each value in ``digits`` significant digits, or in as many more as tell those that differ in
     ``most`` digits apart."""
     different = len({f"{value:.{most}g}" for value in values})
@@ -160,13 +160,13 @@ def _without_unit(text: str, unit: str) -> str:
 
 
 def _without_denominator(text: str, unit: str) -> tuple[str, int]:
-    """A text without a unit such as V/us for V/s, and the power of ten of what it is per."""
+    """A text without a unit such as V/us for V/s, and the power of ten of the denominator's prefix."""
     above, slash, below = unit.partition("/")
     if not slash or not below[0].isalpha():  # V/√Hz has no prefix below
         return text, 0
     above = "[ ·]?".join(map(re.escape, above.split(" ")))
-    found = re.fullmatch(rf"(.*?)\s*{above}\s*/\s*([fpnumkMGT]){re.escape(below)}", text)
-    return (found[1], _PREFIXES[found[2]]) if found else (text, 0)
+    match = re.fullmatch(rf"(.*?)\s*{above}\s*/\s*([fpnumkMGT]){re.escape(below)}", text)
+    return (match[1], _PREFIXES[match[2]]) if match else (text, 0)
 
 
 def _plain(number: Decimal) -> str:

@@ -15,12 +15,12 @@ from designer.base.schema import (
     fraction,
     line,
     lines,
+    literal,
     number,
     one_of,
     several,
-    shown,
     text,
-    whole,
+    whole_number,
 )
 from designer.base.units import VALUE_CODES, parse_quantity
 
@@ -31,7 +31,7 @@ NAME = line("a name of one line")
 CODE_TEXT = text("[!-~]*", "text without spaces, possibly empty")
 VALUE_CODE = choice(*VALUE_CODES)
 FOOTPRINT = text(r"[\w.-]+:[\w.,+-]+", "a KiCad footprint, Library:Name")
-PRICE = whole(f"a price class, 1 (cheapest) to {len(PRICE_CLASSES)}", 1, len(PRICE_CLASSES))
+PRICE = whole_number(f"a price class, 1 (cheapest) to {len(PRICE_CLASSES)}", 1, len(PRICE_CLASSES))
 GRADE = fraction("0.01 is 1 %")
 SOURCES = lines("a list of data sheets: title, revision, section")
 ASSUMED = lines("a list of what was not checked")
@@ -80,7 +80,7 @@ def figure(unit: str, *, signed: bool = False) -> Accepts:
             try:
                 numbers[key] = bound.read(value[key])
             except ValueError as error:
-                problems.append(InputError(None, key, shown(value[key]), str(error)))
+                problems.append(InputError(None, key, literal(value[key]), str(error)))
         ascending = list(numbers.values())
         if len(numbers) == len(value.keys() & set(_BOUNDS)) and (
             not numbers or ascending != sorted(ascending)
@@ -88,7 +88,7 @@ def figure(unit: str, *, signed: bool = False) -> Accepts:
             stated = {key: value[key] for key in numbers}
             expected = "at least one number of min, typ, max, and min <= typ <= max"
             problems.append(
-                InputError(None, "", shown(stated) if stated else "no number", expected)
+                InputError(None, "", literal(stated) if stated else "no number", expected)
             )
         problems += _without_source(value)
         if problems:
@@ -115,11 +115,11 @@ def _without_source(value: dict[str, object]) -> list[InputError]:
     problems = []
     source, assumed = value.get("source", MISSING), value.get("assumed", False)
     if not isinstance(source, str) or not source.strip():
-        stated = source if source is MISSING else shown(source)
+        stated = source if source is MISSING else literal(source)
         expected = "where the figure stands: title, revision and section of the data sheet"
         problems.append(InputError(None, "source", stated, expected))
     if not isinstance(assumed, bool):
-        problems.append(InputError(None, "assumed", shown(assumed), "true or false"))
+        problems.append(InputError(None, "assumed", literal(assumed), "true or false"))
     return problems
 
 
@@ -189,7 +189,7 @@ def pair_of_pins() -> Accepts:
 
 
 def ways() -> Accepts:
-    way = whole("", 1, 99)
+    way = whole_number("", 1, 99)
 
     def check(value: object) -> tuple[int, int]:
         if not isinstance(value, list) or len(value) != 2:

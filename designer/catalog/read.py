@@ -32,7 +32,7 @@ from designer.base.schema import (
     keys_of,
     one_of,
     validated,
-    whole,
+    whole_number,
 )
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
@@ -169,7 +169,7 @@ class FamilyTable(FamilyBase):
     """Values beside those of the series."""
     example: _Example | None = None
     """A value with its part number, by which the rule is tried."""
-    elements: Annotated[int | None, whole("a whole number from 2 to 16", 2, 16)] = None
+    elements: Annotated[int | None, whole_number("a whole number from 2 to 16", 2, 16)] = None
     """Parts in one case of an array."""
 
     def __post_init__(self) -> None:

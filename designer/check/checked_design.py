@@ -97,7 +97,7 @@ class CheckedResponse:
 
 def check(
     design: Design,
-    found: Sequence[ModelResponse],
+    responses: Sequence[ModelResponse],
     pool: SpicePool | None,
     progress: Callable[[str], object] = lambda _: None,
     *,
@@ -105,18 +105,18 @@ def check(
 ) -> tuple[CheckedResponse, ...]:
     """Every response on the exact circuit and, with a pool, in ngspice behind the gate.
 
-    gates : what ngspice's gate found of this very design before; it is not asked again then.
+    gates : earlier results of ngspice's gate for this very design; it is then not run again.
     """
     reduction = nominal_reduction(design)
     system = reduction.system()
     settings = [
         Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b, r.omega))
-        for r in found
+        for r in responses
     ]
     progress("exact circuit")
-    flows = [circuit_flow(system, design, r) for r in found]
-    orbits = [reached(flow, design, r) for flow, r in zip(flows, found, strict=True)]
-    results: Sequence[GateResult | None] = [None] * len(found)
+    flows = [circuit_flow(system, design, r) for r in responses]
+    orbits = [reached(flow, design, r) for flow, r in zip(flows, responses, strict=True)]
+    results: Sequence[GateResult | None] = [None] * len(responses)
     if pool is not None and gates is not None:
         results = gates
     elif pool is not None:
@@ -125,7 +125,7 @@ def check(
         results = gate.check(pool, [gate.GateSubject(reduction, e, o) for e, o in pairs])
     return tuple(
         CheckedResponse(r, o, e, g, design, flow)
-        for r, o, e, g, flow in zip(found, orbits, settings, results, flows, strict=True)
+        for r, o, e, g, flow in zip(responses, orbits, settings, results, flows, strict=True)
     )
 
 

@@ -54,23 +54,23 @@ class Coexistence:
 
     starts: int
     """How many starts were run."""
-    asked: int
-    """How many starts were asked for: more where all together would have taken more than
+    wanted_starts: int
+    """How many starts were wanted: more than ``starts`` where all together would have taken more than
     ``step_budget.STARTS`` steps."""
     seed: int
     """Seed that the starts were drawn with."""
     box: Array
     """(states,) half-widths, of every state at drive phase 0, in model units."""
     basins: tuple[Basin, ...]
-    """The known attractors first, then those met, in order."""
+    """The known attractors first, then the others in the order of their first start."""
     not_settled: int
-    """Starts for which no attractor was seen."""
+    """Starts that did not settle on an attractor."""
 
     def as_dict(self) -> dict[str, Any]:
         """By the keys of the contract."""
         return {
             "count": self.starts,
-            "asked": self.asked,
+            "asked": self.wanted_starts,
             "seed": self.seed,
             "phase": 0.0,
             "box": dict(zip(state_names(len(self.box) // 2), self.box.tolist(), strict=True)),
@@ -99,7 +99,7 @@ def check(starts: int) -> None:
         raise InputError(None, "--starts", starts, f"at most {MOST_STARTS}")
 
 
-def drawn(box: Array, count: int, seed: int) -> Array:
+def random_starts(box: Array, count: int, seed: int) -> Array:
     """(count, states) initial states, even in the box ± ``box`` (states,)."""
     names = [f"start {name}" for name in state_names(len(box) // 2)]
     return np.asarray(box * (2.0 * random_streams.cube(seed, names, range(count)) - 1.0))
@@ -111,24 +111,24 @@ def of_model(
 ) -> Coexistence:
     """Of the model under a drive of frequency ``omega``, by the exact flow; largest share first."""
     flow = model_flow(model, omega)
-    met = of_flow(flow, scale_of(model, omega), starts, seed)
-    return replace(met, basins=tuple(sorted(met.basins, key=lambda b: -b.count)))
+    result = of_flow(flow, scale_of(model, omega), starts, seed)
+    return replace(result, basins=tuple(sorted(result.basins, key=lambda b: -b.count)))
 
 
 def beside(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
-    """What coexists with a response of the model, by ``DRAWN_STARTS`` starts: the largest share
-    first, then what was met on the way to it alone.
+    """The attractors that coexist with a response of the model, by ``DRAWN_STARTS`` starts: the
+    largest share first, then those that only the search for the response came to.
 
     model : with the clearance of the response.
     """
     flow = model_flow(model, response.omega)
-    met = of_model(model, response.omega).basins
+    basins = of_model(model, response.omega).basins
     rest = [
         Basin(o, 0, None)
         for o in response.others
-        if o.status in ANSWERS and not any(same(flow, o, b.orbit) for b in met)
+        if o.status in ANSWERS and not any(same(flow, o, b.orbit) for b in basins)
     ]
-    return (*(b for b in met if not same(flow, b.orbit, response.orbit)), *rest)
+    return (*(b for b in basins if not same(flow, b.orbit, response.orbit)), *rest)
 
 
 def of_flow(
@@ -136,17 +136,17 @@ def of_flow(
     box: Array,
     starts: int,
     seed: int,
-    known: Sequence[Orbit] = (),
+    orbits: Sequence[Orbit] = (),
     unit: Array | None = None,
 ) -> Coexistence:
     """Where the starts end under a flow.
 
-    box : (states,) half-widths in model units. known : attractors that are listed first, in this
+    box : (states,) half-widths in model units. orbits : attractors that are listed first, in this
     order. unit : (states,) size of a model unit in the states of a circuit, whose twins are those
     that look like mirror images; None for a model.
     """
-    states = drawn(box, starts, seed) * (1.0 if unit is None else unit)
-    tally = _Tally(flow, known, alike=unit is not None)
+    states = random_starts(box, starts, seed) * (1.0 if unit is None else unit)
+    tally = _Tally(flow, orbits, alike=unit is not None)
     run, unsettled = tally.take(states)
     return Coexistence(run, starts, seed, box, tally.basins(), unsettled)
 
@@ -157,14 +157,14 @@ def of_flow(
 class _Tally:
     """Counts starts by the attractor that they end on."""
 
-    def __init__(self, flow: Flow, known: Sequence[Orbit], *, alike: bool) -> None:
+    def __init__(self, flow: Flow, orbits: Sequence[Orbit], *, alike: bool) -> None:
         self._flow = flow
         self._alike = alike and flow.system.mirror is None
         self._twins = self._alike or flow.system.mirror is not None
         self._orbits: list[Orbit] = []
         self._images: list[tuple[Array, Array]] = []
         self._counts: list[list[int]] = []
-        for orbit in known:
+        for orbit in orbits:
             self._add(orbit)
 
     def take(self, states: Array) -> tuple[int, int]:

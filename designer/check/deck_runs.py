@@ -42,13 +42,13 @@ class FirstRun:
     """(states,) capacitor voltages at t = 0; None for discharged ones."""
 
 
-def first_run(made: Synthesis, checked: CheckedResponse | None = None) -> FirstRun:
+def first_run(synthesis: Synthesis, checked: CheckedResponse | None = None) -> FirstRun:
     """The first response, ω = 1 where there is none.
 
     checked : of that response; its gate's settings are used.
     """
-    design, first = made.design, _responses(made)[0]
-    excitation = _excitation(made, first)
+    design, first = synthesis.design, _responses(synthesis)[0]
+    excitation = _excitation(synthesis, first)
     if checked is None:
         orbit = on_circuit(nominal_reduction(design).system(), design, first)
     else:
@@ -61,27 +61,27 @@ def first_run(made: Synthesis, checked: CheckedResponse | None = None) -> FirstR
     return FirstRun(excitation, settings, PERIODS * period, initial)
 
 
-def response_runs(made: Synthesis) -> tuple[ResponseRun, ...]:
+def response_runs(synthesis: Synthesis) -> tuple[ResponseRun, ...]:
     """One run for each wanted response in the order of the model file; ω = 1 where there is none.
 
     The step is an eighth of that which the numerics gate tries first: the gate takes smaller ones
     until two agree, and a deck that somebody runs elsewhere has no gate.
     """
-    return tuple(_run(made, response) for response in _responses(made))
+    return tuple(_run(synthesis, response) for response in _responses(synthesis))
 
 
-def _responses(made: Synthesis) -> tuple[ModelResponse, ...]:
-    return made.model_responses or find(made.design.model, [Response(1.0)])
+def _responses(synthesis: Synthesis) -> tuple[ModelResponse, ...]:
+    return synthesis.model_responses or find(synthesis.design.model, [Response(1.0)])
 
 
-def _excitation(made: Synthesis, response: ModelResponse) -> Excitation:
-    frequency = made.design.errors.scales.frequency(response.omega)
-    return Excitation(frequency, made.design.amplitude(response.b, response.omega))
+def _excitation(synthesis: Synthesis, response: ModelResponse) -> Excitation:
+    frequency = synthesis.design.errors.scales.frequency(response.omega)
+    return Excitation(frequency, synthesis.design.amplitude(response.b, response.omega))
 
 
-def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
-    design = made.design
-    excitation = _excitation(made, response)
+def _run(synthesis: Synthesis, response: ModelResponse) -> ResponseRun:
+    design = synthesis.design
+    excitation = _excitation(synthesis, response)
     reduction = nominal_reduction(design)
     orbit = on_circuit(reduction.system(), design, response)
     subject = numerics_gate.GateSubject(reduction, excitation, orbit)
@@ -98,20 +98,20 @@ def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
     )
 
 
-def circuit_notes(made: Synthesis, run: FirstRun) -> tuple[str, ...]:
-    """For ``circuit.cir``. run : what it shows."""
+def circuit_notes(synthesis: Synthesis, run: FirstRun) -> tuple[str, ...]:
+    """The notes at the top of ``circuit.cir``. run : the run that the deck does."""
     drive = run.excitation
-    if made.model_responses:
-        first = made.model_responses[0]
+    if synthesis.model_responses:
+        first = synthesis.model_responses[0]
         wanted = f", expected {first.expected}" if first.expected else ""
-        count = len(made.model_responses)
-        shown = f"number 1 of {count} in the model file, omega {first.omega:g}{wanted}"
+        count = len(synthesis.model_responses)
+        text = f"number 1 of {count} in the model file, omega {first.omega:g}{wanted}"
     else:
-        shown = "the model file wants none, so omega is 1"
+        text = "the model file wants none, so omega is 1"
     return (
         "For ngspice 36 or later: its XSPICE code model limit is used. Run: ngspice -b circuit.cir",
-        *_circuit(made),
-        f"Response: {shown}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak",
+        *_circuit(synthesis),
+        f"Response: {text}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak",
         "Another response: frequency and amplitude of VM1 are in setup.csv, with how to start it.",
         "The start voltages (IC=) belong to this response alone, and .tran to its frequency",
         "Every response with its own start, and other simulators: designer export DIR --deck NAME,",
@@ -120,12 +120,12 @@ def circuit_notes(made: Synthesis, run: FirstRun) -> tuple[str, ...]:
 
 
 def simulator_notes(
-    made: Synthesis, dialect: Dialect, runs: tuple[ResponseRun, ...]
+    synthesis: Synthesis, dialect: Dialect, runs: tuple[ResponseRun, ...]
 ) -> tuple[str, ...]:
-    """For a deck of another simulator."""
+    """The notes at the top of a deck for another simulator."""
     return (
         OTHERS[dialect],
-        *_circuit(made),
+        *_circuit(synthesis),
         "An op-amp is a current into 1 kohm, clamped by diodes at its output limits, and a source.",
         "Finite gain and bias current are the nominal ones, as in circuit.cir",
         f"Responses: {len(runs)} at the end of the deck, the first one switched on. For another,",
@@ -133,9 +133,9 @@ def simulator_notes(
     )
 
 
-def _circuit(made: Synthesis) -> tuple[str, ...]:
-    circuit = made.design.circuit
-    stage = made.modelfile.circuit.dead_zone if circuit.stops else "none"
+def _circuit(synthesis: Synthesis) -> tuple[str, ...]:
+    circuit = synthesis.design.circuit
+    stage = synthesis.modelfile.circuit.dead_zone if circuit.stops else "none"
     return (
         f"Circuit: {len(circuit.sections)} op-amps {circuit.opamp} at +-{circuit.supply:g} V, "
         f"{len(circuit.resistors)} resistors, {len(circuit.capacitors)} capacitors, "

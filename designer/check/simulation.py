@@ -139,7 +139,7 @@ def simulate(
         number of starts that cannot be, or nothing to simulate.
     """
     coexistence.check(starts)
-    drawn = (starts, seed)
+    sampling = (starts, seed)
     progress = Progress() if progress is None else progress
     if rung != "ideal" and engine != "ngspice":
         raise InputError(
@@ -155,17 +155,17 @@ def simulate(
         if spec.omega is not None:
             check_omega(f"response[{number}].omega", spec.omega, modelfile.model, file)
     if engine != "ngspice":
-        one = partial(_on_model, modelfile, traces, drawn)
+        one = partial(_on_model, modelfile, traces, sampling)
         if engine == "circuit":
-            made = synthesis or synthesise(modelfile)
-            one = partial(_on_circuit, made, bool(omegas), traces, drawn)
-        what = "model" if engine == "model" else "exact circuit"
-        step = progress.stage(f"responses of the {what}", len(specs))
+            synthesis = synthesis or synthesise(modelfile)
+            one = partial(_on_circuit, synthesis, bool(omegas), traces, sampling)
+        engine_name = "model" if engine == "model" else "exact circuit"
+        step = progress.stage(f"responses of the {engine_name}", len(specs))
         return tuple(_timed(step, one, spec) for spec in specs)
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
-        made = synthesis or synthesise(modelfile)
-        return _in_ngspice(made, specs, bool(omegas), pool, progress, traces, rung)
+        synthesis = synthesis or synthesise(modelfile)
+        return _in_ngspice(synthesis, specs, bool(omegas), pool, progress, traces, rung)
 
 
 def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
@@ -217,15 +217,15 @@ def _timed(
 
 
 def _on_model(
-    modelfile: ModelFile, traces: bool, drawn: tuple[int, int], spec: Response
+    modelfile: ModelFile, traces: bool, sampling: tuple[int, int], spec: Response
 ) -> Simulated:
     with naming(modelfile):
         (r,) = find(modelfile.model, [spec])
     model = modelfile.model.at(r.b)
     flow = model_flow(model, r.omega)
-    known = _attractors((r.orbit, *r.others))
-    met = coexistence.of_flow(flow, scale_of(model, r.omega), *drawn, known)
-    others = (*_attractors(r.others), *(b.orbit for b in met.basins[len(known) :]))
+    first = _attractors((r.orbit, *r.others))
+    result = coexistence.of_flow(flow, scale_of(model, r.omega), *sampling, first)
+    others = (*_attractors(r.others), *(b.orbit for b in result.basins[len(first) :]))
     orbits = [_measured(flow, o) for o in (r.orbit, *others)]
     twins = [None if flow.system.mirror is None else _twin(flow, o) for o in orbits]
     units = np.ones(flow.system.size)
@@ -241,7 +241,7 @@ def _on_model(
         settings=_exact_settings(flow, orbits[0], 1.0),
         traces=_traces(flow, (orbits[0], twins[0]), units, 1.0) if traces else (),
         trust=trust.of_orbit(flow, orbits[0]),
-        coexistence=met,
+        coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model)) for o in orbits),
         **_of_system(model),
     )
@@ -273,10 +273,10 @@ def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     if flow.system.mirror is not None:
         return attractors.twin(flow, orbit)
     image = -flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=2).strobes[1]
-    found = attractors.shoot(flow, image, orbit.n)
-    if found is None:
+    solution = attractors.shoot(flow, image, orbit.n)
+    if solution is None:
         return None
-    near = attractors.describe(flow, found[0], orbit.n, found[1])
+    near = attractors.describe(flow, solution[0], orbit.n, solution[1])
     if not (near.counts == orbit.counts.mirrored and near.symmetric is False and near.radius < 1.0):
         return None
     return near if coexistence.alike(orbit, near, NEAR_TWIN, mirrored=True) else None
@@ -302,58 +302,62 @@ def _traces(
 
 
 def _circuit_orbits(
-    made: Synthesis, spec: Response, scan: bool
+    synthesis: Synthesis, spec: Response, scan: bool
 ) -> tuple[ModelResponse, Flow, list[Orbit]]:
     """The wanted orbit first, in volts and seconds; with ``scan`` what is reached from rest."""
-    with naming(made.modelfile):
-        known = [r for r in made.model_responses if r.spec is spec]
-        (r,) = known or find(made.modelfile.model, [spec])
-    flow = circuit_flow(nominal.nominal_reduction(made.design).system(), made.design, r)
-    volts = made.design.volts(r.b)
+    with naming(synthesis.modelfile):
+        same = [r for r in synthesis.model_responses if r.spec is spec]
+        (r,) = same or find(synthesis.modelfile.model, [spec])
+    flow = circuit_flow(nominal.nominal_reduction(synthesis.design).system(), synthesis.design, r)
+    volts = synthesis.design.volts(r.b)
     if scan:
-        model = made.modelfile.model.at(r.b)
+        model = synthesis.modelfile.model.at(r.b)
         return r, flow, coexisting(flow, sobol_starts(scale_of(model, r.omega) * volts, STARTS))
     orbits = [settle(flow, o.start * volts) for o in (r.orbit, *r.others) if len(o.start)]
     return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
 
 
 def _on_circuit(
-    made: Synthesis, scan: bool, traces: bool, drawn: tuple[int, int], spec: Response
+    synthesis: Synthesis, scan: bool, traces: bool, sampling: tuple[int, int], spec: Response
 ) -> Simulated:
-    r, flow, orbits = _circuit_orbits(made, spec, scan)
-    volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
+    r, flow, orbits = _circuit_orbits(synthesis, spec, scan)
+    volts, seconds = synthesis.design.volts(r.b), synthesis.design.errors.scales.seconds
     measured = [_measured(flow, o) for o in orbits]
-    shown = [made.design.in_model_units(o, volts) for o in measured]
-    kept = [i for i in _distinct(shown) if i == 0 or shown[i].status in ANSWERS]
-    known = _attractors([measured[i] for i in kept])
-    model = made.modelfile.model.at(r.b)
+    scaled = [synthesis.design.in_model_units(o, volts) for o in measured]
+    numbers = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
+    first = _attractors([measured[i] for i in numbers])
+    model = synthesis.modelfile.model.at(r.b)
     box, ground = scale_of(model, r.omega), ground_of(model) * volts
-    met = coexistence.of_flow(flow, box, *drawn, known, volts)
-    more = [_measured(flow, b.orbit) for b in met.basins[len(known) :]]
-    kept += range(len(measured), len(measured) + len(more))
+    result = coexistence.of_flow(flow, box, *sampling, first, volts)
+    more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
+    numbers += range(len(measured), len(measured) + len(more))
     measured += more
-    shown += [made.design.in_model_units(o, volts) for o in more]
-    twins = {i: _twin(flow, measured[i]) for i in kept}
+    scaled += [synthesis.design.in_model_units(o, volts) for o in more]
+    twins = {i: _twin(flow, measured[i]) for i in numbers}
     return Simulated(
         r.omega,
         r.expected,
         matches(orbits[0], r.spec),
-        shown[0],
-        tuple(shown[i] for i in kept[1:]),
+        scaled[0],
+        tuple(scaled[i] for i in numbers[1:]),
         0.0,
-        tuple(None if t is None else made.design.in_model_units(t, volts) for t in twins.values()),
+        tuple(
+            None if t is None else synthesis.design.in_model_units(t, volts) for t in twins.values()
+        ),
         r.b,
-        settings=_exact_settings(flow, measured[0], float(volts[made.design.moving])),
+        settings=_exact_settings(flow, measured[0], float(volts[synthesis.design.moving])),
         traces=_traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
         trust=trust.of_orbit(flow, measured[0]),
-        coexistence=met,
-        absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in kept),
+        coexistence=result,
+        absolute=tuple(
+            absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in numbers
+        ),
         **_of_system(model),
     )
 
 
 def _in_ngspice(
-    made: Synthesis,
+    synthesis: Synthesis,
     specs: Sequence[Response],
     scan: bool,
     pool: SpicePool,
@@ -364,12 +368,12 @@ def _in_ngspice(
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began = time.perf_counter()
     step = progress.stage("responses of the exact circuit", len(specs))
-    reduction = nominal.nominal_reduction(made.design)
+    reduction = nominal.nominal_reduction(synthesis.design)
     rows, subjects = [], []
     for spec in specs:
-        r, _, orbits = _circuit_orbits(made, spec, scan)
-        frequency = made.design.errors.scales.frequency(r.omega)
-        excitation = Excitation(frequency, made.design.amplitude(r.b, r.omega))
+        r, _, orbits = _circuit_orbits(synthesis, spec, scan)
+        frequency = synthesis.design.errors.scales.frequency(r.omega)
+        excitation = Excitation(frequency, synthesis.design.amplitude(r.b, r.omega))
         started = [o for o in orbits if len(o.start)]
         subjects += [
             numerics_gate.GateSubject(reduction, excitation, o, rung=rung) for o in started
@@ -381,25 +385,27 @@ def _in_ngspice(
     seconds = (time.perf_counter() - began) / max(len(specs), 1)
     out = []
     for r, excitation, count in rows:
-        volts, scale = made.design.volts(r.b), made.design.errors.scales.seconds
+        volts, scale = synthesis.design.volts(r.b), synthesis.design.errors.scales.seconds
         gates = [next(results) for _ in range(count)]
         answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
         orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
-        shown = [made.design.in_model_units(o, volts) for o in orbits]
+        scaled = [synthesis.design.in_model_units(o, volts) for o in orbits]
         out.append(
             Simulated(
                 r.omega,
                 r.expected,
                 matches(orbits[0], r.spec),
-                shown[0],
-                tuple(shown[i] for i in _distinct(shown)[1:]),
+                scaled[0],
+                tuple(scaled[i] for i in _distinct(scaled)[1:]),
                 seconds,
                 b=r.b,
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
-                absolute=_unmoved(made.modelfile.model, [shown[i] for i in _distinct(shown)]),
-                **_of_system(made.modelfile.model.at(r.b)),
+                absolute=_unmoved(
+                    synthesis.modelfile.model, [scaled[i] for i in _distinct(scaled)]
+                ),
+                **_of_system(synthesis.modelfile.model.at(r.b)),
             )
         )
     return tuple(out)

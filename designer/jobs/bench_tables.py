@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
-from designer.base.units import told_apart
+from designer.base.units import distinct_texts
 from designer.check import checked_design
 from designer.circuit.design import Design, settings
 from designer.dynamics.orbit import OrbitStatus
@@ -53,7 +53,7 @@ def setup_csv(
     known = settings(design, responses)
     omegas = [repr(s.omega) for s in known]
     if si is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
-        omegas = told_apart([s.omega for s in known], OMEGA_DIGITS)
+        omegas = distinct_texts([s.omega for s in known], OMEGA_DIGITS)
     rows = [
         {
             "omega": omega,

@@ -121,7 +121,7 @@ def _trade_of(folder: Folder, modelfile: ModelFile, *, resumes: bool) -> dict[st
     """What a trade says that stood here when the search began, as ``rung_choice.RungChoice``."""
     if resumes:
         assert folder.manifest is not None
-        trade: object = folder.manifest.stages["search"].kept.get("trade")
+        trade: object = folder.manifest.stages["search"].resume_data.get("trade")
         if not (trade is None or isinstance(trade, dict)):
             field = "stages.search.kept.trade"
             raise InputError(folder / MANIFEST, field, trade, "the choice of a trade")

@@ -59,17 +59,17 @@ def system_sketch(system: Elements) -> str:
     pairs = [frozenset(name.replace("|", "ground") for name in row[i : i + 2])
              for i in range(len(row) - 1)]  # fmt: skip
     lines = []
-    for joints, drawn in ((springs, _SPRING), (set[frozenset[str]](), _NONE), (dampers, _DAMPER)):
+    for joints, symbol in ((springs, _SPRING), (set[frozenset[str]](), _NONE), (dampers, _DAMPER)):
         named = not joints
         parts = ["|"]
         for pair, name, width in zip(pairs, row[1:], widths[1:], strict=True):
-            parts.append(drawn if pair in joints else _NONE)
+            parts.append(symbol if pair in joints else _NONE)
             parts.append(f"[ {name} ]" if named else "|" + " " * (width - 2) + "|")
         lines.append("".join(parts))
     lines.append("")
-    for what, joints in (("spring", springs), ("damper", dampers)):
+    for kind, joints in (("spring", springs), ("damper", dampers)):
         apart = sorted(sorted(pair) for pair in joints - set(pairs))
-        lines += [f"{what}: {first} to {second}" for first, second in apart]
+        lines += [f"{kind}: {first} to {second}" for first, second in apart]
     for gap in system.gaps:
         sides = " and ".join(s for s in ("upper", "lower") if getattr(gap, s) is not None)
         lines.append(f"{gap.name}: {sides} stop, {' to '.join(gap.between)}")

@@ -22,7 +22,7 @@ from designer.base.schema import (
     physical_span,
     several,
     text,
-    whole,
+    whole_number,
 )
 from designer.base.units import parse_quantity
 from designer.catalog.entries import FORBIDDEN
@@ -149,7 +149,7 @@ class CircuitSpec(FileTable):
     """Groups of parts with equal values."""
     preferred: Annotated[tuple[float, ...], _preferred()] = ()
     """Values [Ω or F] that do not count among the distinct ones."""
-    most_values: Annotated[int | None, whole("a whole number >= 1", 1)] = None
+    most_values: Annotated[int | None, whole_number("a whole number >= 1", 1)] = None
     """Limit on distinct values; None for none."""
     slack: Annotated[
         float, number("", "a number from 0 to 0.1", lambda value: 0.0 <= value <= 0.1)

@@ -43,9 +43,9 @@ class ModelResponse:
     orbit: Orbit
     """The wanted orbit, or the attractor reached from rest where it was not found."""
     others: tuple[Orbit, ...]
-    """Coexisting attractors that were met."""
+    """Coexisting attractors that the search came to."""
     found: bool
-    """Whether it is what was wanted (always, where nothing was)."""
+    """Whether the orbit is the wanted one; true where no response was wanted."""
 
     @property
     def omega(self) -> float:
@@ -66,12 +66,12 @@ def find(model: MechanicalModel, wanted: Sequence[Response]) -> tuple[ModelRespo
     """
     out = []
     for number, spec in enumerate(wanted, start=1):
-        for key, found in (
+        for key, value in (
             ("omega", "best" if spec.omega is None else None),
             ("b", list(spec.b) if isinstance(spec.b, tuple) else None),
         ):
-            if found is not None:
-                raise InputError(None, f"response[{number}].{key}", found, _A_NUMBER)
+            if value is not None:
+                raise InputError(None, f"response[{number}].{key}", value, _A_NUMBER)
         assert spec.omega is not None
         assert not isinstance(spec.b, tuple)
         check_omega(f"response[{number}].omega", spec.omega, model)
@@ -91,10 +91,10 @@ def matches(orbit: Orbit, spec: Response) -> bool:
     return not spec.difference(orbit)
 
 
-def peaks(model: MechanicalModel, found: Sequence[ModelResponse]) -> Peaks:
-    """What the circuit has to hold, over all responses and their starts from rest."""
+def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
+    """The peaks that the circuit has to hold, over all responses and their starts from rest."""
     runs: list[tuple[MechanicalModel, float, Orbit]] = [
-        (model.at(r.b), r.omega, r.orbit) for r in found
+        (model.at(r.b), r.omega, r.orbit) for r in responses
     ]
     if not runs:
         unit = model.second_order().own_frequency
@@ -164,14 +164,14 @@ class _Span:
 def _find_one(model: MechanicalModel, spec: Response, b: float) -> ModelResponse:
     assert spec.omega is not None
     flow = model_flow(model, spec.omega)
-    met = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
-    for orbit in met:
+    orbits = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
+    for orbit in orbits:
         for candidate in _with_twin(flow, orbit, spec):
             if matches(candidate, spec):
                 return ModelResponse(
-                    spec, b, candidate, tuple(o for o in met if o is not orbit), True
+                    spec, b, candidate, tuple(o for o in orbits if o is not orbit), True
                 )
-    return ModelResponse(spec, b, met[0], tuple(met[1:]), False)
+    return ModelResponse(spec, b, orbits[0], tuple(orbits[1:]), False)
 
 
 def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import did_you_mean
+from designer.base.schema import one_of
 from designer.model.lumped_elements import GROUND, Elements, Gap
 
 RESERVED = (GROUND, "base")
@@ -38,7 +38,7 @@ def check(system: Elements) -> None:
     _check_names(system)
     for gap in system.gaps:
         _check_gap(gap)
-    _check_held(system)
+    _check_grounded(system)
     _check_driven(system)
 
 
@@ -63,15 +63,10 @@ def _check_names(system: Elements) -> None:
     for kind, between in _joints(system):
         for name in between:
             if name not in (*system.names, GROUND):
-                _refuse(f"{kind}.between", name, _known(name, (*system.names, GROUND)))
+                _refuse(f"{kind}.between", name, one_of(name, (*system.names, GROUND)))
     for force in system.forces:
         if force.on not in system.names:
-            _refuse("force.on", force.on, _known(force.on, system.names))
-
-
-def _known(name: str, names: Sequence[str]) -> str:
-    hint = did_you_mean(name, names)
-    return f"one of {', '.join(names)}" + (f"; {hint}" if hint else "")
+            _refuse("force.on", force.on, one_of(force.on, system.names))
 
 
 def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, str]]]:
@@ -85,9 +80,9 @@ def _check_gap(gap: Gap) -> None:
     if gap.upper is None and gap.lower is None:
         _refuse(f"{field}.upper", MISSING, "a gap to an upper or a lower stop, or both")
     if gap.upper is not None and gap.lower is not None and gap.upper + gap.lower <= 0.0:
-        found = f"{gap.upper:g}, with lower = {gap.lower:g}"
+        text = f"{gap.upper:g}, with lower = {gap.lower:g}"
         more = "two stops that are both in contact at rest are two clearances, one for each"
-        _refuse(f"{field}.upper", found, f"upper + lower > 0; {more}")
+        _refuse(f"{field}.upper", text, f"upper + lower > 0; {more}")
     if gap.law == "hertz":
         for key in ("constant", "depth"):
             if getattr(gap, key) is None:
@@ -100,14 +95,14 @@ def _check_gap(gap: Gap) -> None:
         if getattr(gap, key) is not None:
             _refuse(f"{field}.{key}", getattr(gap, key), 'none without law = "hertz"')
     for side in ("upper", "lower"):
-        own = getattr(gap, f"{side}_stiffness")
-        if getattr(gap, side) is None and own is not None:
-            _refuse(f"{field}.{side}_stiffness", own, f"none: there is no {side} stop")
-        if getattr(gap, side) is not None and own is None and gap.stiffness is None:
+        stiffness = getattr(gap, f"{side}_stiffness")
+        if getattr(gap, side) is None and stiffness is not None:
+            _refuse(f"{field}.{side}_stiffness", stiffness, f"none: there is no {side} stop")
+        if getattr(gap, side) is not None and stiffness is None and gap.stiffness is None:
             _refuse(f"{field}.stiffness", MISSING, f"a stiffness, or {side}_stiffness")
 
 
-def _check_held(system: Elements) -> None:
+def _check_grounded(system: Elements) -> None:
     """Springs hold every mass to ground, directly or through others."""
     sprung = {name for spring in system.springs for name in spring.between}
     for name in system.names:
@@ -115,8 +110,8 @@ def _check_held(system: Elements) -> None:
             _refuse(
                 "spring.between", f"no spring on {name}", f"a [[spring]] between {name} and another"
             )
-    held = _reached({GROUND}, [spring.between for spring in system.springs])
-    floating = [name for name in system.names if name not in held]
+    grounded = _reached({GROUND}, [spring.between for spring in system.springs])
+    floating = [name for name in system.names if name not in grounded]
     if floating:
         _refuse(
             "spring.between",
@@ -169,6 +164,6 @@ def check_damped(state_matrix: Array) -> None:
     rates = np.linalg.eigvals(state_matrix)
     slowest = rates[np.argmax(rates.real / np.abs(rates))]
     if not -slowest.real > UNDAMPED * abs(slowest):
-        found = f"none that slows the motion at {abs(slowest.imag):.4g} rad per unit of time"
+        text = f"none that slows the motion at {abs(slowest.imag):.4g} rad per unit of time"
         expected = "a [[damper]] for it: without one no steady response is reached"
-        _refuse("damper.between", found, expected)
+        _refuse("damper.between", text, expected)

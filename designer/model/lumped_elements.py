@@ -13,7 +13,16 @@ from typing import Annotated, Literal
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.schema import Accepts, FileTable, choice, number, physical, several, text, whole
+from designer.base.schema import (
+    Accepts,
+    FileTable,
+    choice,
+    number,
+    physical,
+    several,
+    text,
+    whole_number,
+)
 from designer.model.hertz_law import HertzPieces, hertz_pieces
 from designer.model.mechanics import Side
 
@@ -102,7 +111,7 @@ class Gap(FileTable):
     """Of the Hertzian law: force over depth^1.5, in the file's units."""
     depth: Annotated[float | None, physical("m")] = None
     """Down to which the Hertzian law holds."""
-    pieces: Annotated[int, whole("a whole number from 1 to 12", 1, 12)] = 4
+    pieces: Annotated[int, whole_number("a whole number from 1 to 12", 1, 12)] = 4
     """Straight pieces that stand for the Hertzian law."""
 
     @property
@@ -117,8 +126,8 @@ class Gap(FileTable):
         """The upper and the lower stop; None where there is none."""
         hertz = self.hertz
 
-        def side(gap: float | None, own: float | None) -> Side | None:
-            stiffness = self.stiffness if own is None else own
+        def side(gap: float | None, side_stiffness: float | None) -> Side | None:
+            stiffness = self.stiffness if side_stiffness is None else side_stiffness
             if gap is None:
                 return None
             if hertz is not None:

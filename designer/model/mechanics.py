@@ -164,8 +164,8 @@ class SecondOrderSystem:
     def relative_stiffness(self, clearance: Clearance) -> float:
         """Stiffness of a clearance's upper stop, or its only one, over that of the springs on its
         mass; k0/(1 - k0) of the paper's Eq. (5)."""
-        own = self.stiffness[clearance.mass, clearance.mass]
-        return float(clearance.first.stiffness / own)
+        spring_stiffness = self.stiffness[clearance.mass, clearance.mass]
+        return float(clearance.first.stiffness / spring_stiffness)
 
     def natural_frequencies(self, *, closed: bool = False) -> Array:
         """(n,) undamped ones, ascending, in rad per unit of time. closed : with every stop in
@@ -212,10 +212,10 @@ class SecondOrderSystem:
         def build(key: ModeKey) -> Mode:
             A, B, d = A0.copy(), B0.copy(), d0.copy()
             guards: list[Guard] = []
-            for j, (contact, met) in enumerate(zip(contacts, key, strict=True)):
-                contact.push(met, A, B, d)
+            for j, (contact, level) in enumerate(zip(contacts, key, strict=True)):
+                contact.push(level, A, B, d)
                 guards += contact.guards(j, key)
-            return Mode(A, B, d, tuple(guards), sides=tuple(int(np.sign(met)) for met in key))
+            return Mode(A, B, d, tuple(guards), sides=tuple(int(np.sign(level)) for level in key))
 
         even = all(stop.upper == stop.lower for stop in self.clearances)
         return PiecewiseLinearSystem(
@@ -245,28 +245,31 @@ class _Contact:
         fixed = system.fixed_stops and clearance.other is None
         self.on_drive = system.base if fixed else 0.0
 
-    def push(self, met: int, A: Array, B: Array, d: Array) -> None:
-        """Add the force of so many springs to the equations."""
-        if not met:
+    def push(self, level: int, A: Array, B: Array, d: Array) -> None:
+        """Add the force of the springs in contact to the equations.
+
+        level : number of springs in contact; negative at the lower stop.
+        """
+        if not level:
             return
-        side = int(np.sign(met))
+        side = int(np.sign(level))
         d -= side * self._stop(side).preload * self.push_back
-        for place, stiffness in self._stop(side).springs[: abs(met)]:
+        for place, stiffness in self._stop(side).springs[: abs(level)]:
             A -= stiffness * np.outer(self.push_back, self.row)
             B -= stiffness * self.on_drive * self.push_back
             d += stiffness * side * place * self.push_back
         A -= self.clearance.damping * np.outer(self.push_back, self.rate)
 
     def guards(self, index: int, key: ModeKey) -> list[Guard]:
-        """Ways to one spring more or fewer."""
-        met = key[index]
+        """Guards of the transitions to one spring more or one fewer."""
+        level = key[index]
         out = []
-        if met:
-            side = int(np.sign(met))
+        if level:
+            side = int(np.sign(level))
             springs = self._stop(side).springs
-            out.append(self._guard(-side, springs[abs(met) - 1][0], met - side, index, key))
-            if abs(met) < len(springs):
-                out.append(self._guard(side, -springs[abs(met)][0], met + side, index, key))
+            out.append(self._guard(-side, springs[abs(level) - 1][0], level - side, index, key))
+            if abs(level) < len(springs):
+                out.append(self._guard(side, -springs[abs(level)][0], level + side, index, key))
             return out
         return [
             self._guard(side, -stop.gap, side, index, key) for side, stop in self.clearance.sides
@@ -275,9 +278,11 @@ class _Contact:
     def _stop(self, side: int) -> Side:
         return dict(self.clearance.sides)[side]
 
-    def _guard(self, sign: int, constant: float, met: int, index: int, key: ModeKey) -> Guard:
-        target = (*key[:index], met, *key[index + 1 :])
-        touches = not (met and key[index])  # contact begins or ends; deeper springs only stiffen it
+    def _guard(self, sign: int, constant: float, level: int, index: int, key: ModeKey) -> Guard:
+        target = (*key[:index], level, *key[index + 1 :])
+        touches = not (
+            level and key[index]
+        )  # contact begins or ends; deeper springs only stiffen it
         return Guard(
             sign * self.row, sign * self.on_drive, constant, target, index if touches else -1
         )

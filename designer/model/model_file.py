@@ -29,7 +29,7 @@ from typing import Annotated, Any, ClassVar
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, parse_toml, read_text
 from designer.base.json_schema import DIALECT, either, of_tables
-from designer.base.schema import FileTable, checked, line, such, whole
+from designer.base.schema import FileTable, checked, line, such, whole_number
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
@@ -91,18 +91,18 @@ class ModelFile:
         return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
 
     def choices(self, catalog: Catalog) -> Catalog:
-        """The catalogue with what this file lets parts be bought from: cases and families.
+        """The catalogue restricted to the cases and families that this file allows.
 
         Raises
         ------
         InputError : a family that the catalogue does not have; names this file and the known ones.
         """
-        asked: dict[Kind, tuple[str, ...]] = {
+        families: dict[Kind, tuple[str, ...]] = {
             "resistor": self.circuit.resistor_family,
             "capacitor": self.circuit.capacitor_family,
         }
         try:
-            return catalog.mounted(self.board.mounting).bought_from(asked)
+            return catalog.mounted(self.board.mounting).bought_from(families)
         except InputError as error:
             raise InputError(self.source, error.field, error.found, error.expected) from None
 
@@ -195,7 +195,7 @@ def _check_expected(
     raise InputError(file, field, str(expect), f"p-q for each clearance, as in {shape}{named}")
 
 
-_FORMAT = whole("1 or 2, the formats that this version reads", 1, 2)
+_FORMAT = whole_number("1 or 2, the formats that this version reads", 1, 2)
 _RULES = such(
     "tables [rules.<id>]",
     lambda value: isinstance(value, dict),

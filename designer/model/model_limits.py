@@ -52,26 +52,26 @@ MODELS = {"model": Dimensionless, "mechanical": Mechanical}
 
 
 def check(data: Mapping[str, object], file: str | None) -> None:
-    """Refuse a model file of format 1 that describes a system which that does not know.
+    """Refuse a model file of format 1 that describes a system which needs format 2.
 
     Raises
     ------
-    InputError : it has such a key; says what is known, and where the limits stand.
+    InputError : it has such a key; names what format 1 knows, and the page with its limits.
     """
     if data.get("format") == 2:
         return
-    for key, what in TABLES.items():
+    for key, feature in TABLES.items():
         if key in data:
-            raise InputError(file, key, f"a table {key!r}", _unknown(key, what))
+            raise InputError(file, key, f"a table {key!r}", _unknown(key, feature))
     for table, record in MODELS.items():
         content = data.get(table)
-        known = {field.name for field in fields(record)}
+        keys = {field.name for field in fields(record)}
         for key in content if isinstance(content, Mapping) else ():
-            for pattern, what in OF_A_MODEL:
-                if key not in known and re.fullmatch(pattern, key, re.ASCII):
-                    found = f"unknown key {key!r}"
-                    raise InputError(file, f"{table}.{key}", found, _unknown(key, what))
+            for pattern, feature in OF_A_MODEL:
+                if key not in keys and re.fullmatch(pattern, key, re.ASCII):
+                    text = f"unknown key {key!r}"
+                    raise InputError(file, f"{table}.{key}", text, _unknown(key, feature))
 
 
-def _unknown(key: str, what: str) -> str:
-    return f"a model without {what}: {KNOWN}; {key} is not known ({WHERE})"
+def _unknown(key: str, feature: str) -> str:
+    return f"a model without {feature}: {KNOWN}; {key} is not known ({WHERE})"

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
 from designer.base.json_schema import either
-from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
+from designer.base.schema import Accepts, FileTable, choice, flag, literal, number, physical, span
 from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
 from designer.dynamics.orbit import Orbit
 from designer.model.model import SiScales
@@ -146,14 +146,14 @@ class ResponseTable(Response):
         def refuse(key: str, found: object, expected: str) -> NoReturn:
             raise InputError(file, f"response[{index}].{key}", found, expected)
 
-        given = [key for key in _FREQUENCY if key in keys]
-        if not given:
+        frequency_keys = [key for key in _FREQUENCY if key in keys]
+        if not frequency_keys:
             more = ", or Omega in rad/s, or frequency in Hz"
             refuse("omega", MISSING, _OMEGA + ("" if si is None else more))
-        if len(given) > 1:
-            many = {2: "two", 3: "three"}[len(given)]
-            refuse(given[-1], " and ".join(given), f"one of the {many}")
-        key, omega = given[0], self.omega
+        if len(frequency_keys) > 1:
+            many = {2: "two", 3: "three"}[len(frequency_keys)]
+            refuse(frequency_keys[-1], " and ".join(frequency_keys), f"one of the {many}")
+        key, omega = frequency_keys[0], self.omega
         angular = self.frequency if self.Omega is None else self.Omega
         if angular is not None:
             if si is None:
@@ -165,5 +165,5 @@ class ResponseTable(Response):
             if not 0.0 < omega < math.inf:
                 refuse(key, angular, "a frequency within the range of numbers")
         if self.twin == "exact" and self.expect is None:
-            refuse("twin", shown(self.twin), "an expect that it can apply to")
+            refuse("twin", literal(self.twin), "an expect that it can apply to")
         return Response(omega, self.expect, self.twin, self.symmetric, self.b)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from designer.base.errors import InputError
-from designer.base.schema import Accepts, FileTable, checked, line, number, one_of, shown
+from designer.base.schema import Accepts, FileTable, checked, line, literal, number, one_of
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.design_rule import DesignRule, Override
 from designer.catalog.design_rules import RULES
@@ -32,7 +32,7 @@ def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override
         if name not in by_id:
             raise InputError(file, f"rules.{name[:60]}", "an unknown rule", one_of(name, by_id))
         if not isinstance(table, dict):
-            raise InputError(file, f"rules.{name}", shown(table), "a table with limit and reason")
+            raise InputError(file, f"rules.{name}", literal(table), "a table with limit and reason")
     return {
         name: _override(rule, tables[name], file) for name, rule in by_id.items() if name in tables
     }
@@ -46,11 +46,11 @@ class _Table(FileTable):
 
 def _override(rule: DesignRule, table: dict[str, Any], file: str | None) -> Override:
     place = f"rules.{rule.id}"
-    given = checked(_Table, table, file, within=place)
+    entry = checked(_Table, table, file, within=place)
     try:
-        return Override(_limit(rule).read(given.limit), given.reason)
+        return Override(_limit(rule).read(entry.limit), entry.reason)
     except ValueError as error:
-        raise InputError(file, f"{place}.limit", shown(given.limit), str(error)) from None
+        raise InputError(file, f"{place}.limit", literal(entry.limit), str(error)) from None
 
 
 def _limit(rule: DesignRule) -> Accepts:

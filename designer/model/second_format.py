@@ -62,11 +62,11 @@ def _blocks(text: str) -> Iterator[_Block]:
         if header is None:
             lines.append(line)
             continue
-        own = len(lines)
-        while own and (not lines[own - 1].strip() or lines[own - 1].lstrip().startswith("#")):
-            own -= 1
-        yield _Block(table, tuple(lines[:own]))
-        table, lines = header[1], [*lines[own:], line]
+        end = len(lines)
+        while end and (not lines[end - 1].strip() or lines[end - 1].lstrip().startswith("#")):
+            end -= 1
+        yield _Block(table, tuple(lines[:end]))
+        table, lines = header[1], [*lines[end:], line]
     yield _Block(table, tuple(lines))
 
 
@@ -102,14 +102,14 @@ def _changed(line: str, changes: Mapping[str, Callable[[Any], Any]]) -> str:
 
 def _elements(modelfile: ModelFile) -> Iterator[str]:
     """The tables of the elements. Plain numbers of [model] are in units of M1, K1 and P1 + P2."""
-    model, given = modelfile.model, modelfile.mechanical
+    model, mechanical = modelfile.model, modelfile.mechanical
     assert isinstance(model, Dimensionless)
-    system = given or Mechanical.from_dimensionless(model, M1=1.0, K1=1.0, force=1.0)
-    raw = {} if given is None else parse_toml(modelfile.text, None)["mechanical"]
+    system = mechanical or Mechanical.from_dimensionless(model, M1=1.0, K1=1.0, force=1.0)
+    raw = {} if mechanical is None else parse_toml(modelfile.text, None)["mechanical"]
 
     def value(name: str) -> str:
         number = raw.get(name, getattr(system, name))
-        if given is None or isinstance(number, str):
+        if mechanical is None or isinstance(number, str):
             return json.dumps(number, ensure_ascii=False)
         return json.dumps(f"{number!r} {MECHANICAL_UNITS[name]}")
 
@@ -131,20 +131,20 @@ def _elements(modelfile: ModelFile) -> Iterator[str]:
 
 
 def _check(modelfile: ModelFile, text: str, scales: SiScales) -> None:
-    """InputError unless the new text says what the file says."""
+    """InputError unless the new text describes the same system as the file."""
     try:
         other = parse_model_file(text, modelfile.source)
     except InputError:
         _refuse(modelfile)
-    ours = (modelfile.mechanical or modelfile.model).second_order()
-    theirs = other.model.second_order()
+    system = (modelfile.mechanical or modelfile.model).second_order()
+    other_system = other.model.second_order()
     keys = ("mass", "damping", "stiffness", "force")
-    pairs = [(getattr(ours, key), getattr(theirs, key)) for key in keys]
+    pairs = [(getattr(system, key), getattr(other_system, key)) for key in keys]
     pairs.append((_frequencies(modelfile, scales), _frequencies(other, SiScales())))
     same = all(np.allclose(a, b, rtol=NEAR, atol=NEAR * np.abs(a).max()) for a, b in pairs)
     wanted = [(r.expect, r.twin, r.symmetric) for r in modelfile.responses]
-    kept = [(r.expect, r.twin, r.symmetric) for r in other.responses]
-    if not same or wanted != kept or modelfile.circuit != other.circuit:
+    other_wanted = [(r.expect, r.twin, r.symmetric) for r in other.responses]
+    if not same or wanted != other_wanted or modelfile.circuit != other.circuit:
         _refuse(modelfile)
 
 

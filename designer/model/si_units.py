@@ -48,9 +48,11 @@ def units_of(si: SiScales | None, model: MechanicalModel) -> dict[str, Unit]:
     if si is None:
         return {}
     scales = {"Hz": si.hertz(1.0), "m": si.length_scale, "m/s": si.speed_scale}
-    own = model.units if in_si(si, model) else ()
+    model_units = model.units if in_si(si, model) else ()
     names = unit_names(model)
-    return {name: Unit(unit, scales[unit]) for name, unit in names.items() if name not in own}
+    return {
+        name: Unit(unit, scales[unit]) for name, unit in names.items() if name not in model_units
+    }
 
 
 NO_UNITS: Mapping[str, Unit] = {}
@@ -108,7 +110,7 @@ class Reader:
         low, high = natural_frequencies(self.model)
         if low / FAR_BELOW <= omega <= FAR_ABOVE * high:
             return omega
-        hertz, meant = value_text(self.si.hertz(omega), "Hz"), self.si.omega(omega)
+        hertz, radians = value_text(self.si.hertz(omega), "Hz"), self.si.omega(omega)
         text = "--frequency" if option == "--omega" else option
         raise InputError(
             None,
@@ -116,7 +118,7 @@ class Reader:
             f"{omega:g}",
             f"ω near the model's natural frequencies, {low:.3g} to {high:.3g}: {omega:g} "
             f"dimensionless would be {hertz}, give {text} '{hertz}' for that; {omega:g} rad/s is "
-            f"ω = {meant:.3g}, give {text} '{omega:g} rad/s' or {option} {meant:.3g} for that",
+            f"ω = {radians:.3g}, give {text} '{omega:g} rad/s' or {option} {radians:.3g} for that",
         )
 
     def value(self, option: str, name: str, value: str | float) -> float:
@@ -143,8 +145,8 @@ class Reader:
         if unit is None:
             raise InputError(None, option, text, f"a number: {name} has no unit")
         quantity = _quantity(option, text, unit)
-        shown = units_of(self._scales(option, text), self.model)
-        return quantity / shown[name].scale if name in shown else quantity
+        units = units_of(self._scales(option, text), self.model)
+        return quantity / units[name].scale if name in units else quantity
 
     def _scales(self, option: str, text: str) -> SiScales:
         if self.si is None:

@@ -76,14 +76,14 @@ def _shape() -> Accepts:
             raise ValueError
         if table["law"] not in LAWS:
             raise ValueError(f"a law is {one_of(table['law'], LAWS)}")
-        own = {"uniform": (), "normal": ("sigmas",), "binned": ("inner",)}[table["law"]]
+        parameters = {"uniform": (), "normal": ("sigmas",), "binned": ("inner",)}[table["law"]]
         for key in table:
-            if key not in ("law", *own):
+            if key not in ("law", *parameters):
                 raise ValueError(f"{table['law']} has no {key}")
         if table["law"] == "binned" and "inner" not in table:
             raise ValueError("binned needs inner, the grade that was picked out")
         return SpreadShape(
-            table["law"], **{key: positive(table, key) for key in own if key in table}
+            table["law"], **{key: positive(table, key) for key in parameters if key in table}
         )
 
     return Accepts(expected, check, json=either({"enum": list(LAWS)}, {"type": "object"}))
@@ -239,7 +239,7 @@ class SpreadSpec(FileTable):
     """Name of the file with a bench's list of measured values; None for none."""
 
     def check(self, resistor_grade: float, capacitor_grade: float, file: str | None) -> None:
-        """Refuse what its keys say only together.
+        """Refuse combinations of keys that contradict each other.
 
         Raises
         ------
@@ -248,9 +248,9 @@ class SpreadSpec(FileTable):
         """
         for index, rule in enumerate(self.network, start=1):
             if (rule.share is None) is (rule.family is None):
-                found = MISSING if rule.share is None else "share and family"
+                value = MISSING if rule.share is None else "share and family"
                 expected = "a share, or the family of arrays that it is bought from"
-                raise InputError(file, f"spread.network[{index}].share", found, expected)
+                raise InputError(file, f"spread.network[{index}].share", value, expected)
         check_binned(self.resistors, resistor_grade, "spread.resistors", file)
         check_binned(self.capacitors, capacitor_grade, "spread.capacitors", file)
 

@@ -124,8 +124,8 @@ class ModelSubject:
     def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters, in the order in which a model file has them; those
         that stand for nothing left out."""
-        known = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
-        names = [name for name in known if name in self.model.parameters]
+        ordered = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
+        names = [name for name in ordered if name in self.model.parameters]
         values = {name: self.model.parameter(name) for name in names if name not in self.model.idle}
         return {"omega": self.omega, **values}
 
@@ -152,13 +152,13 @@ def of_model(model: MechanicalModel, omega: float, parameter: str) -> Family:
     ------
     InputError : the parameter is not one of them.
     """
-    known = {"omega": frequency_range(model), **model.parameters}
-    if parameter not in known:
-        raise InputError(None, "over", parameter, f"one of {', '.join(known)}")
+    ranges = {"omega": frequency_range(model), **model.parameters}
+    if parameter not in ranges:
+        raise InputError(None, "over", parameter, f"one of {', '.join(ranges)}")
 
     def build(value: float) -> Flow:
         if parameter == "omega":
             return model_flow(model, value, fast=False)
         return model_flow(model.changed({parameter: value}), omega, fast=False)
 
-    return Family(parameter, *known[parameter], build)
+    return Family(parameter, *ranges[parameter], build)

@@ -44,8 +44,8 @@ def element_rows(model: LumpedSystem, *, si: bool) -> list[tuple[str, str, str]]
     si : whether the numbers are SI values, which are then shown with their units.
     """
     return [
-        (symbol, _value(value, unit if si else ""), what)
-        for symbol, value, unit, what in _elements(model)
+        (symbol, _value(value, unit if si else ""), text)
+        for symbol, value, unit, text in _elements(model)
     ]
 
 
@@ -67,45 +67,45 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
     for i, mass in enumerate(model.masses, start=1):
         yield subscripted(f"m{i}"), mass.mass, "kg", f"mass of {mass.name}"
     for i, spring in enumerate(model.springs, start=1):
-        what = f"spring, {' to '.join(spring.between)}"
-        yield subscripted(f"k{i}"), spring.stiffness, "N/m", what
+        text = f"spring, {' to '.join(spring.between)}"
+        yield subscripted(f"k{i}"), spring.stiffness, "N/m", text
     for i, damper in enumerate(model.dampers, start=1):
-        what = f"damper, {' to '.join(damper.between)}"
-        yield subscripted(f"c{i}"), damper.damping, "N s/m", what
+        text = f"damper, {' to '.join(damper.between)}"
+        yield subscripted(f"c{i}"), damper.damping, "N s/m", text
     for gap in model.gaps:
         yield from _of_gap(gap)
     for i, force in enumerate(model.forces, start=1):
         if force.amplitude:
-            what = f"amplitude of the force on {force.on}"
-            yield subscripted(f"P{i}"), force.amplitude, "N", what
+            text = f"amplitude of the force on {force.on}"
+            yield subscripted(f"P{i}"), force.amplitude, "N", text
         if force.constant:
             yield subscripted(f"G{i}"), force.constant, "N", f"constant force on {force.on}"
     if model.base is not None:
         stops = "with" if model.base.stops == "base" else "without"
-        what = f"amplitude of the ground's motion, {stops} the stops"
-        yield "Y", model.base.amplitude, "m", what
+        text = f"amplitude of the ground's motion, {stops} the stops"
+        yield "Y", model.base.amplitude, "m", text
 
 
 def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
-    where = f"in {gap.name}, {' to '.join(gap.between)}"
+    location = f"in {gap.name}, {' to '.join(gap.between)}"
     for side in ("upper", "lower"):
         place = getattr(gap, side)
         if place is not None:
             more = ", preloaded" if place < 0.0 else ""
-            yield f"{gap.name}.{side}", place, "m", f"gap to the {side} stop {where}{more}"
+            yield f"{gap.name}.{side}", place, "m", f"gap to the {side} stop {location}{more}"
     for side in ("", "upper_", "lower_"):
-        own = getattr(gap, f"{side}stiffness")
-        if own is not None:
+        stiffness = getattr(gap, f"{side}stiffness")
+        if stiffness is not None:
             of = f"the {side[:-1]} stop" if side else "the stops"
-            yield f"{gap.name}.{side}stiffness", own, "N/m", f"stiffness of {of} {where}"
+            yield f"{gap.name}.{side}stiffness", stiffness, "N/m", f"stiffness of {of} {location}"
     if gap.constant is not None and gap.depth is not None:
-        yield f"{gap.name}.constant", gap.constant, "", f"of the Hertzian law {where}"
-        yield f"{gap.name}.depth", gap.depth, "m", f"down to which the law holds {where}"
+        yield f"{gap.name}.constant", gap.constant, "", f"of the Hertzian law {location}"
+        yield f"{gap.name}.depth", gap.depth, "m", f"down to which the law holds {location}"
     if gap.preload:
-        what = f"push of the stops where they are touched {where}"
-        yield f"{gap.name}.preload", gap.preload, "N", what
+        text = f"push of the stops where they are touched {location}"
+        yield f"{gap.name}.preload", gap.preload, "N", text
     if gap.damping:
-        yield f"{gap.name}.damping", gap.damping, "N s/m", f"damping of the stops {where}"
+        yield f"{gap.name}.damping", gap.damping, "N s/m", f"damping of the stops {location}"
 
 
 def _value(value: float, unit: str) -> str:
@@ -184,9 +184,9 @@ def _law(model: LumpedSystem, gap: Gap, naming: Naming) -> str:
             depth = f"max({'u' if end == 'upper' else '−u'} − {gap.name}.{end}, 0)"
             terms.append(f"{'' if end == 'upper' else '−'}{gap.name}.constant {depth}^1.5")
             continue
-        own = f"{gap.name}.{end}_stiffness"
-        known = getattr(gap, f"{end}_stiffness") is not None
-        name = own if known else f"{gap.name}.stiffness"
+        side_name = f"{gap.name}.{end}_stiffness"
+        is_stated = getattr(gap, f"{end}_stiffness") is not None
+        name = side_name if is_stated else f"{gap.name}.stiffness"
         for place, stiffness in stop.springs:
             shift = naming(f"{gap.name}.{end}", place)
             terms.append(f"{_times(naming(name, stiffness))}{bound}(u {sign} {shift}, 0)")

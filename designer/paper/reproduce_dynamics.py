@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from designer.base.atomic_write import write
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.report_pieces import check_ours
+from designer.base.report_pieces import check_report_folder
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.point_captions import caption
@@ -114,7 +114,7 @@ def reproduce(
     progress = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
-        check_ours(out, NAMES, DATA, COMMAND)
+        check_report_folder(out, NAMES, DATA, COMMAND)
     except OSError as error:
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"

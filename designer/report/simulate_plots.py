@@ -32,7 +32,7 @@ from designer.base.figure_style import (
     styled,
 )
 from designer.base.si_unit import Unit
-from designer.base.units import told_apart
+from designer.base.units import distinct_texts
 from designer.check.simulation import Simulated
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -61,7 +61,7 @@ def names(omegas: Sequence[float], digits: int = DIGITS) -> tuple[str, ...]:
     digits : significant ones of a frequency, or as many more as tell those of this run apart.
     """
     out: list[str] = []
-    for text in told_apart(omegas, digits, DIGITS):
+    for text in distinct_texts(omegas, digits, DIGITS):
         stem = name = f"omega-{text}"
         count = 1
         while name in out:

@@ -141,7 +141,7 @@ class _Rules:
         return InputError(self.file, f"spread.{key}", value, expected)
 
     def _own_rules(self) -> dict[str, PartRule]:
-        """The rule of each part named in ``[[spread.part]]``; a later table adds to an earlier one."""
+        """The rule of each part in ``[[spread.part]]``; a later table adds to an earlier one."""
         rules: dict[str, PartRule] = {}
         for number, rule in enumerate(self.rules.part, start=1):
             for name in self.named(rule.names, f"part[{number}].names"):

@@ -63,7 +63,7 @@ def test_shares_are_those_of_a_plain_settling() -> None:
     count = 60
     (found,) = simulate(parse_model_file(SI), [OMEGA], starts=count)
     box = scale_of(MODEL, OMEGA)
-    states = coexistence.drawn(box, count, SEED)
+    states = coexistence.random_starts(box, count, SEED)
     assert (np.abs(states) <= box).all()
     assert (np.abs(states).max(axis=0) > 0.8 * box).all()  # the whole box, not a part of it
     ends = [settled(x) for x in states]
@@ -95,9 +95,9 @@ def test_shares_are_those_of_a_plain_settling() -> None:
 
 def test_a_start_is_the_same_whatever_their_number() -> None:
     box = scale_of(MODEL, OMEGA)
-    many = coexistence.drawn(box, 50, 7)
-    assert np.array_equal(many[:20], coexistence.drawn(box, 20, 7))
-    assert not np.array_equal(many[:20], coexistence.drawn(box, 20, 8))
+    many = coexistence.random_starts(box, 50, 7)
+    assert np.array_equal(many[:20], coexistence.random_starts(box, 20, 7))
+    assert not np.array_equal(many[:20], coexistence.random_starts(box, 20, 8))
 
 
 def test_starts_that_do_not_settle_are_counted() -> None:

@@ -78,12 +78,12 @@ def test_all_starts_together_have_a_budget(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(step_budget, "STARTS", 3000)
     made = Flow(PAPER.second_order().piecewise_linear(), Drive(0.85))
     met = coexistence.of_flow(made, np.ones(4), 50, 1)
-    assert 0 < met.starts < met.asked == 50
+    assert 0 < met.starts < met.wanted_starts == 50
     assert met.starts == sum(b.count for b in met.basins) + met.not_settled
     count = [0]
 
     def states() -> object:
-        for x in coexistence.drawn(np.ones(4), 50, 1):
+        for x in coexistence.random_starts(np.ones(4), 50, 1):
             count[0] += 1
             yield x
 

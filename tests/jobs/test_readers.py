@@ -19,7 +19,7 @@ from designer.base.guarded_reading import csv_rows, parse_json, read_bytes, read
 from designer.base.keyed_store import KeyedStore
 from designer.base.manifest import MANIFEST, read_json
 from designer.base.parquet_entry import ParquetForm
-from designer.base.report_pieces import check_ours
+from designer.base.report_pieces import check_report_folder
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board
 from designer.catalog.catalog import load_catalog
@@ -319,7 +319,7 @@ def test_a_defect_outside_the_file_stays_one() -> None:
 def test_a_report_s_folder_with_nested_json(tmp_path: Path) -> None:
     (tmp_path / "data.json").write_text("[" * 100_000)
     with pytest.raises(InputError, match=r"data\.json"):
-        check_ours(tmp_path, ["data.json"], "data.json", "trade")
+        check_report_folder(tmp_path, ["data.json"], "data.json", "trade")
 
 
 # ---------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.si_unit import prefixed, value_text
-from designer.base.units import told_apart
+from designer.base.units import distinct_texts
 from designer.bifurcations.parameter_map import MapPlan
 from designer.cli import entry, tables
 from designer.jobs import bifurcation_request
@@ -139,9 +139,9 @@ def test_natural_frequencies_are_those_of_the_two_linear_systems() -> None:
 
 
 def test_numbers_are_told_apart_with_as_few_digits_as_that_takes() -> None:
-    assert told_apart([1.152343150646588, 0.5], 4) == ["1.152", "0.5"]
-    assert told_apart([1.15231, 1.15238, 1.15231], 4) == ["1.1523", "1.1524", "1.1523"]
-    assert told_apart([1.0, 1.0 + 1e-15], 4) == ["1", "1"]
+    assert distinct_texts([1.152343150646588, 0.5], 4) == ["1.152", "0.5"]
+    assert distinct_texts([1.15231, 1.15238, 1.15231], 4) == ["1.1523", "1.1524", "1.1523"]
+    assert distinct_texts([1.0, 1.0 + 1e-15], 4) == ["1", "1"]
 
 
 # ---------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.report_pieces import check_ours
+from designer.base.report_pieces import check_report_folder
 from designer.bifurcations.doubling_cascade import cascade
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.windows import BranchWindow, WindowEnd
@@ -292,7 +292,7 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
     assert titles == [reproduce_dynamics.TITLE]
     assert {path.name for path in out.iterdir()} <= reproduce_dynamics.NAMES
     command = reproduce_dynamics.COMMAND
-    check_ours(out, reproduce_dynamics.NAMES, "dynamics.json", command)  # may be replaced
+    check_report_folder(out, reproduce_dynamics.NAMES, "dynamics.json", command)  # may be replaced
     (out / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"notes\.txt"):
         reproduce(out, extent=few)
