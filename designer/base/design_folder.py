@@ -208,8 +208,10 @@ class Folder:
         self.manifest.files[name] = (stage, file_hash(name, data))
 
     def rewrite(self, name: str, content: str | bytes) -> None:
-        """Write a file of a finished stage anew, unless it has this content already. At no time does
-        the manifest state a hash that is not the file's."""
+        """Write a file of a finished stage anew, unless it has this content already.
+
+        At no time does the manifest state a hash that is not the file's.
+        """
         assert self.manifest is not None
         stage, digest = self.manifest.files[name]
         data = content.encode("utf-8") if isinstance(content, str) else content

@@ -160,7 +160,7 @@ def _without_unit(text: str, unit: str) -> str:
 
 
 def _without_denominator(text: str, unit: str) -> tuple[str, int]:
-    """A text without a unit such as V/us for V/s, and the power of ten of the denominator's prefix."""
+    """A text without a unit such as V/us for V/s; the power of ten of the denominator's prefix."""
     above, slash, below = unit.partition("/")
     if not slash or not below[0].isalpha():  # V/√Hz has no prefix below
         return text, 0

@@ -55,8 +55,8 @@ class Coexistence:
     starts: int
     """How many starts were run."""
     wanted_starts: int
-    """How many starts were wanted: more than ``starts`` where all together would have taken more than
-    ``step_budget.STARTS`` steps."""
+    """How many starts were wanted: more than ``starts`` where all of them would have taken
+    more than ``step_budget.STARTS`` steps."""
     seed: int
     """Seed that the starts were drawn with."""
     box: Array

@@ -52,7 +52,7 @@ MODELS = {"model": Dimensionless, "mechanical": Mechanical}
 
 
 def check(data: Mapping[str, object], file: str | None) -> None:
-    """Refuse a model file of format 1 that describes a system which needs format 2.
+    """Refuse a model file of format 1 that describes a system that format 1 does not know.
 
     Raises
     ------
