@@ -50,10 +50,10 @@ def setup_csv(
     recipes : how to start each response; None where the nominal circuit does not show it.
     si : adds what each frequency is in the mechanism, Hz, in a last column.
     """
-    known = settings(design, responses)
-    omegas = [repr(s.omega) for s in known]
+    bench_settings = settings(design, responses)
+    omegas = [repr(s.omega) for s in bench_settings]
     if si is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
-        omegas = distinct_texts([s.omega for s in known], OMEGA_DIGITS)
+        omegas = distinct_texts([s.omega for s in bench_settings], OMEGA_DIGITS)
     rows = [
         {
             "omega": omega,
@@ -66,30 +66,30 @@ def setup_csv(
             "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
             **({} if si is None else {MECHANISM: hertz(si.hertz(s.omega))}),
         }
-        for s, omega, r, recipe in zip(known, omegas, responses, recipes, strict=True)
+        for s, omega, r, recipe in zip(bench_settings, omegas, responses, recipes, strict=True)
     ]
     return csv_text(COLUMNS if si is None else (*COLUMNS, MECHANISM), rows)
 
 
-def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
+def start_recipes(synthesis: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
     """A start recipe for each response of a design, found on its circuit; None where the model or
     the nominal circuit does not show it."""
-    checked = checked_design.check(made.design, made.model_responses, None)
-    shown = [
+    checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
+    indices = [
         i
         for i, c in enumerate(checked)
         if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
     ]
     plan = plan_study(
-        made.modelfile,
-        made.design,
-        [checked[i] for i in shown],
-        made.catalog,
+        synthesis.modelfile,
+        synthesis.design,
+        [checked[i] for i in indices],
+        synthesis.catalog,
         samples=1,  # neither this nor the seed matters to a recipe
         seed=0,
     )
-    known = dict(zip(shown, find_recipes(plan, jobs), strict=True))
-    return tuple(known.get(i) for i in range(len(checked)))
+    recipe_of = dict(zip(indices, find_recipes(plan, jobs), strict=True))
+    return tuple(recipe_of.get(i) for i in range(len(checked)))
 
 
 def scales_csv(modelfile: ModelFile, design: Design, responses: Sequence[ModelResponse]) -> str:

@@ -167,7 +167,7 @@ def _answer(
         with folder.working(stages, before or work.provenance):
             answer, figure = _make(work, folder)
             progress.stage("pictures")
-            for name, content in _drawn(kind, figure()).items():
+            for name, content in _image_files(kind, figure()).items():
                 folder.write(name, content)
             answer["cost"]["seconds"] = time.perf_counter() - began
             folder.write(f"{kind}.json", dumps(answer))
@@ -182,8 +182,8 @@ def _subject(
 ) -> tuple[ModelFile, Swept]:
     if not isinstance(model, ModelFile) and Path(model).is_dir():
         if request.circuit:
-            made = read_design(model, progress=progress)
-            return made.modelfile, BoardSubject(made.design)
+            synthesis = read_design(model, progress=progress)
+            return synthesis.modelfile, BoardSubject(synthesis.design)
         modelfile, _ = source(model, model)
     else:
         modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
@@ -201,8 +201,8 @@ class _Work:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
-        asked = {"points": request.points} if request.kind == "sweep" else {}
-        decides = {"kind": request.kind, **plan.as_dict(), **asked}
+        more = {"points": request.points} if request.kind == "sweep" else {}
+        decides = {"kind": request.kind, **plan.as_dict(), **more}
         self.hash = work_hash(decides)
         self.provenance = provenance(
             modelfile,
@@ -315,7 +315,7 @@ def _with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
     return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
 
 
-def _drawn(kind: StageName, figure: Any) -> dict[str, str | bytes]:
+def _image_files(kind: StageName, figure: Any) -> dict[str, str | bytes]:
     from designer.base.figure_style import to_png, to_svg
 
     return {f"{kind}.png": to_png(figure, 200.0), f"{kind}.svg": to_svg(figure)}

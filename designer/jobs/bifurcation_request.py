@@ -79,7 +79,7 @@ Plan = SweepPlan | MapPlan | BasinPlan
 
 
 def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
-    """What is to be made.
+    """The sweep, map or basins that a request asks for.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
         both_ends = [{over: low}, {over: high}]
         tracks = sweep.from_starts(subject, both_ends, request.starts)
     else:
-        both = [d for d, asked in ((DOWN, request.down), (UP, request.up)) if asked]
+        both = [d for d, wanted in ((DOWN, request.down), (UP, request.up)) if wanted]
         tracks = sweep.follow(*(both or [DOWN]))
     return SweepPlan(subject, over, values, course=_course(request, Course()), **tracks)
 
@@ -187,8 +187,8 @@ def _axis(
 
 def _check_cells(columns: int, rows: int) -> None:
     if columns * rows > MOST_CELLS:
-        found = f"{columns} x {rows} points"
-        raise InputError(None, "--map", found, f"at most {MOST_CELLS} points in all")
+        text = f"{columns} x {rows} points"
+        raise InputError(None, "--map", text, f"at most {MOST_CELLS} points in all")
 
 
 def _course(request: Request, usual: Course) -> Course:
@@ -257,41 +257,41 @@ def _at_frequency(
 ) -> Swept:
     """With the drive's frequency fixed, where it is not swept: --omega, or the first response's."""
     option = "--omega"
-    asked: float | str | None = request.omega
+    stated: float | str | None = request.omega
     if request.frequency is not None:
-        if asked is not None:
+        if stated is not None:
             raise InputError(None, "--frequency", request.frequency, "nothing beside --omega")
-        option, asked = "--frequency", request.frequency
+        option, stated = "--frequency", request.frequency
     if "omega" in swept or "frequency" in swept:
-        if asked is not None:
-            raise InputError(None, option, asked, "nothing: the frequency is swept")
+        if stated is not None:
+            raise InputError(None, option, stated, "nothing: the frequency is swept")
         if {"omega", "frequency"} <= set(swept):
             raise InputError(None, "--map", swept[1], "not the frequency a second time")
         return subject
     read = _reader(subject, modelfile)
     if not isinstance(subject, BoardSubject):
-        omega = _omega(option, asked, read, modelfile)
+        omega = _omega(option, stated, read, modelfile)
         return ModelSubject(subject.model, omega, scales=subject.scales)
-    if isinstance(asked, str):
-        hertz = read.value(option, "frequency", asked)
+    if isinstance(stated, str):
+        hertz = read.value(option, "frequency", stated)
         subject.check(option, "frequency", hertz)
     else:
-        hertz = subject.design.errors.scales.frequency(_omega(option, asked, read, modelfile))
+        hertz = subject.design.errors.scales.frequency(_omega(option, stated, read, modelfile))
     return BoardSubject(subject.design, hertz, subject.amplitude, subject.offset)
 
 
-def _omega(option: str, asked: float | str | None, read: Reader, modelfile: ModelFile) -> float:
+def _omega(option: str, stated: float | str | None, read: Reader, modelfile: ModelFile) -> float:
     """The drive's dimensionless frequency: the option's, or that of the file's first response."""
-    if asked is None:
-        known = [r.omega for r in modelfile.responses if r.omega is not None]
-        if not known:
+    if stated is None:
+        omegas = [r.omega for r in modelfile.responses if r.omega is not None]
+        if not omegas:
             raise InputError(
                 None, "--omega", MISSING, "the drive's frequency: no response of the file has one"
             )
-        omega = known[0]
-    elif isinstance(asked, str):
-        omega = read.frequency(option, asked)
+        omega = omegas[0]
+    elif isinstance(stated, str):
+        omega = read.frequency(option, stated)
     else:
-        omega = read.value(option, "omega", asked)
+        omega = read.value(option, "omega", stated)
     check_omega(option, omega, modelfile.model)
     return omega

@@ -22,7 +22,7 @@ def names(modelfile: ModelFile) -> list[str]:
     return [BILL, NOTES, DRAWING, PICTURE, *(file_of(name) for name in modelfile.board.bom)]
 
 
-def texts(made: Synthesis) -> dict[str, str]:
+def texts(synthesis: Synthesis) -> dict[str, str]:
     """The content of all but the picture, by name.
 
     Raises
@@ -33,35 +33,35 @@ def texts(made: Synthesis) -> dict[str, str]:
     from designer.board import schematic_drawing  # with matplotlib, which nothing before this needs
 
     doing("bill of materials, drawing")
-    circuit, choice = board_circuit(made)
-    parts = components(circuit, made.catalog, choice)
+    circuit, choice = board_circuit(synthesis)
+    parts = components(circuit, synthesis.catalog, choice)
     return {
-        NOTES: board_notes.markdown(made, circuit, choice, parts),
-        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(parts)),
-        **_bills(made, parts, choice),
+        NOTES: board_notes.markdown(synthesis, circuit, choice, parts),
+        DRAWING: schematic_drawing.svg(circuit, synthesis.modelfile.title, pin_numbers(parts)),
+        **_bills(synthesis, parts, choice),
     }
 
 
-def bills(made: Synthesis) -> dict[str, str]:
+def bills(synthesis: Synthesis) -> dict[str, str]:
     """The bills of materials alone, by name; raises as ``texts`` does."""
-    circuit, choice = board_circuit(made)
-    return _bills(made, components(circuit, made.catalog, choice), choice)
+    circuit, choice = board_circuit(synthesis)
+    return _bills(synthesis, components(circuit, synthesis.catalog, choice), choice)
 
 
-def _bills(made: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
+def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
     bought = bill(to_buy(parts, choice))
-    others = layouts(made.modelfile.board.bom, made.catalog.folders)
+    others = layouts(synthesis.modelfile.board.bom, synthesis.catalog.folders)
     return {
         BILL: bill_csv(bought),
         **{layout.file: layout.csv(bought) for layout in others},
     }
 
 
-def picture(made: Synthesis) -> bytes:
+def picture(synthesis: Synthesis) -> bytes:
     """The drawing once more, as points."""
     from designer.board import schematic_drawing
 
     doing("drawing")
-    circuit, choice = board_circuit(made)
-    numbers = pin_numbers(components(circuit, made.catalog, choice))
-    return schematic_drawing.png(circuit, made.modelfile.title, numbers=numbers)
+    circuit, choice = board_circuit(synthesis)
+    numbers = pin_numbers(components(circuit, synthesis.catalog, choice))
+    return schematic_drawing.png(circuit, synthesis.modelfile.title, numbers=numbers)

@@ -32,12 +32,12 @@ from designer.check.synthesis_result import Synthesis
 from designer.jobs import folder_numbers, rung_choice
 from designer.jobs.design_source import (
     design_inputs,
+    design_inputs_of,
     design_stage,
     grade_inputs,
-    made_from,
     read_design,
 )
-from designer.jobs.options import Options, given
+from designer.jobs.options import Options, stated_options
 from designer.jobs.origin import provenance
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
@@ -108,21 +108,21 @@ def cure(
     """
     path = Path(folder)
     limits = () if overwrite else ("budget", "without")
-    known: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
     if is_design_folder(path):
-        known = folder_numbers.own(Folder(path), "cure", ("yield", "seed"), limits)
-    asked = known | given(
+        defaults = folder_numbers.stage_numbers(Folder(path), "cure", ("yield", "seed"), limits)
+    settings = defaults | stated_options(
         {"yield": yield_, "budget": budget, "without": without or None, "seed": seed}
     )
-    if "yield" not in asked:
+    if "yield" not in settings:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
     return cure_into(
         path,
-        target=asked["yield"],
-        budget=asked.get("budget"),
+        target=settings["yield"],
+        budget=settings.get("budget"),
         out=None if out is None else Path(out),
-        without=asked.get("without", ()),
-        options=Options(asked.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
+        without=settings.get("without", ()),
+        options=Options(settings.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
         progress=progress,
     )
 
@@ -150,7 +150,7 @@ def cure_into(
     need_responses(base.modelfile)
     folder = Folder(path)
     inputs = {
-        "design": made_from(folder),
+        "design": design_inputs_of(folder),
         "catalogue": base.catalog.hash,
         "rules": RULES,
         "yield": target,
@@ -189,9 +189,9 @@ def _find_and_write(
 ) -> None:
     """Find the cheapest cure of the design ``base`` and write it into its folder."""
     began = time.perf_counter()
-    known = {}
+    studies_before = {}
     if folder.manifest and STUDIES in folder.manifest.files:
-        known = _LINES.load(folder / STUDIES, progress.note, folder.vouches)
+        studies_before = _LINES.load(folder / STUDIES, progress.note, folder.vouches)
     origin = provenance(
         base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
     )
@@ -211,7 +211,7 @@ def _find_and_write(
                 without=unwanted,
                 seed=options.seed,
                 jobs=options.jobs,
-                book=Book(known, save),
+                book=Book(studies_before, save),
                 progress=progress,
             )
         progress.stage("report of the cure")
@@ -252,11 +252,13 @@ def _write_design(
         progress.note("no cure: no design is written")
         return
     progress.stage("cured design")
-    made = cured(base, Upgrades.of_dict(answer["upgrades"]))
+    synthesis = cured(base, Upgrades.of_dict(answer["upgrades"]))
     folder = Folder(out)
-    stages = design_stage(made.modelfile, design_inputs(made.modelfile, made.catalog))
+    stages = design_stage(
+        synthesis.modelfile, design_inputs(synthesis.modelfile, synthesis.catalog)
+    )
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
-        write_design(folder, made, stages, options, progress)
+        write_design(folder, synthesis, stages, options, progress)
 
 
 def _checked(target: float, budget: float | None, without: Collection[str]) -> frozenset[str]:

@@ -66,21 +66,21 @@ class Cluster:
         source = enumerate(tasks)
         index: dict[Any, int] = {}
         with self._staying():
-            done = self._as_completed()
+            completed = self._as_completed()
             limit = AHEAD * max(len(self._client.scheduler_info()["workers"]), 1)
         try:
             with self._staying():
-                self._feed(source, index, done, limit)
+                self._feed(source, index, completed, limit)
             while index:
                 with self._staying():
-                    future = next(done)
+                    future = next(completed)
                     number = index.pop(future)
                     rows: Sequence[Any] = future.result()
                 for _ in rows:
                     step()
                 yield number, rows
                 with self._staying():
-                    self._feed(source, index, done, limit)
+                    self._feed(source, index, completed, limit)
         finally:
             if self._client.status == "running":
                 self._client.cancel(list(index))
@@ -92,7 +92,7 @@ class Cluster:
         return make(loop=self._client.loop)
 
     def _feed(
-        self, source: Iterator[tuple[int, Task]], index: dict[Any, int], done: Any, limit: int
+        self, source: Iterator[tuple[int, Task]], index: dict[Any, int], completed: Any, limit: int
     ) -> None:
         while len(index) < limit:
             following = next(source, None)
@@ -102,7 +102,7 @@ class Cluster:
             # Not pure: equal blocks of two studies are two blocks.
             future = self._client.submit(_rows, task, pure=False, retries=ATTEMPTS)
             index[future] = number
-            done.add(future)
+            completed.add(future)
 
     @contextmanager
     def _staying(self) -> Iterator[None]:
@@ -124,12 +124,12 @@ class Cluster:
         """The cluster has workers, and all of them make rows by the rules of this process."""
         try:
             self._client.wait_for_workers(1, timeout=PATIENCE)
-            found = self._client.run(_identity)
+            identities = self._client.run(_identity)
         except (OSError, TimeoutError) as error:
             raise EnvironmentMissing(f"no worker at {address}: {error}; {_HOW}") from None
         except ImportError as error:
             raise EnvironmentMissing(f"workers at {address} lack this tool: {error}") from None
-        for worker, (version, rules) in sorted(found.items()):
+        for worker, (version, rules) in sorted(identities.items()):
             if (version, rules) != _identity():
                 raise EnvironmentMissing(
                     f"the worker {worker} has designer {version} with rules {rules}, "

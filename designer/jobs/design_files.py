@@ -45,50 +45,52 @@ def check(modelfile: ModelFile, catalog: Catalog) -> None:
         check_board(modelfile, catalog)
 
 
-def texts(made: Synthesis) -> dict[str, str]:
-    """Everything of the design stage but ``design.json``; made before the folder is touched."""
-    modelfile, design = made.modelfile, made.design
+def texts(synthesis: Synthesis) -> dict[str, str]:
+    """Every file of the design stage but ``design.json``; made before the folder is touched."""
+    modelfile, design = synthesis.modelfile, synthesis.design
     return {
         MODEL: modelfile.text,
-        "circuit.cir": circuit_deck(made),
-        SETUP: setup_csv(design, made.model_responses, start_recipes(made, cores()), modelfile.si),
-        "scales.csv": scales_csv(modelfile, design, made.model_responses),
-        **board_files.texts(made),
+        "circuit.cir": circuit_deck(synthesis),
+        SETUP: setup_csv(
+            design, synthesis.model_responses, start_recipes(synthesis, cores()), modelfile.si
+        ),
+        "scales.csv": scales_csv(modelfile, design, synthesis.model_responses),
+        **board_files.texts(synthesis),
     }
 
 
-def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> None:
+def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:
     """Write the stage. files : its ``texts``."""
     for name, text in files.items():
         folder.write(name, text)
-    folder.write(board_files.PICTURE, board_files.picture(made))
-    if made.modelfile.measured is not None:
-        folder.write(MEASURED, made.modelfile.measured.content)
-    folder.write(DESIGN, dumps(answer(made)))
+    folder.write(board_files.PICTURE, board_files.picture(synthesis))
+    if synthesis.modelfile.measured is not None:
+        folder.write(MEASURED, synthesis.modelfile.measured.content)
+    folder.write(DESIGN, dumps(answer(synthesis)))
 
 
-def renew_bills(folder: Folder, made: Synthesis) -> None:
+def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
     """Write the bills of a finished design anew, as its parts are bought now."""
     assert folder.manifest is not None
-    for name, text in board_files.bills(made).items():
+    for name, text in board_files.bills(synthesis).items():
         if name in folder.manifest.files:
             folder.rewrite(name, text)
 
 
-def answer(made: Synthesis) -> dict[str, Any]:
-    """What ``design.json`` says of a design."""
+def answer(synthesis: Synthesis) -> dict[str, Any]:
+    """The JSON object of ``design.json``."""
     return synthesis_json(
-        made.modelfile,
-        made.design,
-        made.model_responses,
-        design_provenance(made),
-        made.seconds,
-        better_grades(made.modelfile, made.design.circuit, made.catalog),
+        synthesis.modelfile,
+        synthesis.design,
+        synthesis.model_responses,
+        design_provenance(synthesis),
+        synthesis.seconds,
+        better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
     )
 
 
-def design_provenance(made: Synthesis) -> dict[str, Any]:
-    return provenance(made.modelfile, made.catalog.hash, settings={"highs": SOLVER})
+def design_provenance(synthesis: Synthesis) -> dict[str, Any]:
+    return provenance(synthesis.modelfile, synthesis.catalog.hash, settings={"highs": SOLVER})
 
 
 def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
@@ -149,27 +151,27 @@ def starts(folder: Folder) -> tuple[str, ...]:
     rows = csv_rows(read_text(path, "the setup table of this design (CSV)"), path)
     _, header = next(rows, (1, []))
     if "start" not in header:
-        found = ", ".join(header) or "nothing"
-        raise InputError(path, "line 1", found, "a header with a column start")
+        text = ", ".join(header) or "nothing"
+        raise InputError(path, "line 1", text, "a header with a column start")
     at = header.index("start")
     return tuple(row[at] if len(row) > at else "" for _, row in rows if row)
 
 
-def circuit_deck(made: Synthesis, checked: CheckedResponse | None = None) -> str:
+def circuit_deck(synthesis: Synthesis, checked: CheckedResponse | None = None) -> str:
     """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
 
     checked : of the first response; its gate's settings are used.
     """
-    design, run = made.design, first_run(made, checked)
+    design, run = synthesis.design, first_run(synthesis, checked)
     text = deck.write(
         design.circuit,
         nominal_board(design.circuit),
         run.excitation,
         run.settings,
-        title=made.modelfile.title,
+        title=synthesis.modelfile.title,
         stop_time=run.stop_time,
         initial=run.initial,
-        notes=circuit_notes(made, run),
+        notes=circuit_notes(synthesis, run),
     )
     # Without such a line the plain program runs nothing.
     return text.replace("\n.end\n", f"\n.print tran {deck.voltages(design.circuit)}\n.end\n")

@@ -58,7 +58,7 @@ def source(model: Path | str | ModelFile, out: Path | str | None) -> tuple[Model
         expected = "a model file (TOML) or a design folder"
         raise InputError(path, "the folder", "no manifest.json", expected)
     modelfile = model_file(path / MODEL)
-    if made_from(Folder(path)).get("model") != modelfile.sha256:
+    if design_inputs_of(Folder(path)).get("model") != modelfile.sha256:
         raise InputError(
             path / MODEL,
             "its sha256",
@@ -80,7 +80,7 @@ def read_design(
     return load(folder, modelfile, catalog)
 
 
-def made_from(folder: Folder) -> dict[str, Any]:
+def design_inputs_of(folder: Folder) -> dict[str, Any]:
     """Inputs of the folder's design; empty where there is none."""
     design = folder.manifest.stages.get("design") if folder.manifest else None
     return {} if design is None else design.inputs
@@ -113,25 +113,25 @@ def design_stage(modelfile: ModelFile, inputs: dict[str, Any]) -> Stages:
 def standing_design(
     folder: Folder, modelfile: ModelFile, catalog: Catalog, progress: Progress
 ) -> Stages:
-    """The stage of the design, but one that stands in the folder is not asked for anew.
+    """The stage of the design; a design that stands in the folder is not made anew.
 
-    A folder may come from elsewhere: where the model file is its own, its parts stand, whatever
-    catalogue or version it was made with, and ``progress`` is told of these.
+    A folder may come from another machine: where the model file is the folder's own, its parts
+    stand, whatever catalogue or version they were chosen with, and a note names these.
     """
-    here, origin = design_inputs(modelfile, catalog), made_from(folder)
+    inputs, origin = design_inputs(modelfile, catalog), design_inputs_of(folder)
     stands = (
         modelfile.source == folder / MODEL
-        and folder.state("design", here) == "other"
-        and all(origin.get(key) == here.get(key) for key in ("model", "measured"))
+        and folder.state("design", inputs) == "other"
+        and all(origin.get(key) == inputs.get(key) for key in ("model", "measured"))
     )
     if not stands:
-        return design_stage(modelfile, here)
+        return design_stage(modelfile, inputs)
     progress.note(
         f"this design was made with catalogue {_short(origin, 'catalogue')} and version "
-        f"{_short(origin, 'version')}; here are catalogue {_short(here, 'catalogue')} and "
-        f"version {_short(here, 'version')}: its parts stand as they are"
+        f"{_short(origin, 'version')}; here are catalogue {_short(inputs, 'catalogue')} and "
+        f"version {_short(inputs, 'version')}: its parts stand as they are"
     )
-    if bills_are_of_old(origin, here):
+    if bills_are_of_old(origin, inputs):
         progress.note(
             "it is of a version whose bill of materials bought better grades than its study "
             "drew: a study that is made now writes the bill anew"
@@ -139,12 +139,12 @@ def standing_design(
     return design_stage(modelfile, origin)
 
 
-def bills_are_of_old(origin: Mapping[str, Any], here: Mapping[str, Any]) -> bool:
+def bills_are_of_old(origin: Mapping[str, Any], inputs: Mapping[str, Any]) -> bool:
     """Whether a folder's bill may list other grades than a study draws now.
 
-    origin, here : inputs of its design, as it was made and as it would be made now.
+    origin, inputs : inputs of its design, as it was made and as it would be made now.
     """
-    return GRADES in here and GRADES not in origin
+    return GRADES in inputs and GRADES not in origin
 
 
 def _short(inputs: Mapping[str, Any], key: str) -> str:

@@ -19,7 +19,7 @@ from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import kicad_files
 from designer.jobs.design_files import design_provenance
-from designer.jobs.design_source import made_from, source
+from designer.jobs.design_source import design_inputs_of, source
 from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
@@ -83,8 +83,8 @@ def export_into(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress
 ) -> ExportResult:
     """Write the project into a design folder, which is made where there is none."""
-    runner, made, reused = _design(modelfile, out, options, progress)
-    folder, files, inputs = runner.folder, kicad_files.texts(made), _inputs(runner)
+    runner, synthesis, reused = _design(modelfile, out, options, progress)
+    folder, files, inputs = runner.folder, kicad_files.texts(synthesis), _inputs(runner)
     if folder.state(kicad_files.STAGE, inputs) == "other" and not options.overwrite:
         # The project is of its time, as the design is: it may hold a board that somebody routed.
         assert folder.manifest is not None
@@ -96,7 +96,7 @@ def export_into(
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("KiCad project")
-        kicad_files.write(folder, made, inputs, files)
+        kicad_files.write(folder, synthesis, inputs, files)
     return _result(runner, list(files), reused and not todo)
 
 
@@ -108,30 +108,30 @@ def export_decks(
     progress: Progress,
 ) -> ExportResult:
     """Write decks into a design folder, which is made where there is none."""
-    runner, made, reused = _design(modelfile, out, options, progress)
+    runner, synthesis, reused = _design(modelfile, out, options, progress)
     folder, inputs = runner.folder, _inputs(runner)
     names = {DECK_STAGES[dialect]: (dialect, file_name(dialect)) for dialect in dialects}
     stages: Stages = {stage: (dict(inputs), [name]) for stage, (_, name) in names.items()}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("decks")
-        texts = {name: deck_text(made, dialect) for dialect, name in names.values()}
-        with folder.working({stage: stages[stage] for stage in todo}, design_provenance(made)):
+        texts = {name: deck_text(synthesis, dialect) for dialect, name in names.values()}
+        with folder.working({stage: stages[stage] for stage in todo}, design_provenance(synthesis)):
             for stage in todo:
                 _, name = names[stage]
                 folder.write(name, texts[name])
     return _result(runner, [name for _, name in names.values()], reused and not todo)
 
 
-def deck_text(made: Synthesis, dialect: Dialect) -> str:
+def deck_text(synthesis: Synthesis, dialect: Dialect) -> str:
     """A deck of a design, with every response that is wanted of it."""
-    runs = response_runs(made)
+    runs = response_runs(synthesis)
     return simulator_decks.write(
         dialect,
-        made.design.circuit,
+        synthesis.design.circuit,
         runs,
-        title=made.modelfile.title,
-        notes=simulator_notes(made, dialect, runs),
+        title=synthesis.modelfile.title,
+        notes=simulator_notes(synthesis, dialect, runs),
     )
 
 
@@ -146,8 +146,8 @@ def _design(
 
 def _inputs(runner: StageRunner) -> dict[str, Any]:
     """What decides the files that are exported now."""
-    here = {"catalogue": runner.catalog.hash, "version": __version__}
-    return {**made_from(runner.folder), **here}
+    current = {"catalogue": runner.catalog.hash, "version": __version__}
+    return {**design_inputs_of(runner.folder), **current}
 
 
 def _result(runner: StageRunner, files: Sequence[str], reused: bool) -> ExportResult:

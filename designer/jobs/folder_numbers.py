@@ -20,7 +20,7 @@ from designer.jobs.study_folder import blame_budget, blamed
 from designer.model.model_file import ModelFile
 
 
-def own(
+def stage_numbers(
     folder: Folder, stage: StageName, names: Collection[str], limits: Collection[str] = ()
 ) -> dict[str, Any]:
     """The inputs of these names that a stage of the folder was made with.
@@ -47,7 +47,7 @@ def of_study(
     out: Path,
     modelfile: ModelFile,
     options: Options,
-    given: Mapping[str, Any],
+    words: Mapping[str, Any],
 ) -> Options:
     """The options with the numbers of the folder's own study.
 
@@ -55,44 +55,48 @@ def of_study(
     model : the verb's argument; out : the folder. With ``overwrite`` a width in ``until`` is not
     taken over, for nothing else could take it away.
     """
-    options = of_list(modelfile, options, given)
+    options = of_list(modelfile, options, words)
     if not goes_on(model, out, options.resume):
         return options
     limits = () if options.overwrite else ("until",)
-    return _with(options, own(Folder(out), "study", ("samples", "seed", "layers"), limits), given)
+    return _with(
+        options, stage_numbers(Folder(out), "study", ("samples", "seed", "layers"), limits), words
+    )
 
 
-def of_list(modelfile: ModelFile, options: Options, given: Mapping[str, Any]) -> Options:
+def of_list(modelfile: ModelFile, options: Options, words: Mapping[str, Any]) -> Options:
     """The options with as many samples as the model file lists measured boards, if it does."""
     listed = modelfile.measured
-    if listed is not None and listed.labels and given["samples"] is None:
+    if listed is not None and listed.labels and words["samples"] is None:
         return replace(options, samples=len(listed.labels))
     return options
 
 
-def of_built(path: Path, options: Options, given: Mapping[str, Any]) -> Options:
+def of_measured(path: Path, options: Options, words: Mapping[str, Any]) -> Options:
     """The options with the numbers of the study of built boards in a design folder."""
     if not is_design_folder(path):
         return options
-    return _with(options, own(Folder(path), "measured", ("seed", "layers")), given)
+    return _with(options, stage_numbers(Folder(path), "measured", ("seed", "layers")), words)
 
 
-def of_search(out: Path, options: Options, given: Mapping[str, Any]) -> Options:
+def of_search(out: Path, options: Options, words: Mapping[str, Any]) -> Options:
     """The options with the numbers of the search that is resumed in the folder ``out``."""
     if not options.resume:
         return options
     folder = Folder(out)
     return _with(
-        options, own(folder, "search", ("seed",)) | own(folder, "study", ("samples",)), given
+        options,
+        stage_numbers(folder, "search", ("seed",)) | stage_numbers(folder, "study", ("samples",)),
+        words,
     )
 
 
-def _with(options: Options, taken: dict[str, Any], given: Mapping[str, Any]) -> Options:
-    """The options with what was taken, where nothing is given."""
-    layers = taken.pop("layers", None)
+def _with(options: Options, numbers: dict[str, Any], words: Mapping[str, Any]) -> Options:
+    """The options with these numbers of the folder, where ``words`` states none."""
+    layers = numbers.pop("layers", None)
     if layers is not None:
-        taken |= {"blamed": blamed(layers), "blame_budget": blame_budget(layers)}
+        numbers |= {"blamed": blamed(layers), "blame_budget": blame_budget(layers)}
         if "ngspice" not in layers:
-            taken["rung"] = "exact"
-    options = replace(options, **{k: v for k, v in taken.items() if given.get(k, k) is None})
+            numbers["rung"] = "exact"
+    options = replace(options, **{k: v for k, v in numbers.items() if words.get(k, k) is None})
     return options if options.blamed else replace(options, blame_budget=None)

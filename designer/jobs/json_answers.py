@@ -152,8 +152,8 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
     if not simulated.masses:
         return {**orbit_json(orbit, si), "twin": twin}
     answer = orbit_json(orbit)
-    known = simulated.absolute and len(simulated.absolute[number])
-    x = simulated.absolute[number][0::2] if known else None
+    is_known = simulated.absolute and len(simulated.absolute[number])
+    x = simulated.absolute[number][0::2] if is_known else None
     low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
     answer |= {
         "x1_max": None if high is None else high[0],
@@ -182,8 +182,8 @@ def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
 def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
     """An orbit in model units; with ``si`` also its extremes and impacts in SI units."""
 
-    known = len(orbit.extremes) > 0
-    met = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
+    is_known = len(orbit.extremes) > 0
+    impacts = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
     return {
         "response": orbit.response,
         "status": str(orbit.status),
@@ -194,13 +194,13 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
         "start": orbit.start,
         "symmetric": orbit.symmetric,
         "asymmetry": orbit.asymmetry,
-        "x1_max": orbit.extremes[0, 1] if known else None,
-        "x1_min": orbit.extremes[0, 0] if known else None,
-        "extremes": _by_state(orbit.extremes) if known else None,
+        "x1_max": orbit.extremes[0, 1] if is_known else None,
+        "x1_min": orbit.extremes[0, 0] if is_known else None,
+        "extremes": _by_state(orbit.extremes) if is_known else None,
         "impact_velocities": orbit.impact_velocities,
         "impacts": [
             {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
-            for t, side, v in met
+            for t, side, v in impacts
         ],
         "multipliers": list(orbit.multipliers.astype(complex)),
         "lyapunov": orbit.lyapunov,
@@ -215,8 +215,8 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
 def _orbit_si(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:
     if si is None:
         return {}
-    known = len(orbit.extremes) > 0
-    low, high = orbit.extremes[0] * si.length_scale if known else (None, None)
+    is_known = len(orbit.extremes) > 0
+    low, high = orbit.extremes[0] * si.length_scale if is_known else (None, None)
     return {
         "x1_max_m": high,
         "x1_min_m": low,

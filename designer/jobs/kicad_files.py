@@ -27,7 +27,7 @@ STAGE: StageName = "kicad"
 FOLDER = "kicad"
 
 
-def texts(made: Synthesis, checked: CheckedResponse | None = None) -> dict[str, str]:
+def texts(synthesis: Synthesis, checked: CheckedResponse | None = None) -> dict[str, str]:
     """Every file of the project by its name inside the design folder.
 
     checked : of the first response; the sheet then runs at its gate's settings.
@@ -36,19 +36,24 @@ def texts(made: Synthesis, checked: CheckedResponse | None = None) -> dict[str, 
     ------
     InputError : a footprint that is not known here, or a part of the board that is not sold.
     """
-    with naming(made.modelfile):
-        circuit, choice = board_circuit(made)
-        parts = components(circuit, made.catalog, choice)
-        rules = rules_text(board_rules(circuit, made.modelfile.rules))
-        run = first_run(made, checked)
-        project = Project(made.modelfile.title, circuit, parts, run, rules)
+    with naming(synthesis.modelfile):
+        circuit, choice = board_circuit(synthesis)
+        parts = components(circuit, synthesis.catalog, choice)
+        rules = rules_text(board_rules(circuit, synthesis.modelfile.rules))
+        run = first_run(synthesis, checked)
+        project = Project(synthesis.modelfile.title, circuit, parts, run, rules)
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 
 def beside(
-    folder: Folder, made: Synthesis, inputs: Mapping[str, Any], overwrite: bool, progress: Progress
+    folder: Folder,
+    synthesis: Synthesis,
+    inputs: Mapping[str, Any],
+    overwrite: bool,
+    progress: Progress,
 ) -> dict[str, str]:
-    """Every file, for a verb that does more than this; none where there can be no project.
+    """Every file of the project, for a verb that writes more beside it; none where there can be no
+    project.
 
     Raises
     ------
@@ -56,7 +61,7 @@ def beside(
     """
     progress.stage("KiCad project")
     try:
-        project = texts(made)
+        project = texts(synthesis)
     except InputError as error:
         progress.note(f"no KiCad project: {error}")
         return {}
@@ -70,17 +75,17 @@ def stages(inputs: Mapping[str, Any], files: Mapping[str, str]) -> Stages:
 
 
 def write(
-    folder: Folder, made: Synthesis, inputs: Mapping[str, Any], files: Mapping[str, str]
+    folder: Folder, synthesis: Synthesis, inputs: Mapping[str, Any], files: Mapping[str, str]
 ) -> None:
     """Write the stage."""
     if not files:
         return
-    with folder.working(stages(inputs, files), design_provenance(made)):
+    with folder.working(stages(inputs, files), design_provenance(synthesis)):
         for name, text in files.items():
             folder.write(name, text)
 
 
-def settle(folder: Folder, made: Synthesis, checked: CheckedResponse) -> None:
+def settle(folder: Folder, synthesis: Synthesis, checked: CheckedResponse) -> None:
     """Let the sheet run at the settings of the gate, if nobody has changed it."""
     listed = {} if folder.manifest is None else folder.manifest.files
     sheet = next((n for n in listed if n.startswith(FOLDER) and n.endswith(".kicad_sch")), None)
@@ -89,4 +94,4 @@ def settle(folder: Folder, made: Synthesis, checked: CheckedResponse) -> None:
     _, digest = listed[sheet]
     path = folder / sheet
     if path.is_file() and file_hash(sheet, path.read_bytes()) == digest:
-        folder.rewrite(sheet, texts(made, checked)[sheet])
+        folder.rewrite(sheet, texts(synthesis, checked)[sheet])

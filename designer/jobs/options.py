@@ -101,8 +101,8 @@ class Options:
         return shlex.join(words)
 
 
-def given(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of the options that have a value."""
+def stated_options(words: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that have a value."""
     return {name: value for name, value in words.items() if value is not None}
 
 

@@ -23,9 +23,9 @@ LIBRARIES = {
 
 def versions() -> dict[str, str | None]:
     """Versions of everything that a result depends on; None for what is not installed."""
-    own = {"designer": __version__, "python": platform.python_version()}
+    tool = {"designer": __version__, "python": platform.python_version()}
     libraries = {name: _version(distribution) for name, distribution in LIBRARIES.items()}
-    return {**own, **libraries, "ngspice": _ngspice()}
+    return {**tool, **libraries, "ngspice": _ngspice()}
 
 
 def provenance(

@@ -79,9 +79,9 @@ def rules(
     junit: Path | str | None = None,
     progress: Progress | None = None,
 ) -> RulesResult:
-    """The verb ``rules``: look at a design folder, write ``rules.json`` there, and say so.
+    """The verb ``rules``: check a design folder and write ``rules.json`` there.
 
-    What the folder has of an earlier look is replaced, for a board changes while it is drawn.
+    An earlier ``rules.json`` is replaced, since a board changes while it is drawn.
     board : a .kicad_pcb of this design. junit : where to write a JUnit report.
 
     Raises
@@ -98,47 +98,49 @@ def rules(
         there = "a folder" if report.is_dir() else "no such folder"
         raise InputError(report, "--junit", there, "a file in a folder that exists")
     catalog = load_catalog()
-    made = read_design(path, catalog, progress)
-    drawn = None if board is None else read_board(Path(board))
+    synthesis = read_design(path, catalog, progress)
+    board_file = None if board is None else read_board(Path(board))
     progress.stage("rules")
-    checks = checked(made, drawn)
+    checks = checked(synthesis, board_file)
     inputs = {
-        "model": made.modelfile.sha256,
+        "model": synthesis.modelfile.sha256,
         "catalogue": catalog.hash,
         "version": __version__,
-        "board": None if drawn is None else sha256(drawn.text.encode("utf-8")),
+        "board": None if board_file is None else sha256(board_file.text.encode("utf-8")),
         "kicad": checks.kicad,
     }
     settings = {"board_sha256": inputs["board"], "kicad": checks.kicad}
-    origin = provenance(made.modelfile, catalog.hash, settings=settings)
-    answer = plain(_json(made, drawn, checks.outcomes, origin, time.perf_counter() - began))
+    origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
+    answer = plain(
+        _json(synthesis, board_file, checks.outcomes, origin, time.perf_counter() - began)
+    )
     place = Folder(path)
     stages: Stages = {"rules": (inputs, [NAME])}
     place.decide(stages, overwrite=True, resume=False)  # refuses what is not ours
     with place.working(stages):
         place.write(NAME, dumps(answer))
     if report is not None:
-        text = rule_reports.junit(made.modelfile.title, checks.outcomes)
+        text = rule_reports.junit(synthesis.modelfile.title, checks.outcomes)
         with atomic_write.appearing(report, "--junit") as partial:
             partial.write_text(text, encoding="utf-8")
     return RulesResult(answer, checks.passed)
 
 
-def checked(made: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
+def checked(synthesis: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
     """Every rule on a design, and on its board if there is one.
 
     Raises
     ------
     InputError : the board is not of this design, or a part is not in the catalogue.
     """
-    limits = made.modelfile.rules
-    with naming(made.modelfile):
-        circuit, choice = board_circuit(made)
-        listed = components(circuit, made.catalog, choice)
+    limits = synthesis.modelfile.rules
+    with naming(synthesis.modelfile):
+        circuit, choice = board_circuit(synthesis)
+        listed = components(circuit, synthesis.catalog, choice)
         custom = board_rules(circuit, limits)
     if board is not None:
         check_belongs(board, listed)
-    on_circuit = run_rules.on_circuit(RuleSubject(made, circuit, listed), limits)
+    on_circuit = run_rules.on_circuit(RuleSubject(synthesis, circuit, listed), limits)
     if board is None:
         return RulesAnswer((*on_circuit, *rule_board.without_board(custom, limits)), None)
     on_board = rule_board.checked(board, listed, custom, limits)
@@ -146,7 +148,7 @@ def checked(made: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
 
 
 def _json(
-    made: Synthesis,
+    synthesis: Synthesis,
     board: BoardFile | None,
     outcomes: Sequence[RuleOutcome],
     origin: dict[str, Any],
@@ -155,7 +157,7 @@ def _json(
     count = {status: sum(o.status == status for o in outcomes) for status in (PASS, FAIL, NOT_RUN)}
     return {
         "format": 1,
-        "title": made.modelfile.title,
+        "title": synthesis.modelfile.title,
         "board": None if board is None else board.path.name,
         "counts": count,
         "complete": not count[NOT_RUN],

@@ -88,9 +88,8 @@ def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEng
     return "ngspice" if choice.rung == "ngspice" else "exact"
 
 
-def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
-    """The options with the rung that was chosen, and a note of why; one that was asked for
-    stands."""
+def with_rung(folder: Folder, options: Options, progress: Progress) -> Options:
+    """The options with a rung in place of "auto", and a note of why; a stated rung stays."""
     if options.rung != "auto":
         return options
     choice = choose(folder)

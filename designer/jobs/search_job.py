@@ -23,9 +23,9 @@ from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import nominal
 from designer.jobs import design_files, folder_numbers, rung_choice
-from designer.jobs.design_source import grade_inputs, made_from, source
+from designer.jobs.design_source import design_inputs_of, grade_inputs, source
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.options import Options, given
+from designer.jobs.options import Options, stated_options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.search_stage import RULES as RULES, searched_into
@@ -73,7 +73,7 @@ def search(
     """
     words = {"samples": samples, "seed": seed}
     options = Options(jobs=jobs, overwrite=overwrite, resume=resume, rung=rung)
-    options = replace(options, **{"samples": SEARCH_SAMPLES} | given(words))
+    options = replace(options, **{"samples": SEARCH_SAMPLES} | stated_options(words))
     options.check()
     path = model if isinstance(model, ModelFile) else Path(model)
     if isinstance(path, Path) and not path.is_file():
@@ -99,10 +99,10 @@ def search_into(
 
     Raises
     ------
-    EnvironmentMissing : there is something to confirm and no ngspice; said before any work.
+    EnvironmentMissing : there is something to confirm and no ngspice; raised before any work.
     """
-    known = Folder(out).manifest
-    stage = None if known is None else known.stages.get("confirmation")
+    manifest = Folder(out).manifest
+    stage = None if manifest is None else manifest.stages.get("confirmation")
     if stage is None or not stage.complete:
         program_version()
     final = searched_into(modelfile, out, options, progress)
@@ -122,20 +122,20 @@ def search_into(
 
 
 def confirms(row: Mapping[str, Any]) -> bool:
-    """Whether ngspice bears a response out: its gate passed, and of the boards that it was asked
+    """Whether ngspice confirms a response: its gate passed, and of the boards that it simulated
     at most the share ``DIFFERING`` differ or have no answer."""
     passed = row["gate"] is not None and row["gate"]["passed"]
-    asked, agreed = int(row["asked"]), int(row["agreed"])
-    return bool(passed and asked and asked - agreed <= DIFFERING * asked)
+    boards, agreed = int(row["asked"]), int(row["agreed"])
+    return bool(passed and boards and boards - agreed <= DIFFERING * boards)
 
 
 def _confirmed(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress
 ) -> dict[str, Any]:
-    """What ngspice says of boards of the study, and what limits each response."""
+    """How ngspice judges boards of the study, and what limits each response."""
     folder, catalog = Folder(out), load_catalog()
     inputs = {
-        **made_from(folder),
+        **design_inputs_of(folder),
         "seed": options.seed,
         "samples": options.samples,
         "rung": RUNG,
@@ -145,8 +145,8 @@ def _confirmed(
     stages: Stages = {"confirmation": (inputs, [CONFIRMATION])}
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         began = time.perf_counter()
-        made = design_files.load(folder, modelfile, catalog)
-        document = {"format": 1, **_confirm(made, folder, options, progress)}
+        synthesis = design_files.load(folder, modelfile, catalog)
+        document = {"format": 1, **_confirm(synthesis, folder, options, progress)}
         with folder.working(stages, provenance(modelfile, catalog.hash, seed=options.seed)):
             cost = {"seconds": time.perf_counter() - began}
             folder.write(CONFIRMATION, dumps({**document, "cost": cost}))
@@ -155,15 +155,15 @@ def _confirmed(
 
 
 def _confirm(
-    made: Synthesis, folder: Folder, options: Options, progress: Progress
+    synthesis: Synthesis, folder: Folder, options: Options, progress: Progress
 ) -> dict[str, Any]:
     stores = FolderStores(folder.path, folder.watch(), progress.note, vouch=folder.vouches)
     jobs = options.workers
     study = study_of(
-        made,
+        synthesis,
         replace(options, rung="exact", blamed=False, blame_budget=None),
         StudyHelp(jobs, None, Here(jobs)),
-        check(made, None, progress),
+        check(synthesis, None, progress),
         stores,
         progress,
     )
@@ -172,7 +172,7 @@ def _confirm(
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
         require_ngspice(pool)
         progress.stage(f"ngspice, rung {RUNG}, numerics gate")
-        reduction = nominal.nominal_reduction(made.design)
+        reduction = nominal.nominal_reduction(synthesis.design)
         subjects = [
             GateSubject(reduction, q.excitation, q.start, rung=RUNG) for q in study.plan.questions
         ]
@@ -184,9 +184,9 @@ def _confirm(
         plan = replace(study.plan, questions=questions)
         asks = [a for a in to_confirm(study.answers) if questions[a.question].settings is not None]
         step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
-        heard = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
+        cross_checks = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
     answers = {(a.sample, a.question): a for a in study.answers}
-    rows = confirmation_json(heard, answers, study.asked, len(study.checked))
+    rows = confirmation_json(cross_checks, answers, study.asked, len(study.checked))
     for index, limit, gate in zip(study.asked, limits, gates, strict=True):
         rows[index]["limited_by"] = limit.as_dict()
         rows[index]["gate"] = gate.as_dict()

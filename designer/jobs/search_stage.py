@@ -40,9 +40,9 @@ RULES = 5
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 
-def chosen(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
-    """The model file that a verb is to work with: as it is, or where it leaves the design to a
-    search, that of the folder ``out``, with the design found and written there.
+def design_file(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
+    """The model file that a verb works with: the given one, or, where it leaves the design to a
+    search, that of the folder ``out``, in which the search then writes the design.
 
     A design folder's own model file has its design already.
     """
@@ -54,13 +54,13 @@ def chosen(modelfile: ModelFile, out: Path, options: Options, progress: Progress
 def searched_into(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress
 ) -> ModelFile:
-    """Search for a design of this model file, unless the folder has it; the folder's model file.
+    """Search for a design of this model file, unless the folder has one; the folder's model file.
 
     Raises
     ------
     InputError, Unreachable : see ``design_search.search``; nothing was written by then, but for
         what a design could not be made of.
-    EnvironmentMissing : no ngspice; said before any work.
+    EnvironmentMissing : no ngspice; raised before any work.
     """
     options.check()
     catalog, folder = load_catalog(), Folder(out)
@@ -73,8 +73,12 @@ def searched_into(
     )
     if not todo:
         return model_file(out / MODEL)
-    begun = folder.state("search", inputs) == "unfinished"
-    if not (begun or options.overwrite) and folder.manifest and "design" in folder.manifest.stages:
+    is_unfinished = folder.state("search", inputs) == "unfinished"
+    if (
+        not (is_unfinished or options.overwrite)
+        and folder.manifest
+        and "design" in folder.manifest.stages
+    ):
         raise InputError(
             folder / MODEL,
             "the design",
@@ -82,7 +86,7 @@ def searched_into(
             "another folder, or --overwrite to replace what manifest.json lists",
         )
     program_version()
-    resumes = begun and options.resume
+    resumes = is_unfinished and options.resume
     trade = _trade_of(folder, modelfile, resumes=resumes)
     began = time.perf_counter()
     windows = look(modelfile, catalog, options.workers, progress)
@@ -105,9 +109,9 @@ def searched_into(
             progress=progress,
         )
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)
-    made = replace(searched.synthesis, modelfile=final, seconds=time.perf_counter() - began)
+    synthesis = replace(searched.synthesis, modelfile=final, seconds=time.perf_counter() - began)
     stages = design_stage(final, design_inputs(final, catalog))
-    write_design(folder, made, stages, options, progress)
+    write_design(folder, synthesis, stages, options, progress)
     if trade is not None:
         trade = {**trade, "model": final.sha256}
     cost = {"seconds": time.perf_counter() - began}

@@ -89,12 +89,12 @@ def simulate(
     Options(seed, jobs).check()
     progress = Progress() if progress is None else progress
     began, catalog = time.perf_counter(), load_catalog()
-    made: Synthesis | None = None
+    synthesis: Synthesis | None = None
     if isinstance(model, ModelFile):
         modelfile = model
     elif Path(model).is_dir():
         modelfile, folder = source(model, model)
-        made = None if engine == "model" else read_design(folder, catalog, progress)
+        synthesis = None if engine == "model" else read_design(folder, catalog, progress)
     else:
         modelfile = model_file(Path(model))
     read = Reader(modelfile.model, modelfile.si)
@@ -112,7 +112,7 @@ def simulate(
         modelfile,
         omegas,
         engine=engine,
-        synthesis=made,
+        synthesis=synthesis,
         jobs=jobs,
         progress=progress,
         traces=plots is not None,

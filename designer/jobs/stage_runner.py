@@ -81,25 +81,25 @@ class StageRunner:
         if "design" in stages:
             self.progress.stage("responses of the model, parts")
             with compiling_ahead(self.options.jobs or cores()):
-                made = synthesis_result.synthesise(self.modelfile, self.catalog)
-                write_design(self.folder, made, stages, self.options, self.progress)
+                synthesis = synthesis_result.synthesise(self.modelfile, self.catalog)
+                write_design(self.folder, synthesis, stages, self.options, self.progress)
         else:
-            made = design_files.load(self.folder, self.modelfile, self.catalog)
+            synthesis = design_files.load(self.folder, self.modelfile, self.catalog)
             if stages:
-                self.folder.begin(stages, design_files.design_provenance(made))
-        return made
+                self.folder.begin(stages, design_files.design_provenance(synthesis))
+        return synthesis
 
 
 def write_design(
-    folder: Folder, made: Synthesis, stages: Stages, options: Options, progress: Progress
+    folder: Folder, synthesis: Synthesis, stages: Stages, options: Options, progress: Progress
 ) -> None:
     """Write a design and its KiCad project. stages : that begin now, the design among them."""
     progress.stage("start recipes, files of the design")
-    with naming(made.modelfile):
-        files = design_files.texts(made)
+    with naming(synthesis.modelfile):
+        files = design_files.texts(synthesis)
     inputs = stages["design"][0]
-    project = kicad_files.beside(folder, made, inputs, options.overwrite, progress)
-    folder.begin(stages, design_files.design_provenance(made))
-    design_files.write(folder, made, files)
+    project = kicad_files.beside(folder, synthesis, inputs, options.overwrite, progress)
+    folder.begin(stages, design_files.design_provenance(synthesis))
+    design_files.write(folder, synthesis, files)
     folder.finish("design")
-    kicad_files.write(folder, made, inputs, project)
+    kicad_files.write(folder, synthesis, inputs, project)

@@ -69,9 +69,9 @@ class StudyCache:
         self._used: set[str] = set()
 
     def get(self, name: str, key: str) -> Any | None:
-        """None where there is none of this name that this key decides."""
-        known, value = self._items.get(name, ("", None))
-        if known != key:
+        """The value of this name, if it was stored under this key; None else."""
+        stored_key, value = self._items.get(name, ("", None))
+        if stored_key != key:
             return None
         self._used.add(name)
         return value
@@ -108,9 +108,9 @@ class _Npz:
         return stream.getvalue()
 
     def decode(self, content: bytes) -> tuple[Mapping[str, Any], _Items]:
-        with np.load(io.BytesIO(content), allow_pickle=False) as held:
-            head = json.loads(str(held[_ITEMS]))  # nan is a number here
-            items = {name: (key, _built(v, held)) for name, (key, v) in head[_ITEMS].items()}
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            head = json.loads(str(archive[_ITEMS]))  # nan is a number here
+            items = {name: (key, _decoded(v, archive)) for name, (key, v) in head[_ITEMS].items()}
             return head, items
 
 
@@ -133,16 +133,16 @@ def _plain(value: Any, arrays: list[Array]) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be stored")
 
 
-def _built(value: Any, held: Mapping[str, Any]) -> Any:
-    """The value of what ``_plain`` gave."""
+def _decoded(value: Any, archive: Mapping[str, Any]) -> Any:
+    """The value that ``_plain`` encoded."""
     if not isinstance(value, dict):
         return value
     ((kind, content),) = value.items()
     if kind == "word":
         return _WORDS[content[0]](content[1])
     if kind == "record":
-        named = {name: _built(v, held) for name, v in content[1].items()}
+        named = {name: _decoded(v, archive) for name, v in content[1].items()}
         return _RECORDS[content[0]](**named)
     if kind == "array":
-        return held[f"array{content}"]
-    return tuple(_built(v, held) for v in content)
+        return archive[f"array{content}"]
+    return tuple(_decoded(v, archive) for v in content)

@@ -77,14 +77,14 @@ def merged(
     """The options with every layer that the folder's study has already, if it is one of the same
     inputs otherwise: a study gets more layers, it loses none. name : of the study's stage."""
     stage = folder.manifest.stages.get(name) if folder.manifest else None
-    known = {} if stage is None else stage.inputs
-    if {k: v for k, v in known.items() if k != "layers"} != dict(inputs):
+    stored = {} if stage is None else stage.inputs
+    if {k: v for k, v in stored.items() if k != "layers"} != dict(inputs):
         return options
-    names = {*known.get("layers", ()), *layers_of(options)}
+    names = {*stored.get("layers", ()), *layers_of(options)}
     rung = options.rung
     if "ngspice" in names:
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    has_blame = stage is not None and stage.complete and blamed(known["layers"])
+    has_blame = stage is not None and stage.complete and blamed(stored["layers"])
     with_blame = options.blamed or has_blame
     return replace(
         options,
@@ -120,13 +120,13 @@ class FolderStores(Stores):
         root: Path,
         guard: Callable[[], None],
         note: Callable[[str], None] = lambda _: None,
-        kept: StudyCache | None = None,
+        cache: StudyCache | None = None,
         pieces: StudyCache | None = None,
         prefix: str = "",
         vouch: Vouch = nobody,
     ) -> None:
         self._vouch = vouch
-        self._root, self._guard, self._note, self._kept = root, guard, note, kept
+        self._root, self._guard, self._note, self._cache = root, guard, note, cache
         self._pieces, self._prefix = pieces, prefix
         self._stores: dict[str, BlockStore[Any]] = {}
 
@@ -150,17 +150,17 @@ class FolderStores(Stores):
         return self._stores[folder]
 
     def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
-        if self._kept is None:
+        if self._cache is None:
             return None
-        found: Blame | None = self._kept.get("blame", blame_hash(plan))
-        if found is None or (found.share < 1.0 and (found.budget or 0) < budget):
+        result: Blame | None = self._cache.get("blame", blame_hash(plan))
+        if result is None or (result.share < 1.0 and (result.budget or 0) < budget):
             return None
-        return found
+        return result
 
     def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
-        if self._kept is not None:
+        if self._cache is not None:
             self._guard()
-            self._kept.put("blame", blame_hash(plan), replace(blame, seconds=0.0))
+            self._cache.put("blame", blame_hash(plan), replace(blame, seconds=0.0))
 
     def blame_parts(self, plan: StudyPlan) -> StoredParts:
         return self._pieces_of(blame_hash(plan))

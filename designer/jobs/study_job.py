@@ -21,7 +21,7 @@ from designer.jobs import design_files, folder_numbers, kicad_files, rung_choice
 from designer.jobs.design_source import bills_are_of_old, design_inputs, source
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.json_answers import run_json
-from designer.jobs.options import Options, given
+from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import StageRunner
 from designer.jobs.study_folder import merged
 from designer.jobs.study_stage import (
@@ -77,7 +77,7 @@ def run(
     """
     words = {"samples": samples, "seed": seed, "until": None, "blamed": blame}
     words |= {"blame_budget": blame_budget}
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **given(words))
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **stated_options(words))
     return _study("run", model, out, options, words, progress, shown, catalog)
 
 
@@ -125,7 +125,7 @@ def tolerance(
         reached=reached,
         maps=tuple(dict.fromkeys(map_)),
         cluster=cluster,
-        **given(words),
+        **stated_options(words),
     )
     if measured is None:
         return _study("tolerance", model, out, options, words, progress, shown)
@@ -140,7 +140,7 @@ def tolerance(
     if not isinstance(folder, Path | str):
         raise InputError(None, "DIR", "no folder", "a design folder, whose boards were measured")
     path = Path(folder)
-    options = folder_numbers.of_built(path, options, words)
+    options = folder_numbers.of_measured(path, options, words)
     command = partial(Options.command, verb="tolerance", model=path, out=None)
     progress = Progress() if progress is None else progress
     return measured_into(path, Path(measured), options, progress, command, shown)
@@ -167,7 +167,7 @@ def _study(
     argument = argument if isinstance(argument, ModelFile) else Path(argument)
     modelfile, folder = source(argument, out)
     options = folder_numbers.of_study(argument, folder, modelfile, options, words)
-    modelfile = search_stage.chosen(modelfile, folder, options, progress)
+    modelfile = search_stage.design_file(modelfile, folder, options, progress)
     path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
     place = None if out is None else Path(out)
     command = partial(Options.command, verb=verb, model=path, out=place)
@@ -186,16 +186,16 @@ def _in_memory(
     options = folder_numbers.of_list(modelfile, options, words)
     with StudyHelp.of(options, progress) as help_:
         progress.stage("responses of the model, parts")
-        made = model
-        if isinstance(made, ModelFile):
-            made = synthesis_result.synthesise(made, catalog)
+        synthesis = model
+        if isinstance(synthesis, ModelFile):
+            synthesis = synthesis_result.synthesise(synthesis, catalog)
         began = time.perf_counter()
-        equations, checked = checks_in_memory(made, help_.pool, progress)
-        study = study_of(made, options, help_, checked, progress=progress)
-    cost = {"study_seconds": time.perf_counter() - began, "design_seconds": made.seconds}
-    result = run_result(made, study, options, cost, equations)
-    answer = run_json(plain(design_files.answer(made)), plain(result_json(result)))
-    return JobOutcome(answer, satisfied(answer), made=made, result=result)
+        equations, checked = checks_in_memory(synthesis, help_.pool, progress)
+        study = study_of(synthesis, options, help_, checked, progress=progress)
+    cost = {"study_seconds": time.perf_counter() - began, "design_seconds": synthesis.seconds}
+    result = run_result(synthesis, study, options, cost, equations)
+    answer = run_json(plain(design_files.answer(synthesis)), plain(result_json(result)))
+    return JobOutcome(answer, satisfied(answer), made=synthesis, result=result)
 
 
 def run_into(
@@ -216,13 +216,13 @@ def run_into(
     """
     options.check()
     need_responses(modelfile)
-    options = rung_choice.chosen(Folder(out), options, progress)
+    options = rung_choice.with_rung(Folder(out), options, progress)
     runner = StageRunner(modelfile, out, options, progress)
     folder = runner.folder
     # A study is of the boards as they are bought now, whatever the design's own inputs say.
-    here = design_inputs(modelfile, runner.catalog)
+    design_now = design_inputs(modelfile, runner.catalog)
     numbers = {"seed": options.seed, "samples": options.samples, "until": options.until}
-    inputs = {**here, **numbers}
+    inputs = {**design_now, **numbers}
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
     labels = () if modelfile.measured is None else modelfile.measured.labels
@@ -232,18 +232,18 @@ def run_into(
         return _outcome(folder, RANDOM, reused=True)
     began = time.perf_counter()
     with StudyHelp.of(options, progress) as help_:
-        made = runner.design()
-        if bills_are_of_old(runner.design_inputs, here):
-            design_files.renew_bills(folder, made)
-        stage = StudyStage(folder, RANDOM, made, options, command(options), progress, shown)
+        synthesis = runner.design()
+        if bills_are_of_old(runner.design_inputs, design_now):
+            design_files.renew_bills(folder, synthesis)
+        stage = StudyStage(folder, RANDOM, synthesis, options, command(options), progress, shown)
 
         def checked(first: CheckedResponse) -> None:
             if first.gate is not None and first.gate.passed:
-                folder.rewrite("circuit.cir", design_files.circuit_deck(made, first))
-                kicad_files.settle(folder, made, first)
+                folder.rewrite("circuit.cir", design_files.circuit_deck(synthesis, first))
+                kicad_files.settle(folder, synthesis, first)
 
         result = stage.work(help_, time.perf_counter() - began, checked)
-    return _outcome(folder, RANDOM, made=made, result=result, shown=stage.early)
+    return _outcome(folder, RANDOM, made=synthesis, result=result, shown=stage.early)
 
 
 def measured_into(
@@ -278,11 +278,13 @@ def measured_into(
     folder = runner.folder
     if folder.decide(runner.stages, overwrite=False, resume=False):
         raise InputError(path, "the design", "unfinished", "a finished one (designer synthesise)")
-    made = design_files.load(folder, modelfile, runner.catalog)
-    made = replace(made, modelfile=replace(modelfile, measured=boards))
+    synthesis = design_files.load(folder, modelfile, runner.catalog)
+    synthesis = replace(synthesis, modelfile=replace(modelfile, measured=boards))
     with naming(modelfile):
-        spread_of(made.modelfile, made.design.circuit, runner.catalog)  # refuses what is not theirs
-    options = rung_choice.chosen(folder, options, progress)
+        spread_of(
+            synthesis.modelfile, synthesis.design.circuit, runner.catalog
+        )  # refuses what is not theirs
+    options = rung_choice.with_rung(folder, options, progress)
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
     inputs = {**runner.design_inputs, **numbers}
@@ -291,13 +293,13 @@ def measured_into(
     list_file = BUILT.prefix + MEASURED
     stages[BUILT.stage][1].append(list_file)
     if not folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
-        return _outcome(folder, BUILT, made=made, reused=True)
+        return _outcome(folder, BUILT, made=synthesis, reused=True)
     with StudyHelp.of(options, progress) as help_:
         folder.begin(stages)
         folder.write(list_file, boards.content)
-        stage = StudyStage(folder, BUILT, made, options, command(options), progress, shown)
+        stage = StudyStage(folder, BUILT, synthesis, options, command(options), progress, shown)
         result = stage.work(help_)
-    return _outcome(folder, BUILT, made=made, result=result, shown=stage.early)
+    return _outcome(folder, BUILT, made=synthesis, result=result, shown=stage.early)
 
 
 def _outcome(folder: Folder, place: Place, **more: Any) -> JobOutcome:

@@ -172,16 +172,18 @@ def _counted(counted: Yield) -> dict[str, Any]:
     return {**(_yield(counted) or {}), "rate": counted.rate}
 
 
-def _agreement(answers: Sequence[Answer], heard: Sequence[CrossCheck]) -> dict[str, Any]:
-    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
-    known = {a.sample: a for a in answers}
+def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) -> dict[str, Any]:
+    """Boards on which ngspice agrees, by their start: their own orbit, or the nominal one."""
+    answer_of = {a.sample: a for a in answers}
 
     def of(kind: str) -> dict[str, Any]:
-        asked = [h.outcome(known[h.sample]) for h in heard if h.kind == kind and h.response]
+        outcomes = [
+            h.outcome(answer_of[h.sample]) for h in cross_checks if h.kind == kind and h.response
+        ]
         counted = (NgspiceVerdict.AGREED, NgspiceVerdict.FAILED, NgspiceVerdict.UNDECIDED)
-        return {"asked": len(asked), **{str(one): asked.count(one) for one in counted}}
+        return {"asked": len(outcomes), **{str(one): outcomes.count(one) for one in counted}}
 
-    too_long = [h for h in heard if not h.response]
+    too_long = [h for h in cross_checks if not h.response]
     return {
         **of("own"),
         "nominal_start": {

@@ -78,8 +78,8 @@ class Place:
         """The answer that stands there."""
         return run_json(folder.json(DESIGN), folder.json(self.prefix + TOLERANCE))
 
-    def kept(self, folder: Folder, note: Note, name: str = CACHE) -> StudyCache:
-        """What is stored there under a name. note : is told of a damaged file."""
+    def cache(self, folder: Folder, note: Note, name: str = CACHE) -> StudyCache:
+        """The cache in the file of this name. note : called with a message where it is damaged."""
 
         def write(name: str, content: bytes) -> None:
             folder.write(self.prefix + name, content)
@@ -137,7 +137,7 @@ class StudyStage:
     """The design folder."""
     place: Place
     """Where in the folder the study is."""
-    made: Synthesis
+    synthesis: Synthesis
     """The design with its model."""
     options: Options
     """Options of the verb."""
@@ -163,16 +163,16 @@ class StudyStage:
         """
         folder, place, options = self.folder, self.place, self.options
         began = time.perf_counter()
-        kept = place.kept(folder, self.progress.note)
-        equations, responses = checks(folder, self.made, help_.pool, kept, self.progress)
+        cache = place.cache(folder, self.progress.note)
+        equations, responses = checks(folder, self.synthesis, help_.pool, cache, self.progress)
         checked(responses[0])
         ready, guard = time.perf_counter(), folder.watch()
         stores = FolderStores(
             folder.path,
             guard,
             self.progress.note,
-            kept,
-            place.kept(folder, self.progress.note, PIECES),
+            cache,
+            place.cache(folder, self.progress.note, PIECES),
             place.prefix,
             folder.vouches,
         )
@@ -187,7 +187,7 @@ class StudyStage:
                 "design_seconds": design_seconds,
                 **{f"{name}_seconds": seconds for name, seconds in study.seconds.items()},
             }
-            return run_result(self.made, study, options, cost, equations)
+            return run_result(self.synthesis, study, options, cost, equations)
 
         def sampled(study: Study) -> None:
             if help_.pool is None:
@@ -202,10 +202,10 @@ class StudyStage:
             self.shown(place.answer(folder))
 
         study = study_of(
-            self.made, options, help_, responses, stores, self.progress, sampled, standing
+            self.synthesis, options, help_, responses, stores, self.progress, sampled, standing
         )
         guard()
-        kept.forget_unused()
+        cache.forget_unused()
         result = result_of(study)
         for name, content in map_files(study, result.provenance).items():
             folder.write(place.prefix + name, content)
@@ -223,8 +223,8 @@ class StudyStage:
         document = result_json(result)
         folder.write(prefix + TOLERANCE, dumps(document))
         if document["boards"] is not None:
-            asked = [(c.model.omega, c.model.expected) for c in result.checked]
-            labels = measured_table.response_labels(asked)
+            wanted = [(c.model.omega, c.model.expected) for c in result.checked]
+            labels = measured_table.response_labels(wanted)
             folder.write(prefix + BOARDS, measured_table.boards_csv(labels, document["boards"]))
         self.progress.stage("report")
         from designer.report.data import ReportData
@@ -235,7 +235,7 @@ class StudyStage:
 
 
 def study_of(
-    made: Synthesis,
+    synthesis: Synthesis,
     options: Options,
     help_: StudyHelp,
     checked: tuple[CheckedResponse, ...],
@@ -244,9 +244,9 @@ def study_of(
     sampled: Callable[[Study], None] = lambda _: None,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
-    """The study that is asked for. checked, stores, sampled, standing : as of ``tolerance``."""
+    """The study that the options ask for. checked, stores, sampled, standing : as of ``tolerance``."""
     return tolerance(
-        made,
+        synthesis,
         samples=options.samples,
         until=options.until,
         rung=options.rung,
@@ -267,7 +267,7 @@ def study_of(
     )
 
 
-def read_study(path: Path, made: Synthesis, place: Place) -> Study:
+def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
     """The study at a place of a folder, as the exact circuit has it: every board and its verdict,
     without the further layers.
 
@@ -284,67 +284,71 @@ def read_study(path: Path, made: Synthesis, place: Place) -> Study:
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
     options = Options(stage.inputs["seed"], samples=samples, rung="exact", blamed=False)
     help_ = StudyHelp(options.workers, None, Here(options.workers))
-    return study_of(made, options, help_, check(made, None), stores)
+    return study_of(synthesis, options, help_, check(synthesis, None), stores)
 
 
 def checks(
-    folder: Folder, made: Synthesis, pool: SpicePool | None, kept: StudyCache, progress: Progress
+    folder: Folder,
+    synthesis: Synthesis,
+    pool: SpicePool | None,
+    cache: StudyCache,
+    progress: Progress,
 ) -> Checks:
     """The checks of a design, made now or taken from the folder."""
     if pool is None:
-        return None, check(made, None, progress)
+        return None, check(synthesis, None, progress)
     assert folder.manifest is not None
     key = checks_hash(folder.manifest.files[DESIGN][1], pool.version)
-    equations: EquationCheck | None = kept.get("equations", key)
+    equations: EquationCheck | None = cache.get("equations", key)
     if equations is None:
-        equations = _equations(made, pool, progress)
+        equations = _equations(synthesis, pool, progress)
         if not any(finding.reason for finding in equations.findings):
-            kept.put("equations", key, equations)
+            cache.put("equations", key, equations)
     if not equations.passed:
         progress.note(equations.problem)
-    gates = kept.get("gates", key)
-    checked = check(made, pool, progress, gates)
-    met = tuple(c.gate for c in checked)
+    gates = cache.get("gates", key)
+    checked = check(synthesis, pool, progress, gates)
+    results = tuple(c.gate for c in checked)
     # A run without an answer is asked again the next time.
-    if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in met):
-        kept.put("gates", key, met)
+    if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in results):
+        cache.put("gates", key, results)
     return equations, checked
 
 
-def checks_in_memory(made: Synthesis, pool: SpicePool | None, progress: Progress) -> Checks:
+def checks_in_memory(synthesis: Synthesis, pool: SpicePool | None, progress: Progress) -> Checks:
     """The checks of a design."""
-    equations = None if pool is None else _equations(made, pool, progress)
-    return equations, check(made, pool, progress)
+    equations = None if pool is None else _equations(synthesis, pool, progress)
+    return equations, check(synthesis, pool, progress)
 
 
-def _equations(made: Synthesis, pool: SpicePool, progress: Progress) -> EquationCheck:
+def _equations(synthesis: Synthesis, pool: SpicePool, progress: Progress) -> EquationCheck:
     progress.stage("ngspice, equation check")
-    return equation_check.check(made.design, made.model_responses, pool)
+    return equation_check.check(synthesis.design, synthesis.model_responses, pool)
 
 
 def run_result(
-    made: Synthesis,
+    synthesis: Synthesis,
     study: Study,
     options: Options,
     cost: dict[str, float],
     equations: EquationCheck | None,
 ) -> RunResult:
-    """A study with all that went into it."""
+    """A study with its design, its checks and its provenance."""
     gates = [
         {"omega": c.model.omega, **c.gate.as_dict()} for c in study.checked if c.gate is not None
     ]
     origin = provenance(
-        made.modelfile,
-        made.catalog.hash,
+        synthesis.modelfile,
+        synthesis.catalog.hash,
         seed=options.seed,
         settings={"highs": SOLVER, "rules": RULES, "rung": options.rung, "ngspice": gates},
         spread=study.plan.spread.as_dict(),
     )
     return RunResult(
-        made.modelfile,
-        made.catalog,
-        made.model_responses,
-        made.design,
+        synthesis.modelfile,
+        synthesis.catalog,
+        synthesis.model_responses,
+        synthesis.design,
         study.checked,
         study,
         origin,

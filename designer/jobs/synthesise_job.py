@@ -64,7 +64,7 @@ def synthesise(
         modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
         return _in_memory(modelfile, catalog, compare, progress)
     modelfile, folder = source(model, out)
-    modelfile = search_stage.chosen(modelfile, folder, options, progress)
+    modelfile = search_stage.design_file(modelfile, folder, options, progress)
     return synthesise_into(modelfile, folder, options, progress, compare=compare)
 
 
@@ -79,37 +79,37 @@ def synthesise_into(
     runner = StageRunner(modelfile, out, options, progress, anew=True)
     names = [COMPARISON, *COMPARISON_PICTURES]
     stages: Stages = {"comparison": (runner.design_inputs, names)} if compare else {}
-    made = runner.design() if runner.decide(stages) else None
+    synthesis = runner.design() if runner.decide(stages) else None
     folder = runner.folder
-    if made is not None and "comparison" in runner.todo:
-        document = _comparison(made, progress)
+    if synthesis is not None and "comparison" in runner.todo:
+        document = _comparison(synthesis, progress)
         folder.write(COMPARISON, dumps(document))
         _draw(folder, document)
         folder.finish("comparison")
     answer = folder.json(DESIGN)
     if compare:
         answer = _beside(answer, folder.json(COMPARISON))
-    return JobOutcome(answer, _all_found(answer), out, made is None, made)
+    return JobOutcome(answer, _all_shown(answer), out, synthesis is None, synthesis)
 
 
 def _in_memory(
     modelfile: ModelFile, catalog: Catalog | None, compare: bool, progress: Progress
 ) -> JobOutcome:
     progress.stage("responses of the model, parts")
-    made = synthesis_result.synthesise(modelfile, catalog)
-    answer = plain(design_files.answer(made))
+    synthesis = synthesis_result.synthesise(modelfile, catalog)
+    answer = plain(design_files.answer(synthesis))
     if compare:
-        answer = _beside(answer, plain(_comparison(made, progress)))
-    return JobOutcome(answer, _all_found(answer), made=made)
+        answer = _beside(answer, plain(_comparison(synthesis, progress)))
+    return JobOutcome(answer, _all_shown(answer), made=synthesis)
 
 
-def _comparison(made: Synthesis, progress: Progress) -> dict[str, Any]:
+def _comparison(synthesis: Synthesis, progress: Progress) -> dict[str, Any]:
     """The JSON object of ``compare.json``."""
     began = time.perf_counter()
-    columns = compare_designs(made, lambda name: _stage(progress, name))
+    columns = compare_designs(synthesis, lambda name: _stage(progress, name))
     seconds = time.perf_counter() - began
-    provenance = design_files.design_provenance(made)
-    return file_json(comparison_json(columns), made.modelfile.title, provenance, seconds)
+    provenance = design_files.design_provenance(synthesis)
+    return file_json(comparison_json(columns), synthesis.modelfile.title, provenance, seconds)
 
 
 def _draw(folder: Folder, document: Mapping[str, Any]) -> None:
@@ -132,7 +132,7 @@ def _beside(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any
     return {**design, "comparison": in_answer(file), "cost": cost}
 
 
-def _all_found(answer: Mapping[str, Any]) -> bool:
+def _all_shown(answer: Mapping[str, Any]) -> bool:
     return all(knob["found"] for knob in answer["knobs"])
 
 

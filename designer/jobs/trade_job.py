@@ -24,7 +24,7 @@ from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.jobs import folder_numbers
 from designer.jobs.design_source import grade_inputs, source
-from designer.jobs.options import Options, given
+from designer.jobs.options import Options, stated_options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import TRADE
 from designer.jobs.stage_runner import StageRunner
@@ -108,7 +108,7 @@ def trade(
     """
     argument = model if isinstance(model, ModelFile) else Path(model)
     words = {"boards": boards, "seed": seed}
-    numbers = {"boards": TRADE_BOARDS, "seed": SEED} | given(words)
+    numbers = {"boards": TRADE_BOARDS, "seed": SEED} | stated_options(words)
     at_least("--boards", numbers["boards"], 0)
     options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
     options.check()
@@ -118,7 +118,9 @@ def trade(
     else:
         modelfile = argument if isinstance(argument, ModelFile) else read_model_file(argument)
     if folder is not None and folder_numbers.goes_on(argument, folder, resume):
-        numbers |= folder_numbers.own(Folder(folder), "trade", tuple(words)) | given(words)
+        numbers |= folder_numbers.stage_numbers(
+            Folder(folder), "trade", tuple(words)
+        ) | stated_options(words)
         options = replace(options, seed=numbers["seed"])
     extent = TradeExtent(boards=numbers["boards"])
     progress = Progress() if progress is None else progress
@@ -126,7 +128,7 @@ def trade(
 
 
 def measure(
-    made: Synthesis,
+    synthesis: Synthesis,
     extent: TradeExtent,
     pieces: TradePieces,
     *,
@@ -136,23 +138,23 @@ def measure(
 ) -> Trade:
     """Every rung on every response of a design, and the boards.
 
-    pieces : what is there already of this very design, extent and seed.
+    pieces : the pieces that are stored already for this very design, extent and seed.
 
     Raises
     ------
     EnvironmentMissing : ngspice is missing.
     """
-    count = len(made.model_responses)
+    count = len(synthesis.model_responses)
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)
         clock = SpiceClock(timed)
         rungs = []
-        for number, r in enumerate(made.model_responses, start=1):
+        for number, r in enumerate(synthesis.model_responses, start=1):
 
             def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
                 progress.stage(f"response {number} of {count}, every rung")
                 measured = trade_rungs.measured(
-                    made, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
+                    synthesis, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
                 )
                 rows, truth = compare(ResponseLabel.of(number, r), measured.answers)
                 return trade_pieces.rungs_json(rows, truth, measured.settings, measured.seconds)
@@ -162,7 +164,9 @@ def measure(
         for number, (rows, truth, settings, seconds) in enumerate(rungs, start=1):
             boards: BoardTrade | LeftOut | None = None
             if extent.boards:
-                plan = yields.question(made, number, settings, samples=extent.boards, seed=seed)
+                plan = yields.question(
+                    synthesis, number, settings, samples=extent.boards, seed=seed
+                )
                 label = truth.label
                 if isinstance(plan, str):
                     boards = LeftOut(label, plan)
@@ -209,8 +213,8 @@ def answer(
     need_responses(modelfile)
     if out is None:
         progress.stage("responses of the model, parts")
-        made = synthesis_result.synthesise(modelfile)
-        return _document(made, extent, TradePieces(), options, progress), False
+        synthesis = synthesis_result.synthesise(modelfile)
+        return _document(synthesis, extent, TradePieces(), options, progress), False
     runner = StageRunner(modelfile, out, options, progress)
     folder = runner.folder
     levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
@@ -221,15 +225,15 @@ def answer(
     key = ManifestStage(inputs).hash
     unfinished = folder.state("trade", inputs) == "unfinished"
     resumes = options.resume and unfinished and "design" not in runner.todo
-    known = read_pieces(folder / PIECES, key, progress.note) if resumes else {}
-    made = runner.design()
+    pieces = read_pieces(folder / PIECES, key, progress.note) if resumes else {}
+    synthesis = runner.design()
     guard = folder.watch()
 
     def save(text: str) -> None:
         guard()
         folder.write(PIECES, text)
 
-    document = _document(made, extent, TradePieces(known, save, key), options, progress)
+    document = _document(synthesis, extent, TradePieces(pieces, save, key), options, progress)
     guard()
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)
@@ -238,17 +242,24 @@ def answer(
 
 
 def _document(
-    made: Synthesis, extent: TradeExtent, pieces: TradePieces, options: Options, progress: Progress
+    synthesis: Synthesis,
+    extent: TradeExtent,
+    pieces: TradePieces,
+    options: Options,
+    progress: Progress,
 ) -> dict[str, Any]:
     from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
 
     measured = measure(
-        made, extent, pieces, seed=options.seed, jobs=options.workers, progress=progress
+        synthesis, extent, pieces, seed=options.seed, jobs=options.workers, progress=progress
     )
     origin = provenance(
-        made.modelfile, made.catalog.hash, seed=options.seed, settings={"trade": asdict(extent)}
+        synthesis.modelfile,
+        synthesis.catalog.hash,
+        seed=options.seed,
+        settings={"trade": asdict(extent)},
     )
-    return trade_json(measured, origin, pieces.seconds, made.modelfile.title)
+    return trade_json(measured, origin, pieces.seconds, synthesis.modelfile.title)
 
 
 def _write(folder: Folder, document: dict[str, Any]) -> None:

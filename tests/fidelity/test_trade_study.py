@@ -47,7 +47,7 @@ from designer.fidelity.trade_study import (
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.jobs import rung_choice
 from designer.jobs.options import Options
-from designer.jobs.rung_choice import choose, chosen
+from designer.jobs.rung_choice import choose, with_rung
 from designer.jobs.trade_job import NAMES
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
@@ -552,16 +552,16 @@ def test_what_was_asked_for_stands(tmp_path: Path, rung: Any) -> None:
     near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     folder = folder_with(tmp_path / "near", near)
     options = Options(rung=rung)
-    assert chosen(folder, options, Progress()) is options
+    assert with_rung(folder, options, Progress()) is options
     notes: list[str] = []
 
     class Heard(Progress):
         def note(self, text: str) -> None:
             notes.append(text)
 
-    assert chosen(folder, Options(), Heard()).rung == "auto"
+    assert with_rung(folder, Options(), Heard()).rung == "auto"
     assert len(notes) == 1
-    assert chosen(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
+    assert with_rung(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
     assert len(notes) == 1
 
 

@@ -159,6 +159,6 @@ def test_a_trade_has_the_folders_own_boards(tmp_path: Path) -> None:
 
 def test_limits_that_are_none_are_left_out(tmp_path: Path) -> None:
     out = folder(tmp_path / "out", study={**STUDY, "until": None})
-    assert folder_numbers.own(Folder(out), "study", ("seed",), ("until",)) == {"seed": 7}
-    assert folder_numbers.own(Folder(out), "trade", ("seed",)) == {}
+    assert folder_numbers.stage_numbers(Folder(out), "study", ("seed",), ("until",)) == {"seed": 7}
+    assert folder_numbers.stage_numbers(Folder(out), "trade", ("seed",)) == {}
     assert json.loads((out / "manifest.json").read_text())["complete"]
