@@ -244,7 +244,7 @@ def study_of(
     sampled: Callable[[Study], None] = lambda _: None,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
-    """The study that the options ask for. checked, stores, sampled, standing : as of ``tolerance``."""
+    """The study that the options want. checked, stores, sampled, standing : as of ``tolerance``."""
     return tolerance(
         synthesis,
         samples=options.samples,
