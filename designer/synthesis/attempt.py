@@ -23,7 +23,7 @@ from designer.circuit.terms import entry_resistor
 from designer.linear_network import linear_search
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks
+from designer.model.find_responses import ModelResponse, Peaks
 from designer.model.mechanics import MechanicalModel
 from designer.synthesis import all_stages
 from designer.synthesis.all_stages import StageQuestion
@@ -318,6 +318,15 @@ def _volts_per_ohm(order: Order, limits: ConditionLimits, values: Mapping[str, f
     wanted = system.drive_force(system.own_frequency)
     driven = wanted != 0.0
     return np.asarray(wanted[driven] / (errors.drive_gain[driven] * placeholder))
+
+
+def relative_amplitude(model: MechanicalModel, response: ModelResponse) -> float:
+    """The generator's amplitude of a response over that at the model's clearance and own frequency;
+    a moving ground's force follows the drive frequency."""
+    system = model.second_order()
+    own = system.drive_force(system.own_frequency)
+    forces = system.drive_force(response.omega)[own != 0.0] / own[own != 0.0]
+    return model.b / response.b * float(forces.max(initial=0.0))
 
 
 def _in_ratio(

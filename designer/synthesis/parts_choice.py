@@ -12,12 +12,14 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NoReturn
 
 from designer.base.errors import Unreachable
 from designer.base.progress import doing, part
 from designer.catalog.catalog import Catalog
 from designer.circuit.coefficients import EXACT
+from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
@@ -26,7 +28,13 @@ from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.find_responses import ModelResponse, Peaks
 from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
-from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
+from designer.synthesis.attempt import (
+    Attempt,
+    Order,
+    attempt,
+    linear_block,
+    relative_amplitude,
+)
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
 from designer.synthesis.part_checks import check_choices
 
@@ -39,6 +47,11 @@ EMPTY = 1e-9
 """Relative: so far below a bound there is no choice, where at the bound there may be one."""
 ASIDE = 1e-6
 """Relative: the ends of an interval of R4 leave out the value between."""
+SPLIT = (
+    "two clearances between the same two, one for each stop: a stage's idle half stays off only "
+    "while the other is not much steeper"
+)
+"""What frees a clearance whose stops are too unequal for one stage."""
 FREES = {
     "frequency": "widen circuit.frequency or circuit.capacitor_range",
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
@@ -82,10 +95,12 @@ class _Verified:
 
 @dataclass(frozen=True)
 class _Missed:
-    """Why there is no design, and whether a limit had been tightened by then."""
+    """Why there is no design, the side conditions that finished circuits broke on the way there,
+    and what would free it where that is known."""
 
     short: Shortfall
-    tightened: bool
+    broken: tuple[str, ...] = ()
+    free: str = ""
 
 
 def synthesise(
@@ -111,11 +126,11 @@ def synthesise(
     """
     began = time.perf_counter()
     check_choices(model, spec, catalog)
-    largest = max([1.0, *(model.b / r.b for r in responses)])
+    largest = max([1.0, *(relative_amplitude(model, r) for r in responses)])
     order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims)
     search = _Search(order, responses)
     best = search.best(spec.kept)
-    if isinstance(best, Shortfall):
+    if isinstance(best, _Missed):
         search.refuse(best)
     design = best.design
     if binding:
@@ -133,27 +148,32 @@ class _Search:
     order: Order
     responses: Sequence[ModelResponse]
 
-    def best(self, conditions: frozenset[str]) -> _Verified | Shortfall:
+    def best(self, conditions: frozenset[str]) -> _Verified | _Missed:
         """The best design that keeps these side conditions, verified on its circuit.
 
         Bandwidth that is missing is sought in smaller gains first, in a slower time scale then.
         """
         answer = self._rounds(conditions, slower=False)
-        if isinstance(answer, _Missed) and answer.tightened and "bandwidth" in conditions:
-            answer = self._rounds(conditions, slower=True)
-        return answer.short if isinstance(answer, _Missed) else answer
+        short = isinstance(answer, _Missed) and answer.broken and not answer.free
+        return (
+            self._rounds(conditions, slower=True) if short and "bandwidth" in conditions else answer
+        )
+
+    @cached_property
+    def by_joins(self) -> bool:
+        """Whether joins choose the linear block, so that searching it again costs little."""
+        return Targets.of(self.order.model).fully_coupled_pair
 
     def binding(self, best: _Verified) -> dict[str, float]:
-        """max_error without each condition that costs some; nothing where the error is none, or
-        where a tree of choices was not searched to its end: its errors say nothing about costs."""
+        """max_error without each condition that costs some; nothing where the error is none, and
+        not asked of a tree of choices, which each condition would have searched again."""
         error, conditions = best.design.errors.max_error, self.order.spec.kept
-        linear, joins = best.attempt.linear, Targets.of(self.order.model).fully_coupled_pair
-        if error <= EXACT or not (linear.proved or joins):
+        if error <= EXACT or not self.by_joins:
             return {}
 
         def without(names: frozenset[str]) -> float:
             other = self.best(conditions - names)
-            return float("inf") if isinstance(other, Shortfall) else other.design.errors.max_error
+            return float("inf") if isinstance(other, _Missed) else other.design.errors.max_error
 
         active = [n for n in SIDE_CONDITIONS if n in conditions and self._acts(best, n)]
         least = error - EXACT - self.order.spec.slack  # inside the slack an error may lie anywhere
@@ -192,24 +212,34 @@ class _Search:
         binding = {name: cost for name, cost in design.binding.items() if cost < least}
         return replace(improved, certificate=certificate, binding=binding)
 
-    def refuse(self, short: Shortfall) -> NoReturn:
+    def refuse(self, missed: _Missed) -> NoReturn:
         """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees
         it."""
-        conditions, what = self.order.spec.kept, short.what
-        guilty: list[str] = []
-        doing("what leaves no choice")
-        if conditions and isinstance(self.best(frozenset()), _Verified):
-            guilty = [
-                name
-                for name in SIDE_CONDITIONS
-                if name in conditions and isinstance(self.best(conditions - {name}), _Verified)
-            ]
-            names = ", ".join(guilty) or "several together"
-            what += f"; side condition: {names}" if names != what else ""
-        free = FREES.get(short.what, "a wider choice of parts")
+        what = missed.short.what
+        guilty, names = self._guilty(missed)
+        if names and names != what:
+            what += f"; side condition: {names}"
+        free = missed.free or FREES.get(missed.short.what, "a wider choice of parts")
         if guilty:
             free += "; or circuit.side_conditions without " + " or ".join(guilty)
         raise Unreachable(None, "circuit", f"no choice of parts; what binds: {what}", free)
+
+    def _guilty(self, missed: _Missed) -> tuple[list[str], str]:
+        """The side conditions that leave no choice, and their names in words: by joins those
+        without which there is one, in a tree of choices those that finished circuits broke."""
+        if not self.by_joins:
+            guilty = [name for name in SIDE_CONDITIONS if name in missed.broken]
+            return guilty, ", ".join(guilty)
+        conditions = self.order.spec.kept
+        doing("what leaves no choice")
+        if not conditions or isinstance(self.best(frozenset()), _Missed):
+            return [], ""
+        guilty = [
+            name
+            for name in SIDE_CONDITIONS
+            if name in conditions and isinstance(self.best(conditions - {name}), _Verified)
+        ]
+        return guilty, ", ".join(guilty) or "several together"
 
     def _limits(self, conditions: frozenset[str]) -> ConditionLimits:
         o = self.order
@@ -220,24 +250,40 @@ class _Search:
         """Search, verify, tighten what is not kept, and again."""
         within = self._limits(conditions)
         broken: list[ConditionCheck] = []
+        names: tuple[str, ...] = ()
         # Under the conditions as they are stated: later rounds search less than they allow.
         widest = linear_block(self.order, within, most_values=self.order.spec.most_values)
         if isinstance(widest, Shortfall):
-            return _Missed(widest, False)
+            return _Missed(widest)
         for number in range(ROUNDS + 1):
             made = self._within_most_values(within, widest, again=number > 0)
             if isinstance(made, Shortfall):
-                return _Missed(made, number > 0)
+                return _Missed(made, names)
             design = self._verified(made, conditions)
             design = replace(design, certificate=_certificate(made, widest))
             broken = [check for check in design.checks if not check.holds]
             if not broken:
                 return _Verified(made, design, within)
+            names += tuple(check.name for check in broken)
+            apart = self._too_unequal(broken)
+            if apart is not None:
+                return _Missed(Shortfall(f"the stops of {apart}", True), ("swing",), SPLIT)
             tighter = within.tightened(broken, design, slower=slower)
             if tighter == within:
                 break
             within = tighter
-        return _Missed(Shortfall(broken[0].name, False), True)
+        return _Missed(Shortfall(broken[0].name, False), names)
+
+    def _too_unequal(self, broken: Sequence[ConditionCheck]) -> str | None:
+        """The clearance whose steeper half drives fv further than its other half can idle, which
+        no amplitude mends; None without one."""
+        where = {check.where for check in broken if check.quantity == "rectifier_fv_v"}
+        for index, clearance in enumerate(self.order.model.second_order().clearances):
+            stops = [stop for _, stop in clearance.sides]
+            diodes = {half_parts(index, side).series for side, _ in clearance.sides}
+            if where & diodes and len({stop.stiffness for stop in stops}) > 1:
+                return clearance.name
+        return None
 
     def _within_most_values(
         self, within: ConditionLimits, widest: LinearBlock, *, again: bool

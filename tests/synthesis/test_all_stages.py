@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from designer.base.errors import InputError
+from designer.base.errors import InputError, Unreachable
 from designer.catalog.catalog import load_catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.model_file import parse_model_file
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool
+from designer.synthesis.attempt import relative_amplitude
 from designer.synthesis.part_checks import check_choices
 
 TWO = """\
@@ -75,6 +76,59 @@ def test_two_unequal_clearances_one_between_masses_and_a_weight() -> None:
     names = {finding.name for finding in check.findings}
     assert {"transfer, open", "slope, upper contact A", "threshold, upper contact B"} <= names
     assert check.passed, check.problem
+
+
+ONE = """\
+format = 2
+[[mass]]
+name = "one"
+mass = 1.0
+[[spring]]
+between = ["one", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["one", "ground"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["one", "ground"]
+upper = 1.26
+lower = 1.26
+upper_stiffness = 20.0
+lower_stiffness = 2.0
+[[force]]
+on = "one"
+amplitude = 1.5
+[[response]]
+omega = 0.8
+[circuit]
+dead_zone = "rectifier"
+resistors = "E24"
+"""
+SHAKEN = (
+    ONE.replace('[[force]]\non = "one"\namplitude = 1.5', "[base]\namplitude = 1.0")
+    .replace("lower = 1.26\n", "")
+    .replace("upper_stiffness = 20.0\nlower_stiffness = 2.0", "stiffness = 29.0")
+    .replace("omega = 0.8", "omega = 1.4\nb = 0.8")
+)
+
+
+def test_stops_too_unequal_for_one_stage_are_refused_with_a_way_out() -> None:
+    with pytest.raises(Unreachable, match="the stops of A; side condition: swing") as caught:
+        synthesise(parse_model_file(ONE))
+    assert "two clearances between the same two" in caught.value.expected
+
+
+def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequency() -> None:
+    """The force of a moving base follows the square of the drive frequency."""
+    file = parse_model_file(SHAKEN)
+    made = synthesise(file)
+    (response,) = made.found
+    assert relative_amplitude(file.model, response) == pytest.approx(1.4**2 / 0.8)
+    design = made.design
+    ratio = design.amplitude(response.b, response.omega) / design.amplitude()
+    assert ratio == pytest.approx(1.4**2 / 0.8)
+    assert {c.name for c in design.checks if c.holds} == set(file.circuit.kept)
 
 
 @pytest.mark.parametrize(
