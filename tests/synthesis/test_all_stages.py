@@ -123,7 +123,7 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
     """The force of a moving base follows the square of the drive frequency."""
     file = parse_model_file(SHAKEN)
     made = synthesise(file)
-    (response,) = made.found
+    (response,) = made.model_responses
     assert relative_amplitude(file.model, response) == pytest.approx(1.4**2 / 0.8)
     design = made.design
     ratio = design.amplitude(response.b, response.omega) / design.amplitude()
