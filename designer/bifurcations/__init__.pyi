@@ -46,6 +46,7 @@ from .store import (
     write_sweep as write_sweep,
 )
 from .subject import (
+    ShownStop as ShownStop,
     Subject as Subject,
 )
 from .sweep import (

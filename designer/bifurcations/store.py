@@ -46,6 +46,8 @@ _COLUMNS = [
 
 _MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
 """Of systems with more clearances than one."""
+_FURTHER = pa.schema([*_MORE, ("further", pa.list_(pa.list_(pa.float64())))])
+"""Of sweeps that show more stops than one."""
 
 
 def work_hash(settings: Mapping[str, Any]) -> str:
@@ -69,7 +71,8 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
         for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
     ]
     key = {"format": FORMAT, "work": work_hash(sweep.plan.as_dict())}
-    store: KeyedStore[Rows] = KeyedStore(path.parent, ParquetForm(_sweep_schema(parameter), _MORE))
+    form = ParquetForm(_sweep_schema(parameter), _FURTHER)
+    store: KeyedStore[Rows] = KeyedStore(path.parent, form)
     store.write(path.name, key, rows, {"provenance": provenance})
 
 
@@ -128,6 +131,7 @@ class SweepStore:
             row.update(_named(row))
             for key in ("start", "end", "minima", "velocities"):
                 row[key] = np.array(row[key], dtype=float)
+            row["further"] = tuple(np.array(v, dtype=float) for v in row.get("further") or ())
             out.append(Steady(**row))
         return out
 
@@ -139,7 +143,7 @@ class SweepStore:
 
     @cached_property
     def _store(self) -> KeyedStore[Rows]:
-        form = ParquetForm(_sweep_schema(self.parameter), _MORE)
+        form = ParquetForm(_sweep_schema(self.parameter), _FURTHER)
         return KeyedStore(self.root, form, self.note, self.vouch)
 
     def _key(self, track: str, block: int) -> dict[str, Any]:

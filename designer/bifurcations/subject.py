@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from designer.base.arrays import Array
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.steady_state import DrivenSystem
+
+
+@dataclass(frozen=True)
+class ShownStop:
+    """A stop whose impacts a diagram shows in a panel of its own."""
+
+    clearance: int
+    """Index of the clearance."""
+    side: int
+    """1 for its upper stop, -1 for the lower."""
+    name: str
+    """The stop in words, such as "the upper stop of A"."""
+    velocity: str
+    """Symbol of the velocity in the clearance."""
 
 
 class Subject(Protocol):
@@ -44,8 +59,14 @@ class Subject(Protocol):
 
     @property
     def labels(self) -> Mapping[str, str]:
-        """What axes call a state, "displacement" and "velocity" in the first clearance, and the
-        "stop" whose impacts a diagram shows, where they have names of their own."""
+        """What axes call a state, and the "displacement" in the first clearance, where they have
+        names of their own."""
+        ...
+
+    @property
+    def stops(self) -> tuple[ShownStop, ...]:
+        """The stops whose impacts a diagram shows: of one even clearance the upper one alone, of
+        which the lower is the mirror image; else every stop. One at least."""
         ...
 
     @property

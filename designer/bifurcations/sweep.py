@@ -19,7 +19,7 @@ from designer.base.threads import parallel
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Course, Steady
+from designer.dynamics.steady_state import UPPER, Course, Steady
 
 BLOCK = 64
 """Steps of a block."""
@@ -77,7 +77,9 @@ class SweepPlan:
 
     def as_dict(self) -> dict[str, Any]:
         """What decides the result."""
+        stops = tuple((stop.clearance, stop.side) for stop in self.subject.stops)
         return {
+            **({} if stops == UPPER else {"stops": stops}),
             "subject": self.subject.as_dict(),
             "parameter": self.parameter,
             "from": float(self.values[0]),

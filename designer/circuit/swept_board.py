@@ -13,15 +13,17 @@ from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
+from designer.bifurcations.subject import ShownStop
 from designer.circuit.design import Design
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
-from designer.dynamics.steady_state import DrivenSystem
+from designer.dynamics.steady_state import UPPER, DrivenSystem
 from designer.model.find_responses import scale_of
-from designer.model.mechanics import check_omega, frequency_range
+from designer.model.mechanics import SecondOrderSystem, check_omega, frequency_range
 from designer.model.model import GREATEST, SMALLEST
+from designer.model.relative_motion import shown_stops, subscripted
 from designer.model.si_units import NO_UNITS
 
 SETTINGS = {
@@ -63,6 +65,25 @@ class BoardSubject:
         self.weights = np.ones(len(self.states))
         self.units: Mapping[str, str] = UNITS
 
+    @property
+    def stops(self) -> tuple[ShownStop, ...]:
+        """Those of ``shown_stops``, by the names of several clearances."""
+        model = self.design.model.second_order()
+        shown, several = shown_stops(model) or UPPER, len(model.clearances) > 1
+        return tuple(self._stop(model, k, side, several=several) for k, side in shown)
+
+    @staticmethod
+    def _stop(model: SecondOrderSystem, index: int, side: int, *, several: bool) -> ShownStop:
+        word, number = ("upper", "A1") if side > 0 else ("lower", "A2")
+        if not model.clearances:
+            return ShownStop(index, side, f"the {word} stop ({number})", "v₂")
+        clearance = model.clearances[index]
+        place = clearance.name if several else number
+        name = f"the {word} stop of {place}" if several else f"the {word} stop ({place})"
+        masses = [mass for mass in (clearance.mass, clearance.other) if mass is not None]
+        velocity = " − ".join(subscripted(f"v{2 * mass + 2}") for mass in masses)
+        return ShownStop(index, side, name, velocity)
+
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""
         if name not in self.parameters:
@@ -85,7 +106,8 @@ class BoardSubject:
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""
         drives = [self.excitation(change).drive for change in changes]
-        return [DrivenSystem(partial(Flow, self.system, d), d.period) for d in drives]
+        stops = tuple((stop.clearance, stop.side) for stop in self.stops)
+        return [DrivenSystem(partial(Flow, self.system, d), d.period, None, stops) for d in drives]
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
         """(states,) size of the states that starts are drawn from: one for all changes."""

@@ -85,6 +85,7 @@ from .piecewise_linear import (
     motion_of_states as motion_of_states,
 )
 from .steady_state import (
+    UPPER as UPPER,
     Course as Course,
     DrivenSystem as DrivenSystem,
     Steady as Steady,

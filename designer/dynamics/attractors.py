@@ -20,7 +20,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult, FlowStatus
 from designer.dynamics.kernel_orbit import (
     CHAOS,
     CLOSING,
@@ -44,6 +44,11 @@ FIRST = 300
 """Drive periods over which chaos is first looked for."""
 SURE = 4.0
 """Standard errors that a small exponent has to be above 0 to be called chaos."""
+RATTLES = (
+    f"more than {MAX_EVENTS} changes of contact in a drive period: something rests on a stop whose "
+    "force jumps at the touch, and rattles on it lower and faster without end"
+)
+"""Why a motion is given up that would have to be followed through infinitely many impacts."""
 ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
 
@@ -71,6 +76,8 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
             diverged = run.status is FlowStatus.DIVERGED
             status = OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED
             reason = str(run.status)
+            if run.status is FlowStatus.CHATTER and not flow.system.continuous:
+                reason = RATTLES
             if run.status is FlowStatus.TOO_LONG:
                 reason = _too_long(flow, spent, budget)
             return Orbit(status, reason=reason, periods=spent)

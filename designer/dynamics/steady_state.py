@@ -1,7 +1,7 @@
 """The steady motion that a start leads to, as a bifurcation diagram shows it.
 
 A transient is run and left out; over the periods kept after it the least displacement of each and
-every impact on the upper stop are noted, and the motion is named n-p-q by the rules of
+every impact on the stops of interest are noted, and the motion is named n-p-q by the rules of
 ``dynamics.attractors``. Two engines: the compiled one for models (``dynamics.kernel_sweep``), and
 the general flow, which is slow and obvious, and serves boards and whatever the fast path does not
 fit.
@@ -91,13 +91,22 @@ class Steady(Motion):
     minima: Array
     """(keep,) least displacement in the first clearance in each period kept."""
     velocities: Array
-    """(k,) velocity where contact with its upper stop begins, in those periods."""
+    """(k,) velocity where contact with the first stop of interest begins, in those periods: the
+    upper stop of the first clearance unless others were asked for."""
     periods: int
     """Drive periods that were run in all."""
     more: Pairs = ()
     """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
     lyapunov_error: float = float("nan")
     """Standard error of ``lyapunov``; nan unless aperiodic."""
+    further: tuple[Array, ...] = ()
+    """The same as ``velocities`` of each further stop of interest."""
+
+
+Stops = tuple[tuple[int, int], ...]
+"""Stops of interest: index of the clearance, and 1 for its upper stop or -1 for the lower."""
+UPPER: Stops = ((0, 1),)
+"""The upper stop of the first clearance, the one that the fast path watches."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,8 @@ class DrivenSystem:
     """Period of the drive, in the system's time."""
     tables: ModalTables | None = None
     """Tables of the fast path; None where steady states are found by the flow."""
+    stops: Stops = UPPER
+    """The stops whose impacts are noted; others than ``UPPER`` need the flow."""
 
     def steady(self, x: Array, course: Course) -> Steady:
         """What the start x (states,) leads to.
@@ -120,13 +131,13 @@ class DrivenSystem:
         """
         if interrupt.is_set():
             raise KeyboardInterrupt
-        if self.tables is None:
-            return by_flow(self.flow(), x, course)
+        if self.tables is None or self.stops != UPPER:
+            return by_flow(self.flow(), x, course, self.stops)
         return _by_kernel(self.flow, self.tables, self.period, x, course)
 
 
-def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
-    """By the general flow, period after period."""
+def by_flow(flow: Flow, x: Array, course: Course, stops: Stops = UPPER) -> Steady:
+    """By the general flow, period after period. stops : whose impacts are noted, one at least."""
     growth, state = None, np.array(x, dtype=float)
     free = course.settle - course.tangents
     spent = course.settle + course.keep
@@ -138,16 +149,18 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
     if course.tangents:
         growth = lyapunov(flow, state, None, course.tangents)
         state = growth.start
-    strobes, minima, velocities = [state], [], []
+    strobes, minima = [state], []
+    velocities: list[list[float]] = [[] for _ in stops]
     for _ in range(course.keep):
         run = flow.run(strobes[-1], 1, measure=True)
         if run.status is not FlowStatus.DONE:
             return _stopped(run.status, strobes[-1], spent)
         strobes.append(run.strobes[-1])
         minima.append(float((run.spans if len(run.spans) else run.extremes)[0, 0]))
-        upper = (run.impacts.side > 0) & (run.impacts.clearance == 0)
-        velocities += run.impacts.velocity[upper].tolist()
-    end, found = strobes[-1], (np.array(minima), np.array(velocities))
+        for met, (clearance, side) in zip(velocities, stops, strict=True):
+            here = (run.impacts.side == side) & (run.impacts.clearance == clearance)
+            met += run.impacts.velocity[here].tolist()
+    end, found = strobes[-1], (np.array(minima), *(np.array(met) for met in velocities))
     chaos = growth is not None and growth.value * growth.period > CHAOS
     if growth and chaos and course.tangents >= kernel.SPAN and not _repeats(flow, strobes):
         orbit = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
@@ -175,9 +188,9 @@ def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
     return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
 
 
-def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, Array], spent: int) -> Steady:
-    """An orbit as what was ``found`` before it leads to: minima and velocities, after ``spent``
-    periods."""
+def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, ...], spent: int) -> Steady:
+    """An orbit as what was ``found`` before it leads to: minima and velocities of each stop, after
+    ``spent`` periods."""
     if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
         orbit = replace(orbit, status=OrbitStatus.PERIODIC)
     periodic = orbit.status is OrbitStatus.PERIODIC
@@ -196,6 +209,7 @@ def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, Array], spent: int) 
         velocities=found[1],
         periods=spent + orbit.periods,
         more=orbit.more if periodic else (),
+        further=found[2:],
     )
 
 

@@ -83,6 +83,7 @@ from .relative_motion import (
     RelativeMotion as RelativeMotion,
     ground_of as ground_of,
     relative_motions as relative_motions,
+    shown_stops as shown_stops,
     state_labels as state_labels,
     subscripted as subscripted,
 )

@@ -126,12 +126,12 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
 
 
 def scale_of(model: MechanicalModel, omega: float) -> Array:
-    """(states,) size of the states that starts are drawn from: a few static deflections and the
-    widest gap."""
+    """(states,) size of the states that starts are drawn from: the static deflection and the widest
+    gap."""
     system = model.second_order()
     flexibility = np.linalg.inv(system.stiffness)
     gaps = [abs(side.gap) for stop in system.clearances for _, side in stop.sides]
-    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=model.b)
+    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=0.0)
     x = x + np.abs(flexibility @ system.constant)
     return np.stack([x, x * max(omega, system.own_frequency)], axis=1).ravel()
 

@@ -62,6 +62,16 @@ def relative_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
     return (RelativeMotion("x₁", _names(system, [0]), row, system.base, ()),)
 
 
+def shown_stops(system: SecondOrderSystem) -> tuple[tuple[int, int], ...]:
+    """(index of the clearance, side) of the stops whose impacts a diagram shows: of one even
+    clearance without a constant force the upper one, since the lower is its mirror image; else
+    every stop."""
+    stops = system.clearances
+    if len(stops) == 1 and stops[0].upper == stops[0].lower and not system.constant.any():
+        return ((0, 1),)
+    return tuple((k, side) for k, stop in enumerate(stops) for side in stop.positions)
+
+
 def ground_of(model: MechanicalModel) -> Array:
     """(states,) amplitude of the ground's displacement in each state: x = z + ground · sin ωt."""
     system = model.second_order()

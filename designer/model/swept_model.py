@@ -14,13 +14,14 @@ from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
+from designer.bifurcations.subject import ShownStop
 from designer.dynamics.flow import Flow
-from designer.dynamics.steady_state import DrivenSystem
+from designer.dynamics.steady_state import UPPER, DrivenSystem
 from designer.model.driven import model_flow
 from designer.model.find_responses import scale_of
 from designer.model.mechanics import MechanicalModel, check_omega, frequency_range, state_names
 from designer.model.model import SiScales
-from designer.model.relative_motion import relative_motions, state_labels
+from designer.model.relative_motion import relative_motions, shown_stops, state_labels
 from designer.model.si_units import in_si, units_of
 from designer.model.swept_tables import ModalBatch
 
@@ -68,13 +69,31 @@ class ModelSubject:
         system = self.model.second_order()
         if not system.names:
             return {}
-        first, stops = relative_motions(system)[0], system.clearances
         return {
             **dict(zip(self.states, state_labels(system), strict=True)),
-            "displacement": first.label,
-            "velocity": first.rate,
-            "stop": f"the upper stop of {stops[0].name}" if stops else "a stop",
+            "displacement": relative_motions(system)[0].label,
         }
+
+    @property
+    def stops(self) -> tuple[ShownStop, ...]:
+        """Those of ``shown_stops``, by their clearance's name where the masses have names."""
+        system = self.model.second_order()
+        motions, shown = relative_motions(system), shown_stops(system)
+        if not system.names:
+            names = {1: "the upper stop (A1)", -1: "the lower stop (A2)"}
+            return tuple(ShownStop(k, side, names[side], "x₁′") for k, side in shown or UPPER)
+        if not shown:
+            return (ShownStop(0, 1, "a stop", motions[0].rate),)
+        words = {1: "upper", -1: "lower"}
+        return tuple(
+            ShownStop(
+                k,
+                side,
+                f"the {words[side]} stop of {system.clearances[k].name}",
+                motions[k].rate,
+            )
+            for k, side in shown
+        )
 
     @property
     def si(self) -> dict[str, Unit]:
@@ -103,8 +122,9 @@ class ModelSubject:
             assert omega is not None
             omegas.append(float(omega))
         tables = self._batch.tables(models, omegas)
+        stops = tuple((stop.clearance, stop.side) for stop in self.stops)
         return [
-            DrivenSystem(lambda m=m, w=w: model_flow(m, w), 2.0 * np.pi / w, t)  # type: ignore[misc]
+            DrivenSystem(lambda m=m, w=w: model_flow(m, w), 2.0 * np.pi / w, t, stops)  # type: ignore[misc]
             for m, w, t in zip(models, omegas, tables, strict=True)
         ]
 

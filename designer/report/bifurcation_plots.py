@@ -49,6 +49,8 @@ MARKS = {
 }
 Coloured = tuple[str, Array, list[Steady]]
 """Colour, values of the parameter, and the motions there."""
+STOP_PANEL = 1.8
+"""Height of the panel of each stop past the first [inch]."""
 SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
 """Of windows of symmetric responses and of others."""
 STRIPS = {DOWN: "↓", UP: "↑"}
@@ -61,15 +63,16 @@ def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Bifurc
 
 @styled
 def diagram(sweep: Sweep, points: Sequence[Bifurcation] = (), name: str = "") -> Figure:
-    """The paper's Fig. 2: least displacement of each period, impact velocity on the upper stop,
-    largest Lyapunov exponent, over the swept parameter; windows named above.
+    """The paper's Fig. 2: least displacement of each period, impact velocity on each stop that the
+    subject shows, largest Lyapunov exponent, over the swept parameter; windows named above.
 
     points : to be marked. name : the model's title.
     """
     plan = sweep.plan
     strips = list(plan.tracks) if plan.followed else ["starts"]
-    figure = new_figure(9.6, 7.6 + 0.24 * len(strips))
-    heights = [0.24] * len(strips) + [2.4, 2.4, 1.6]
+    more = len(plan.subject.stops) - 1
+    figure = new_figure(9.6, 7.6 + 0.24 * len(strips) + STOP_PANEL * more)
+    heights = [0.24] * len(strips) + [2.4, 2.4, *[STOP_PANEL] * more, 1.6]
     _head(figure, title(name, plan, 120))
     rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     for axes, track in zip(rows, strips, strict=False):
@@ -85,13 +88,14 @@ def diagram(sweep: Sweep, points: Sequence[Bifurcation] = (), name: str = "") ->
 
 
 def _clouds(panels: Sequence[Axes], sweep: Sweep, coloured: Sequence[Coloured]) -> None:
-    """Every step of the sweep in the three panels, and limits for the exponent."""
-    least, speed, growth = panels
+    """Every step of the sweep in the panels, and limits for the exponent."""
+    least, *speeds, growth = panels
     size = min(3.2, max(1.5, 1000.0 / len(sweep.plan.values)))
     for colour, values, steps in coloured:
         ink: dict[str, Any] = {"color": colour, "ls": "", "rasterized": True, "ms": size}
         _cloud(least, values, [s.minima for s in steps], ink)
-        _cloud(speed, values, [s.velocities for s in steps], ink)
+        for k, speed in enumerate(speeds):
+            _cloud(speed, values, [_met(s, k) for s in steps], ink)
         growth.plot(values, [s.lyapunov for s in steps], marker=".", mew=0, **ink)
     growth.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
     finite = np.array([s.lyapunov for steps in sweep.steps.values() for s in steps])
@@ -103,10 +107,9 @@ def _clouds(panels: Sequence[Axes], sweep: Sweep, coloured: Sequence[Coloured]) 
 
 
 def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
-    least, speed, growth = panels
+    least, *speeds, growth = panels
     units, si = plan.subject.units, plan.subject.si
     symbol = plan.subject.states[0][0]
-    rate = f"{symbol}₁′" if symbol == "x" else f"{symbol}₂"
     labels = plan.subject.labels
     name = labels.get("displacement", f"{symbol}₁")
     least.set_ylabel(
@@ -115,9 +118,10 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
             units.get("x", ""),
         )
     )
-    where = labels.get("stop", "the upper stop (A1)")
-    text = f"impact velocity {labels.get('velocity', rate)}\non {where}"
-    speed.set_ylabel(_label(text, units.get("v", "")))
+    for speed, stop in zip(speeds, plan.subject.stops, strict=True):
+        text = f"impact velocity {stop.velocity}\non {stop.name}"
+        speed.set_ylabel(_label(text, units.get("v", "")))
+        si_y(speed, si.get("x1'"))
     growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
     for axes in panels:
         axes.grid(True, color=GRID, lw=0.5)
@@ -126,7 +130,12 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     growth.set_xlabel(_axis(plan.subject, plan.parameter))
     si_x(growth, si.get(plan.parameter), below=SECOND_AXIS)
     si_y(least, si.get("x1"))
-    si_y(speed, si.get("x1'"))
+
+
+def _met(step: Steady, stop: int) -> Array:
+    """Impact velocities on one of the shown stops; none of a step that did not come to an end."""
+    each = (step.velocities, *step.further)
+    return each[stop] if stop < len(each) else np.zeros(0)
 
 
 def _marked(panels: Sequence[Axes], points: Sequence[Bifurcation]) -> list[Any]:
