@@ -16,6 +16,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.model.driven import model_flow
 from designer.model.mechanics import Clearance, MechanicalModel, check_omega
+from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 
 STARTS = 16
@@ -131,7 +132,9 @@ def scale_of(model: MechanicalModel, omega: float) -> Array:
     system = model.second_order()
     flexibility = np.linalg.inv(system.stiffness)
     gaps = [abs(side.gap) for stop in system.clearances for _, side in stop.sides]
-    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=0.0)
+    # Without a stop the clearance b of a dimensionless model is a length still; else b is a factor.
+    length = model.b if isinstance(model, Dimensionless) else 0.0
+    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=length)
     x = x + np.abs(flexibility @ system.constant)
     return np.stack([x, x * max(omega, system.own_frequency)], axis=1).ravel()
 
