@@ -45,6 +45,13 @@ from .fields import (
     PRICE_CLASSES as PRICE_CLASSES,
     Figure as Figure,
 )
+from .output_stage import (
+    HEAVY_LOAD as HEAVY_LOAD,
+    RATED_LOAD as RATED_LOAD,
+    OutputStage as OutputStage,
+    output_at as output_at,
+    saturation_resistance as saturation_resistance,
+)
 from .read import (
     LAYOUTS as LAYOUTS,
 )

@@ -166,7 +166,7 @@ def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
         design.circuit.values,
         opamp,
         supply=design.circuit.supply,
-        saturation=spec.saturation or opamp.saturation_at(spec.supply),
+        saturation=spec.saturation,
         stage=dead_zone_stage(model, spec, catalog),
         composites=design.composites,
     )

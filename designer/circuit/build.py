@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from designer.catalog.entries import OpAmp
+from designer.catalog.output_stage import output_at
 from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section
@@ -44,11 +45,14 @@ def circuit_of(
     opamp: OpAmp,
     *,
     supply: float,
-    saturation: float,
+    saturation: float | None,
     stage: DeadZoneStage = SATURATING,
     composites: Mapping[str, Composite] = MappingProxyType({}),
 ) -> Circuit:
-    """The circuit of a model, as ``build`` makes it of the model's terms."""
+    """The circuit of a model, as ``build`` makes it of the model's terms.
+
+    saturation : output limit [V] of every pin in this circuit; None: the op-amp's own, by its load.
+    """
     system = model.second_order()
     force = system.drive_force(system.own_frequency)
     matrices = system.damping.tolist(), system.stiffness.tolist(), force.tolist()
@@ -71,7 +75,7 @@ def build(
     opamp: OpAmp,
     *,
     supply: float,
-    saturation: float,
+    saturation: float | None,
     clearances: tuple[Clearance, ...] = (),
     constants: Sequence[float] = (),
     stage: DeadZoneStage = SATURATING,
@@ -79,6 +83,7 @@ def build(
 ) -> Circuit:
     """The circuit of these terms.
 
+    saturation : as of ``circuit_of``.
     values : ohm and farad by part name; holds R100 … for the inverters and, for each clearance, R50
     and the resistors of the dead-zone stage (``dead_zone_place``).
     clearances : each gets a nonlinear stage. constants : the constant force on each mass, of which
@@ -116,6 +121,7 @@ def build(
         feed = f"feed of the reference, {end} half"
         parts += rails(sign, "reference of the constant forces", feed)
     resistors.done()
+    reached = output_at(opamp, supply, saturation)
     circuit = Circuit(
         parts=tuple(parts),
         generator=GENERATOR,
@@ -126,7 +132,8 @@ def build(
         gain=opamp.gain.typ or 1e5,
         bias=opamp.bias.typ or 0.0,
         supply=supply,
-        saturation=saturation,
+        saturation=reached.limit,
+        saturation_load=reached.load,
         figures=opamp,
     )
     return packed(circuit, opamp)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from designer.base.natural_sort import natural_key
 from designer.base.views import View
 from designer.catalog.diode_curve import DiodeModel
 from designer.catalog.entries import OpAmp
+from designer.catalog.output_stage import OutputStage
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.resistor_network import Conductance, without_inner_nets
 from designer.circuit.stop import Contact, Stop
 from designer.dynamics.piecewise_linear import Drive
 
@@ -207,6 +210,8 @@ class Circuit:
     """Output limits of the op-amps, ± [V]."""
     figures: OpAmp | None = None
     """The catalogue's entry of the op-amp, for models above the ideal one."""
+    saturation_load: float | None = field(default=None, repr=False)
+    """Load that ``saturation`` is reached into [ohm]; None: each output's own, whatever it is."""
     fittings: tuple[Fitting, ...] = ()
     """Parts of the board and the bill that are not simulated (``board.board_parts``)."""
 
@@ -230,6 +235,42 @@ class Circuit:
     def gain_bandwidth(self) -> float:
         """Typical gain-bandwidth of the op-amp [Hz]; nan where its figures are not known."""
         return self.figures.gbw.nominal if self.figures is not None else math.nan
+
+    @property
+    def output_stage(self) -> OutputStage:
+        """How far the op-amps' outputs reach."""
+        return OutputStage.of(self.figures, self.saturation, self.saturation_load)
+
+    def wires(self, values: Mapping[str, Any] | None = None) -> list[Conductance]:
+        """Conductances between the nets that more than resistors meet. values : [ohm] by part, one
+        number or an array of boards; the circuit's own where None."""
+        ohms = values or self.values
+        held = {GROUND, self.generator.net, *(supply.net for supply in self.supplies)}
+        held = held.union(*(p.nets for p in self.parts if not isinstance(p, Resistor)))
+        every = [Conductance(r.a, r.b, 1.0 / ohms[r.name]) for r in self.resistors]
+        return without_inner_nets(every, held)
+
+    def output_nets(self, section: Section) -> frozenset[str]:
+        """Net of a section's output, and those that a diode joins to it while it conducts."""
+        joined = {net for d in self.diodes if section.output in d.nets for net in d.nets}
+        return frozenset({section.output, *joined} - {section.inverting})
+
+    def output_loads(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Load [ohm] of each section's output, every resistor there taken to ground; infinite
+        without one. values : as of ``wires``."""
+        wires, loads = self.wires(values), {}
+        for section in self.sections:
+            siemens = [w.siemens for w in wires if {w.a, w.b} & self.output_nets(section)]
+            loads[section.name] = 1.0 / sum(siemens) if siemens else math.inf
+        return loads
+
+    def output_limits(self) -> dict[str, float]:
+        """Nominal output limit [V] of each section into its own load, no further than the rails."""
+        stage = self.output_stage
+        if stage.load is None:
+            return {s.name: stage.limit for s in self.sections}
+        loads = self.output_loads()
+        return {name: min(stage.limit_into(load), self.supply) for name, load in loads.items()}
 
     @property
     def resistors(self) -> tuple[Resistor, ...]:
@@ -378,11 +419,10 @@ def nominal_board(circuit: Circuit, *, ideal: bool = False) -> Board:
 
     ideal : infinite gain and no bias current, as the matching conditions assume.
     """
-    limit = circuit.saturation
     return Board(
         values=circuit.values,
         offset={s.name: 0.0 for s in circuit.sections},
-        rails={s.name: (-limit, limit) for s in circuit.sections},
+        rails={name: (-limit, limit) for name, limit in circuit.output_limits().items()},
         inverse_gain=0.0 if ideal else 1.0 / circuit.gain,
         bias={} if ideal else {s.name: circuit.bias for s in circuit.sections},
         reference={r.name: r.volts for r in circuit.references},

@@ -149,11 +149,12 @@ class BoardSubject:
     def as_dict(self) -> dict[str, object]:
         """What decides the flow, for hashes and provenance. The hash is of the whole circuit: of
         the op-amps' gain, bias currents and limits and the diodes' curves too."""
-        circuit = self.design.circuit
+        circuit, load = self.design.circuit, self.design.circuit.saturation_load
+        text = repr(circuit) + (repr(load) if load is not None else "")
         return {
             "board": "nominal",
             "parts": dict(sorted(circuit.values.items())),
-            "circuit_sha256": hashlib.sha256(repr(circuit).encode("utf-8")).hexdigest(),
+            "circuit_sha256": hashlib.sha256(text.encode("utf-8")).hexdigest(),
             "frequency": self.frequency,
             "amplitude": self.amplitude,
             "offset": self.offset,

@@ -111,12 +111,12 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             values,
             opamp,
             supply=float(document["circuit"]["supply"]),
-            saturation=float(document["circuit"]["saturation"]),
+            saturation=spec.saturation,
             stage=dead_zone_stage(model, spec, catalog),
             composites=document.get("composites", {}),
         )
-        gain, bias = (float(document["circuit"][k]) for k in ("gain", "bias"))
-        circuit = replace(circuit, gain=gain, bias=bias)
+        gain, bias, limit = (float(document["circuit"][k]) for k in ("gain", "bias", "saturation"))
+        circuit = replace(circuit, gain=gain, bias=bias, saturation=limit)
         largest = peaks(model, responses).states
         volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
         swing = (float((volts * largest).max()), largest)

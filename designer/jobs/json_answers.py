@@ -14,6 +14,7 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.base.arrays import Array
     from designer.check.simulation import Simulated
     from designer.circuit.design import Design
+    from designer.circuit.netlist import Circuit
     from designer.dynamics.orbit import Orbit
     from designer.model.find_responses import ModelResponse
     from designer.model.model import SiScales
@@ -239,6 +240,12 @@ def _conditions(design: Design) -> dict[str, Any]:
     }
 
 
+def _limit(circuit: Circuit) -> float:
+    """Output limit [V] of the section that makes the first stop; of a rectifier as stated."""
+    switches = [contact.switch for _, contact in circuit.stops[0].contacts]
+    return circuit.output_limits().get(switches[0], circuit.saturation)
+
+
 def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
     if not design.circuit.stops:
         return None
@@ -246,7 +253,7 @@ def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
     slopes = [error for name, error in errors.errors.items() if "stop slope" in name]
     return {
         "kind": modelfile.circuit.dead_zone,
-        "saturation": design.circuit.saturation,
+        "saturation": _limit(design.circuit),
         "threshold": errors.scales.threshold,
         "threshold_lower": errors.scales.threshold_lower,
         "offcentre": errors.scales.offcentre,

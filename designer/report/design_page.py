@@ -21,6 +21,7 @@ from designer.base.page import (
 )
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
+from designer.circuit.netlist import Circuit
 from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
@@ -289,11 +290,23 @@ def _parts(data: ReportData, schematic: Picture | Gallery | None) -> PageSection
     return PageSection("Parts", blocks, "parts")
 
 
+def _into(circuit: Circuit) -> str:
+    """The load that the limits belong to, and what U3C or its like reaches in its own; of a limit
+    that the model file states nothing, for it is that of every pin."""
+    stage = circuit.output_stage
+    if stage.load is None:
+        return ""
+    limits = circuit.output_limits()
+    meant = [contact.switch for stop in circuit.stops for _, contact in stop.contacts]
+    own = {f"{name} {limits[name]:.4g} V" for name in meant if name in limits}
+    return f" into {stage.load / 1e3:g} kΩ ({', '.join([stage.source, *sorted(own)])})"
+
+
 def _parts_note(data: ReportData) -> str:
     c = data.design.circuit
     better = better_grades_text(data.better_grades)
     return (
-        f"Supply ± {c.supply:g} V, op-amp output limits ± {c.saturation:g} V nominal. "
+        f"Supply ± {c.supply:g} V, op-amp output limits ± {c.saturation:g} V nominal{_into(c)}. "
         f"{words.plural(len(c.sections), 'section')} of {c.opamp} in "
         f"{words.plural(len(c.packages), 'package')}; {len(c.resistors)} resistors, "
         f"{len(c.capacitors)} capacitors, {data.design.distinct_values} different values."

@@ -111,7 +111,7 @@ def write(
 def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, float]) -> list[str]:
     """One element line for each section, and the model.
 
-    A vendor's model has a bandwidth of its own, which no board changes.
+    A vendor's model has a bandwidth and limits of its own, which no board changes.
     """
     gain = open_loop_gain(board)
     if rung == "ideal":
@@ -121,8 +121,15 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
     figures = circuit.figures
     vendor = rung == "full" and figures.spice is not None
     drawn = {} if vendor else board.gain_bandwidth
-    bandwidths = {name: opamp_model.bandwidth(rung, figures, gbw) for name, gbw in drawn.items()}
-    lines = _instances(circuit, board, rung, outputs, bandwidths)
+    loads = {} if vendor or rung != "full" else circuit.output_loads(board.values)
+    more = {
+        s.name: {
+            **(opamp_model.load(rung, loads[s.name]) if s.name in loads else {}),
+            **(opamp_model.bandwidth(rung, figures, drawn[s.name]) if s.name in drawn else {}),
+        }
+        for s in circuit.sections
+    }
+    lines = _instances(circuit, board, rung, outputs, more)
     return lines + opamp_model.subcircuit(rung, figures, gain)
 
 
@@ -131,7 +138,7 @@ def _instances(
     board: Board,
     rung: Rung,
     outputs: Mapping[str, float],
-    bandwidths: Mapping[str, Mapping[str, float]],
+    more: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
     return [
         opamp_model.instance(
@@ -142,7 +149,7 @@ def _instances(
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],
             start=outputs.get(s.name, 0.0),
-            bandwidth=bandwidths.get(s.name),
+            more=more.get(s.name),
         )
         for s in circuit.sections
     ]

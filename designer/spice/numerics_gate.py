@@ -23,7 +23,6 @@ from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.base.reason import Reason
 from designer.circuit.netlist import Board, Circuit, Excitation
-from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
@@ -32,7 +31,7 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Rung, limit_into
+from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import BRIEF, Read, Reading, clearance_rows, read
 from designer.spice.simulator import SimulationFailed, SpiceJob
@@ -196,7 +195,7 @@ def job(
         discard=0 if whole else subject.discard,
         nets=subject.circuit.state_nets,
         shift=subject.shift,
-        clearances=clearance_rows(_rung_reduction(subject).system()),
+        clearances=clearance_rows(subject.system),
         generator=subject.circuit.generator.net,
         keep=keep,
         brief=subject.brief and not subject.orbit.n,
@@ -230,23 +229,6 @@ def task(
 ) -> Task[Read]:
     """The run as one that remedies may change."""
     return Task(partial(job, subject, keep=keep, whole=whole), settings)
-
-
-def _rung_reduction(subject: GateSubject) -> Reduction:
-    """The reduction with the rung's own thresholds, by which impacts are counted.
-
-    On ``full`` the output limits follow the loads, and with them a saturating stage's clearance.
-    The limits of a vendor's model are not known: the board's stand for them.
-    """
-    figures = subject.circuit.figures
-    if subject.rung != "full" or figures is None or figures.spice is not None:
-        return subject.reduction
-    rails = dict(subject.board.rails)
-    for stage in stages(subject.circuit):
-        low, high = rails[stage.section.name]
-        ratio = limit_into(stage.load, figures)
-        rails[stage.section.name] = (ratio * low, ratio * high)
-    return Reduction(subject.circuit, replace(subject.board, rails=rails))
 
 
 def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Excitation) -> float:

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from designer.catalog.entries import OpAmp
 from designer.catalog.fields import Figure
+from designer.catalog.output_stage import HEAVY_LOAD, RATED_LOAD
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
-    HEAVY_LOAD,
     NOISE_FREQUENCY,
-    RATED_LOAD,
     Rung,
     headroom,
     instance,

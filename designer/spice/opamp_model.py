@@ -1,12 +1,13 @@
 """Op-amp models for ngspice, written from the catalogue's data-sheet figures.
 
 Three rungs share one subcircuit, ``opamp`` with the pins ``inp inn out vcc vee`` and, per
-instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground),
-above ``ideal`` ``start`` [V] and, where it is drawn, ``gbw`` [Hz]:
+instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground, at
+the pin as it is loaded), above ``ideal`` ``start`` [V] and, where it is drawn, ``gbw`` [Hz], on
+``full`` ``load`` [ohm], which the limits belong to:
 
 ``ideal``    limits and finite gain, nothing else.
 ``dynamic``  and gain-bandwidth, slew rate, output resistance, recovery from saturation.
-``full``     and a second pole, limits that depend on the load, output current limit, input
+``full``     and a second pole, limits that move with the current, output current limit, input
              common-mode range (with phase reversal where the op-amp has it), supply current, noise.
 
 The models are made so that Newton's method converges at the kinks of the circuits here. Limits are
@@ -14,7 +15,7 @@ XSPICE ``limit`` blocks with a rounded corner; sources with formulas (``B``) cos
 and serve only the supply pins. The offset is a source in series, not the limiter's own parameter:
 with the parameter every op-amp starts beyond its limit, where the slope is zero, and no board with
 offsets ever starts. The output resistance acts before the limit (``Hout``), so that up to
-``dynamic`` the limits are those of the pin whatever the load.
+``dynamic`` the limits are those of the pin whatever the current.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ import math
 from collections.abc import Mapping
 from typing import Literal, get_args
 
-from designer.base.errors import InputError
 from designer.catalog.entries import OpAmp
+from designer.catalog.output_stage import RATED_LOAD, saturation_resistance
 
 Rung = Literal["ideal", "dynamic", "full"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -32,8 +33,8 @@ RUNGS: tuple[Rung, ...] = get_args(Rung)
 PINS = "inp inn out vcc vee"
 LIMIT_RANGE = 1e-3
 """Width [V] over which an output limit's corner is rounded, so that Newton's method converges."""
-RATED_LOAD, HEAVY_LOAD = 10e3, 2e3
-"""Loads [ohm] that the catalogue's ``swing`` (and ``saturation``) and ``swing_2k`` belong to."""
+NO_LOAD = 1e12
+"""Load [ohm] that stands for none."""
 
 ASSUMED_RECOVERY = 1e-6
 """Recovery [s] from a hard overdrive, for op-amps whose data sheet gives none."""
@@ -88,36 +89,6 @@ def second_pole(opamp: OpAmp) -> float:
     return opamp.gbw.nominal * math.sin(margin) * math.tan(margin)
 
 
-def saturation_resistance(opamp: OpAmp) -> float:
-    """Resistance [Ω] by which the output limit falls from one load to the next.
-
-    From the swing into 10 kΩ and into 2 kΩ. Where the second is not given, assumed: all of the
-    distance to the rail at 10 kΩ, but no more than the output resistance.
-    """
-    light = opamp.saturation.nominal
-    if opamp.swing_2k is not None:
-        heavy = min(opamp.swing_2k.nominal, light)
-        if heavy / HEAVY_LOAD <= light / RATED_LOAD:
-            raise InputError(
-                None,
-                f"opamp {opamp.name}.swing_2k",
-                opamp.swing_2k.nominal,
-                f"a swing into 2 kΩ with more current than {light:g} V into 10 kΩ",
-            )
-        return max((light - heavy) / (heavy / HEAVY_LOAD - light / RATED_LOAD), 1e-3)
-    headroom = max(opamp.rated_supply - light, 1e-6)
-    return min(headroom * RATED_LOAD / light, opamp.output_resistance.nominal)
-
-
-def limit_into(load: float, opamp: OpAmp) -> float:
-    """How far the limits of ``full`` into a load [Ω] are from those into the rated one, a ratio.
-
-    By Ohm's law: the limits fall by `saturation_resistance` times the current.
-    """
-    resistance = saturation_resistance(opamp)
-    return (1.0 + resistance / RATED_LOAD) / (1.0 + resistance / load)
-
-
 def instance(
     name: str,
     nets: tuple[str, str, str],
@@ -127,18 +98,18 @@ def instance(
     ib: float,
     rails: tuple[float, float],
     start: float = 0.0,
-    bandwidth: Mapping[str, float] | None = None,
+    more: Mapping[str, float] | None = None,
     supplies: tuple[str, str] = ("vcc", "vee"),
 ) -> str:
     """The element line of one op-amp.
 
     nets : noninverting input, inverting input, output. rails : output limits [V]. start : output
-    voltage at the start of a transient [V]. bandwidth : `bandwidth` of this one; the model's own
-    where None. ``ideal`` has neither memory nor bandwidth, and takes neither.
+    voltage at the start of a transient [V]. more : `bandwidth` and `load` of this one; the model's
+    own where None. ``ideal`` has neither memory nor bandwidth, and takes none of it.
     """
     given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
     if rung != "ideal":
-        given |= {"start": start, **(bandwidth or {})}
+        given |= {"start": start, **(more or {})}
     words = " ".join(f"{key}={literal(value)}" for key, value in given.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
@@ -154,6 +125,12 @@ def bandwidth(rung: Rung, opamp: OpAmp, gbw: float) -> dict[str, float]:
     if rung == "full":
         own["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
     return own
+
+
+def load(rung: Rung, ohms: float) -> dict[str, float]:
+    """Parameter of one op-amp whose limits are those into this load [ohm]: on ``full``, where they
+    move with the current."""
+    return {"load": min(ohms, NO_LOAD)} if rung == "full" else {}
 
 
 def subcircuit(rung: Rung, opamp: OpAmp, gain: float | None = None) -> list[str]:
@@ -196,9 +173,8 @@ def _dynamic(opamp: OpAmp, gain: float) -> list[str]:
 
 def _full(opamp: OpAmp, gain: float) -> list[str]:
     """Common-mode range, pole, second pole, output limit, output current limit, supply pins."""
-    rail = 1.0 / RATED_LOAD
     return [
-        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(opamp, gain)} "
+        f".subckt opamp {PINS} {_EACH} start=0 load={RATED_LOAD!r} {_dynamics(opamp, gain)} "
         f"pole2={literal(second_pole(opamp))} rsat={literal(saturation_resistance(opamp))} "
         f"isc={literal(opamp.output_current.nominal)} iq={literal(opamp.supply_current.nominal)}",
         *_noisy_input(opamp),
@@ -208,8 +184,8 @@ def _full(opamp: OpAmp, gain: float) -> list[str]:
         "Rpole2 w 0 1",
         f"Cpole2 w 0 {{{literal(0.5 / math.pi)}/pole2}} IC={{start}}",
         "Hout z w Vout {rsat-rout}",
-        # The catalogue's limits are those into the rated load.
-        *_output_limit(f"{{low*(1+rsat*{literal(rail)})}}", f"{{high*(1+rsat*{literal(rail)})}}"),
+        # The limits are those into the load: without one the output reaches further.
+        *_output_limit("{low*(1+rsat/load)}", "{high*(1+rsat/load)}"),
         "Acurrent %vd(y drive) %id(y drive) short",
         ".model short limit(in_offset=0 gain={1/rsat} out_lower_limit={-isc} "
         f"out_upper_limit={{isc}} limit_range={{{literal(_CORNER)}*isc}} fraction=FALSE)",

@@ -122,13 +122,14 @@ class _Statics:
         except ArithmeticError:  # a floating net: ngspice shall say it
             return False
         x = np.linalg.solve(mode.A, -(mode.B * volts + mode.d))
+        limits = circuit.output_limits()
         known, voltage = np.concatenate([x, [volts, 1.0]]), reduction.solution(key).voltage
         tops = [
-            abs(float(voltage[section.output] @ known))
+            abs(float(voltage[section.output] @ known)) / limits[section.name]
             for section, position in zip(circuit.sections, key, strict=False)
             if not position
         ]
-        return max(tops) > circuit.saturation
+        return max(tops) > 1.0
 
     def open(self) -> StaticRest | None:
         """All clearances open: up to near the force that closes the first one, either way."""

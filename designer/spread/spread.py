@@ -18,7 +18,13 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.entries import OpAmp
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
+from designer.circuit.netlist import (
+    Board,
+    Capacitor,
+    Circuit,
+    Reference,
+    Resistor,
+)
 from designer.model.distributions import Distribution, Normal, Uniform
 from designer.model.measured_values import MeasuredBoards
 from designer.spread import random_streams
@@ -338,12 +344,13 @@ class _Draw:
         exact = self.same(c.supply)
         above, below = supply.get("VCC", exact), -supply.get("VEE", -exact)  # of ground
 
-        def limit(name: str, rail: Array, sign: float) -> Array:
-            wanted = c.saturation * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
+        def limit(name: str, nominal: float, rail: Array, sign: float) -> Array:
+            wanted = nominal * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
             return self.or_measured(name, sign * np.minimum(wanted, rail))
 
-        low = {s.name: limit(f"{s.name}.low", below, -1.0) for s in c.sections}
-        high = {s.name: limit(f"{s.name}.high", above, 1.0) for s in c.sections}
+        nominal = c.output_limits()
+        low = {name: limit(f"{name}.low", v, below, -1.0) for name, v in nominal.items()}
+        high = {name: limit(f"{name}.high", v, above, 1.0) for name, v in nominal.items()}
         return low, high
 
 

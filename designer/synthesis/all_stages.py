@@ -15,6 +15,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.progress import doing
+from designer.catalog.output_stage import OutputStage
 from designer.circuit.build import constant_resistor
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts
@@ -45,8 +46,8 @@ class StageQuestion:
     """The side conditions."""
     peaks: Peaks
     """What the circuit has to hold."""
-    saturation: float
-    """Output limit of the op-amps, ± [V]."""
+    output: OutputStage
+    """How far the outputs of the op-amps reach."""
     spec: CircuitSpec
     """Its supply, matched, preferred, most_values and slack count."""
     resistors: Array
@@ -230,7 +231,7 @@ class _Sizing:
                 q.stage,
                 q.limits,
                 q.peaks,
-                saturation=q.saturation,
+                output=q.output,
                 supply=q.spec.supply,
                 index=place.index,
             )

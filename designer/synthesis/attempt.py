@@ -13,6 +13,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, OpAmp
+from designer.catalog.output_stage import OutputStage, output_at
 from designer.circuit import build
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
@@ -54,8 +55,8 @@ class Order:
     """What the circuit is to be made of."""
     opamp: OpAmp
     """The op-amp that it is built with."""
-    saturation: float
-    """Output limit of the op-amps, ± [V]."""
+    output: OutputStage
+    """How far the outputs of the op-amps reach."""
     stage: DeadZoneStage
     """The stage that makes the dead zone."""
     peaks: Peaks
@@ -106,7 +107,7 @@ class Order:
             model=model,
             spec=spec,
             opamp=opamp,
-            saturation=spec.saturation or opamp.saturation_at(spec.supply),
+            output=output_at(opamp, spec.supply, spec.saturation),
             stage=dead_zone_stage(model, spec, catalog),
             peaks=peaks,
             resistors=resistors,
@@ -139,7 +140,7 @@ class Order:
             values,
             self.opamp,
             supply=self.spec.supply,
-            saturation=self.saturation,
+            saturation=self.spec.saturation,
             stage=self.stage,
             composites=composites or {},
         )
@@ -244,7 +245,7 @@ def _question(order: Order, limits: ConditionLimits) -> StageQuestion:
         stage=order.stage,
         limits=limits,
         peaks=order.peaks,
-        saturation=order.saturation,
+        output=order.output,
         spec=order.spec,
         resistors=order.resistors,
         base=nearest(order.resistors, BASE),

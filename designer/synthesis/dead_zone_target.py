@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from designer.catalog.diode_curve import diode_model
+from designer.catalog.output_stage import OutputStage
 from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
@@ -40,8 +41,8 @@ class DeadZoneTarget:
     slope: tuple[float, float]
     """Least and largest wanted (fv slope)/R50 [1/ohm]; inside the interval the slope has no
     error."""
-    saturation: float
-    """Output limit of U3C [V]."""
+    output: OutputStage
+    """How far an output reaches, U3C's above all."""
     threshold: float
     """Largest v1 at the stop that keeps every state inside its swing [V]."""
     linear_gain: float
@@ -67,6 +68,11 @@ class DeadZoneTarget:
     """Voltage of the reference [V]."""
     reference_current: tuple[float, float] = (0.0, float("inf"))
     """Least and largest current of the reference [A], margins included."""
+
+    @property
+    def farthest(self) -> float:
+        """What U3C reaches without a load [V]: no load of its own lets it reach further."""
+        return float(self.output.limit_into(np.inf))
 
     @property
     def shift(self) -> tuple[float, float]:
@@ -138,13 +144,14 @@ def target_of(
     limits: ConditionLimits,
     peaks: Peaks,
     *,
-    saturation: float,
+    output: OutputStage,
     supply: float,
     index: int = 0,
 ) -> DeadZoneTarget:
     """What the stage of a clearance has to do beside this linear block.
 
-    values : of the linear block by part name. saturation, supply : ± [V]. index : of the clearance.
+    values : of the linear block by part name. output : of the op-amps. supply : ± [V].
+    index : of the clearance.
     """
     system = model.second_order()
     stop = system.clearances[index]
@@ -163,12 +170,12 @@ def target_of(
         least, most = stage.reference.current.min or 0.0, stage.reference.current.max or np.inf
         current = (REFERENCE_MARGIN * least, most / REFERENCE_MARGIN)
     # Where the swing is no condition an output may go as far as it can.
-    more = 1.0 if "swing" in limits.conditions else saturation / limits.swing
+    more = 1.0 if "swing" in limits.conditions else output.limit / limits.swing
     return DeadZoneTarget(
         mu=mu,
         slope=slope_interval(values, targets, wanted, stop.mass),
-        saturation=saturation,
-        threshold=min(gap * top, saturation / LEAST_GAIN),
+        output=output,
+        threshold=min(gap * top, output.limit / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
         output_gain=more * ((limits.swing - drop) / (top * depth(reach, peak))),
         load=limits.load,

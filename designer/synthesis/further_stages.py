@@ -243,7 +243,7 @@ def _lifts(
     total = sum(float(np.copysign(t.threshold, ends[t.side].gap)) for t in targets)
     out = {}
     for side, half in chosen.halves.items():
-        most = LIFT * target.saturation * half.source / total
+        most = LIFT * target.output.limit * half.source / total
         fine = resistors[resistors <= most]
         out[half_parts(place.index, side).lift] = float(fine[-1] if len(fine) else resistors[0])
     return out

@@ -157,7 +157,7 @@ def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) ->
         defaultdict(lambda: 1.0),
         opamp,
         supply=spec.supply,
-        saturation=spec.saturation or opamp.saturation_at(spec.supply),
+        saturation=spec.saturation,
         stage=dead_zone_stage(model, spec, catalog),
     )
 

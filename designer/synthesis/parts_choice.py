@@ -244,7 +244,7 @@ class _Search:
     def _limits(self, conditions: frozenset[str]) -> ConditionLimits:
         o = self.order
         unit = o.model.second_order().own_frequency
-        return limits(o.spec, conditions, o.opamp, o.saturation, o.peaks.fastest, o.aims, unit)
+        return limits(o.spec, conditions, o.opamp, o.output.limit, o.peaks.fastest, o.aims, unit)
 
     def _rounds(self, conditions: frozenset[str], *, slower: bool) -> _Verified | _Missed:
         """Search, verify, tighten what is not kept, and again."""

@@ -132,7 +132,7 @@ def _with_shift(
     error = error[row]
     shift = steep_gain(both.columns) * t.target.supply * both["R200"] / both["R211"]
     # Only what lies in the range of c has a threshold at all.
-    good = np.flatnonzero(inside(shift / t.target.saturation, t.box.shift))
+    good = np.flatnonzero(inside(shift / t.target.farthest, t.box.shift))
     both, error = both.take(good), error[good]
     worst = np.maximum(error, np.abs(bias(t.target, both.columns, np.exp(u))))
     good = np.flatnonzero(worst <= level)

@@ -71,11 +71,17 @@ def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, flo
 
 
 def threshold(target: DeadZoneTarget, values: Mapping[str, float]) -> float:
-    """v1 at the stop [V]: (Esat - c)/A+."""
+    """v1 at the stop [V]: (Esat - c)/A+, Esat by U3C's load."""
     v = {name: np.asarray(value) for name, value in values.items()}
     steep = steep_gain(v)
     shift = steep * target.supply * v["R200"] / v["R211"] if target.sides != "both" else 0.0
-    return float((target.saturation - shift) / steep)
+    return float((_limit(target, v) - shift) / steep)
+
+
+def _limit(target: DeadZoneTarget, v: Mapping[str, Array]) -> Array:
+    """Esat [V]: U3C drives R203 to a summing node and the divider into another."""
+    behind = v["R204"] + v["R205"] * v["R208"] / (v["R205"] + v["R208"])
+    return np.asarray(target.output.limit_into(1.0 / (1.0 / v["R203"] + 1.0 / behind)))
 
 
 def steep_gain(v: Mapping[str, Array]) -> Array:
@@ -91,7 +97,7 @@ def divider(v: Mapping[str, Array]) -> Array:
 def bias(target: DeadZoneTarget, v: Mapping[str, Array], per_ohm: Array) -> Array:
     """mu (leftover current)/(A-/R209 · threshold): the constant force in units of K1 times b."""
     shift = steep_gain(v) * target.supply * v["R200"] / v["R211"]
-    threshold = (target.saturation - shift) / steep_gain(v)
+    threshold = (_limit(target, v) - shift) / steep_gain(v)
     left = shift / divider(v) - target.supply / v["R212"]
     # A shift as large as the range leaves no threshold: such rows are no choice, whatever is left.
     return np.asarray(target.mu * left / (per_ohm * np.maximum(threshold, 1e-12)))
@@ -125,7 +131,7 @@ class SearchBox:
     ) -> SearchBox:
         """Threshold, A- and fv slope within these factors of their largest."""
         shift = target.shift[0], min(target.shift[1], MOST_SHIFT)
-        top = max(target.saturation * (1.0 - shift[0]) / target.threshold, LEAST_STEEP)
+        top = max(target.farthest * (1.0 - shift[0]) / target.threshold, LEAST_STEEP)
         wanted = target.slope[1]
         return cls(
             steep=(top, top * threshold),
@@ -274,7 +280,7 @@ def tables(
     if target.sides != "both":
         shift = combinations(("R200", "R211", "R212"), lists, equal.group)
         # c = A+ supply R200/R211, with both ends of A+.
-        ratio = target.supply * shift["R200"] / shift["R211"] / target.saturation
+        ratio = target.supply * shift["R200"] / shift["R211"] / target.farthest
         low, high = box.shift
         shift = shift.take((ratio * box.steep[1] >= low) & (ratio * box.steep[0] <= high))
     else:  # with a shift R200 stands in the bias too: equal ratios are not the same

@@ -100,6 +100,7 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         "rules": RULES["samples"],
         "parts": [[type(p).__name__, plain(_simulated(p))] for p in circuit.parts],
         "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
+        **({"limit_into": circuit.saturation_load} if circuit.saturation_load else {}),
         "figures": repr(circuit.figures),
         "spread": plain(plan.spread.as_dict()),
         "seed": plan.seed,

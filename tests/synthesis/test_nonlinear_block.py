@@ -13,6 +13,7 @@ import pytest
 
 from designer.base.eseries import series_values
 from designer.catalog.catalog import load_catalog
+from designer.catalog.output_stage import OutputStage
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.linear_network import linear_search
 from designer.linear_network.linear_terms import Targets
@@ -39,7 +40,8 @@ def target(values: dict[str, float], kind: Literal["saturation", "rectifier"]) -
     within = limits(spec, frozenset({"swing", "load"}), CATALOG.opamp(spec.opamp), 13.0, 1.0)
     stage = dead_zone_stage(MODEL, spec, CATALOG)
     within = replace(within, swing=11.0)
-    return target_of(MODEL, values, stage, within, PEAKS, saturation=13.0, supply=15.0)
+    output = OutputStage(13.0, None, 0.0, "stated")
+    return target_of(MODEL, values, stage, within, PEAKS, output=output, supply=15.0)
 
 
 def linear_block(spread: float, seed: int) -> dict[str, float]:

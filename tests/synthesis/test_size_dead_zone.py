@@ -13,6 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.eseries import series_values
+from designer.catalog.output_stage import OutputStage
 from designer.linear_network.linear_terms import ANY
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
@@ -38,9 +39,12 @@ Kind = Literal["saturation", "rectifier"]
 SETTERS = ("R200", "R202", "R206", "R208", "R209")
 
 
+LIMIT = OutputStage(13.0, None, 0.0, "stated")
+
+
 def target(mu: float = 19.0, threshold: float = 4.0, gain: float = 1.0) -> DeadZoneTarget:
     return DeadZoneTarget(
-        mu=mu, slope=(mu * 2e-5, mu * 2e-5), saturation=13.0, threshold=threshold,
+        mu=mu, slope=(mu * 2e-5, mu * 2e-5), output=LIMIT, threshold=threshold,
         linear_gain=gain, output_gain=2.0 * gain, load=2e3, reference_current=(1.6e-4, 14e-3),
     )  # fmt: skip
 
@@ -164,7 +168,7 @@ def test_never_worse_than_every_choice_that_keeps_the_conditions(seed: int) -> N
         output_gain=8.0,
         noise_gain=[np.inf, 12.0][seed % 2],
     )
-    steep = wanted.saturation / wanted.threshold
+    steep = wanted.farthest / wanted.threshold
     top = wanted.output_gain / wanted.slope[1]
     narrow = Ranges(
         steep=(steep, 1.2 * steep), linear=(1.0, 1.6), stop=(top / 2.5, top), first=1.0,
