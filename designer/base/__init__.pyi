@@ -168,6 +168,7 @@ from .progress import (
     progress_for as progress_for,
 )
 from .proportion import (
+    mid_p as mid_p,
     wilson as wilson,
 )
 from .reason import (

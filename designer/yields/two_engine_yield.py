@@ -15,9 +15,9 @@ of them were lost, and if all were ok, stand beside. The variance is that of two
 S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling Techniques, 1977, 12.2 and 7.2;
 Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
 terms by the method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27,
-2008, 1693): each enters with its own Wilson limits instead of its standard error, D = +1 and
-D = -1 apart. So fifty boards without a difference do not make the exact rung's interval ngspice's:
-the disagreement may be as large as fifty boards can hide.
+2008, 1693): each enters with its own limits instead of its standard error, Wilson's of the yield,
+those of the mid-p value of D = +1 and D = -1. So fifty boards without a difference do not make the
+exact rung's interval ngspice's: the disagreement may be as large as fifty boards can hide, 5.8 %.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from designer.base.proportion import wilson
+from designer.base.proportion import mid_p, wilson
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.read_orbit import STROBE_TOLERANCE
 from designer.verdicts.cross_check import (
@@ -213,7 +213,7 @@ def _off(count: int, could: int, stratum: Stratum) -> tuple[float, float]:
     if stratum.asked == stratum.samples:
         return 0.0, 0.0
     rate = count / stratum.asked
-    low, high = wilson(float(count), stratum.asked)
+    low, high = mid_p(count, stratum.asked)
     high = max(min(high, could / stratum.samples), rate)
     # Of a finite number of boards; what was asked is no longer uncertain.
     finite = math.sqrt(1.0 - stratum.asked / stratum.samples)

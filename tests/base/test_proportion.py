@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
 
-from designer.base.proportion import wilson
+from designer.base.proportion import mid_p, wilson
 
 
 @given(of=st.integers(1, 500), count=st.integers(0, 500))
@@ -32,3 +33,28 @@ def test_an_interval_of_none_or_all_ends_without_rounding(of: int) -> None:
 
 def test_nothing_asked_says_nothing() -> None:
     assert wilson(0, 0) == (0.0, 1.0)
+
+
+@given(st.integers(1, 400), st.data())
+def test_mid_p_limits_leave_a_fortieth_beyond_each(of: int, data: st.DataObject) -> None:
+    count = data.draw(st.integers(0, of))
+    low, high = mid_p(count, of)
+    assert mid_p(of - count, of) == pytest.approx((1.0 - high, 1.0 - low), abs=1e-12)
+    above = 0.5 * (binom.sf(count - 1, of, low) + binom.sf(count, of, low))
+    assert above == pytest.approx(0.025 if count else 0.5, abs=1e-9)
+    below = 0.5 * (binom.cdf(count - 1, of, high) + binom.cdf(count, of, high))
+    assert below == pytest.approx(0.025 if count < of else 0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("of", [30, 50, 200])
+def test_mid_p_is_tight_where_nothing_was_seen_and_still_covers(of: int) -> None:
+    assert mid_p(0, of)[1] == pytest.approx(1.0 - 0.05 ** (1.0 / of))
+    assert mid_p(0, of)[1] < 0.9 * wilson(0, of)[1]
+    rates = np.linspace(0.001, 0.5, 300)
+    limits = [mid_p(k, of) for k in range(of + 1)]
+    covered = [
+        sum(binom.pmf(k, of, rate) for k, (low, high) in enumerate(limits) if low <= rate <= high)
+        for rate in rates
+    ]
+    assert min(covered) > 0.92
+    assert np.mean(covered) > 0.95

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from designer.base.proportion import wilson
 from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     OR,
@@ -81,7 +82,13 @@ def joined(answers: list[Answer], said: dict[int, bool], boundary: bool = True) 
 @pytest.mark.parametrize("boundary", [True, False])
 @pytest.mark.parametrize(
     ("boards", "rate", "gain", "loss"),
-    [(250, 0.9, 0.1, 0.01), (250, 0.5, 0.05, 0.05), (250, 0.8, 0.0, 0.04), (250, 0.97, 0.0, 0.0)],
+    [
+        (250, 0.9, 0.1, 0.01),
+        (250, 0.5, 0.05, 0.05),
+        (250, 0.8, 0.0, 0.04),
+        (250, 0.97, 0.0, 0.0),
+        (250, 1.0, 0.0, 0.06),  # as much as fifty boards hide one time in twenty
+    ],
 )
 def test_estimates_are_unbiased_and_intervals_cover(
     boards: int, rate: float, gain: float, loss: float, boundary: bool
@@ -106,12 +113,26 @@ def test_engines_that_agree_give_the_exact_estimate() -> None:
     assert both.estimate == counted.rate
     low, high = counted.interval
     assert both.low < low < high < both.high  # fifty boards may hide a difference
+    assert both.high - both.low < 0.9 * _by_wilson(both)
     assert both.disagreement.count == 0
     assert both.differences == ()
     everything = [Ask(i, 0, StartKind.NOMINAL, Why.ALL) for i in range(500)]
     whole = combine(answers, listened(answers, said, everything), QUESTION)
     assert whole is not None
     assert (whole.low, whole.high) == pytest.approx((low, high))
+
+
+def _by_wilson(both: Combined) -> float:
+    """The width if the limits of what was not seen were Wilson's: by hand, for no differences."""
+    total = sum(s.samples for s in both.strata)
+    low, high = wilson(both.estimate * total, total)
+    off_low, off_high = 0.0, 0.0
+    for s in both.strata:
+        most = wilson(0, s.asked)[1] * np.sqrt(1.0 - s.asked / s.samples) * s.samples / total
+        off_low += most**2 if s.could_lose else 0.0
+        off_high += most**2 if s.could_gain else 0.0
+    low = both.estimate - np.sqrt((both.estimate - low) ** 2 + off_low)
+    return float(both.estimate + np.sqrt((high - both.estimate) ** 2 + off_high) - low)
 
 
 def test_every_board_in_ngspice_gives_its_own_yield() -> None:
