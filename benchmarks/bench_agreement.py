@@ -96,8 +96,8 @@ def measure(file: ModelFile, samples: int = SAMPLES) -> tuple[list[Row], list[Di
     made = synthesise(file)
     with SpicePool(cores(), timeout=SPICE_TIMEOUT) as pool:
         study = tolerance(made, samples=samples, rung="ngspice", blamed=False, seed=SEED, pool=pool)
-        found = [d for index in study.asked for d in _differences(study, index, pool)]
-    return [_row(study, index, found) for index in study.asked], found
+        found = [d for index in study.response_indices for d in _differences(study, index, pool)]
+    return [_row(study, index, found) for index in study.response_indices], found
 
 
 def _row(study: Study, index: int, found: Sequence[Difference]) -> Row:
@@ -111,7 +111,7 @@ def _row(study: Study, index: int, found: Sequence[Difference]) -> Row:
     words = [h.response for h in heard if h.kind is StartKind.NOMINAL]
     omega = study.checked[index].model.omega
     return Row(
-        response=study.plan.questions[study.asked.index(index)].start.response,
+        response=study.plan.questions[study.response_indices.index(index)].start.response,
         omega=omega,
         samples=len(nominal),
         agreed=nominal.count(True),
@@ -126,7 +126,7 @@ def _row(study: Study, index: int, found: Sequence[Difference]) -> Row:
 
 
 def _differences(study: Study, index: int, pool: SpicePool) -> list[Difference]:
-    number = study.asked.index(index)
+    number = study.response_indices.index(index)
     question = study.plan.questions[number]
     answers = {a.sample: a for a in study.answers_to(index)}
     heard = {

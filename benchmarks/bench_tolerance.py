@@ -37,7 +37,7 @@ from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
-from designer.yields.layers import Here, samples_task
+from designer.yields.layers import LocalRunner, samples_task
 from designer.yields.study import plan_study
 
 ROOT = Path(__file__).parent.parent
@@ -136,7 +136,7 @@ def memory(plan: StudyPlan, samples: int) -> float:
 def _memory(plan: StudyPlan, samples: int) -> float:
     asked = replace(plan, samples=samples)
     tasks = (samples_task(asked, block) for block in asked.blocks())
-    kept = [answers for _, answers in Here(cores()).run(tasks, lambda: None)]
+    kept = [answers for _, answers in LocalRunner(cores()).run(tasks, lambda: None)]
     assert sum(len(answers) for answers in kept) == samples * len(plan.questions)
     # Not getrusage: what it tells of a new process includes the one that started it.
     status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -157,7 +157,7 @@ def measure(
             longest = 0
             wanted = replace(asked, samples=samples)
             tasks = (samples_task(wanted, block) for block in wanted.blocks())
-            for _, answers in Here(cores()).run(tasks, lambda: None):
+            for _, answers in LocalRunner(cores()).run(tasks, lambda: None):
                 verdicts.update(answer.verdict for answer in answers)
                 longest = max(longest, *(answer.periods for answer in answers))
             seconds, cpu = time.perf_counter() - began, time.process_time() - spent

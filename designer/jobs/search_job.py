@@ -40,7 +40,7 @@ from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts import ngspice_runs
 from designer.verdicts.cross_check import Ask, StartKind, Why
 from designer.verdicts.verdict import Answer, Verdict
-from designer.yields.layers import Here
+from designer.yields.layers import LocalRunner
 from designer.yields.tolerance_study import StudyEngine, check
 
 CONFIRMATION = "confirmation.json"
@@ -162,7 +162,7 @@ def _confirm(
     study = study_of(
         synthesis,
         replace(options, rung="exact", blamed=False, blame_budget=None),
-        StudyHelp(jobs, None, Here(jobs)),
+        StudyHelp(jobs, None, LocalRunner(jobs)),
         check(synthesis, None, progress),
         stores,
         progress,
@@ -186,8 +186,8 @@ def _confirm(
         step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
         cross_checks = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
     answers = {(a.sample, a.question): a for a in study.answers}
-    rows = confirmation_json(cross_checks, answers, study.asked, len(study.checked))
-    for index, limit, gate in zip(study.asked, limits, gates, strict=True):
+    rows = confirmation_json(cross_checks, answers, study.response_indices, len(study.checked))
+    for index, limit, gate in zip(study.response_indices, limits, gates, strict=True):
         rows[index]["limited_by"] = limit.as_dict()
         rows[index]["gate"] = gate.as_dict()
     return {"rung": RUNG, "responses": rows}

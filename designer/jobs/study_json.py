@@ -152,14 +152,14 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
         **_counted(count(rows, study.plan.census)),
         "reasons": reasons((a.verdict, a.reason) for a in rows),
         "clipped_at_start": sum(r.clipped for r in rows),
-        "recipe": study.recipes[study.asked.index(index)].as_dict(),
+        "recipe": study.recipes[study.response_indices.index(index)].as_dict(),
     }
 
 
 def _blame(study: Study, index: int) -> dict[str, Any] | None:
-    if study.blame is None or index not in study.asked:
+    if study.blame is None or index not in study.response_indices:
         return None
-    blame: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    blame: dict[str, Any] = study.blame.as_dict()["responses"][study.response_indices.index(index)]
     return blame
 
 

@@ -43,7 +43,7 @@ from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.yields.blame_analysis import BlameStage
 from designer.yields.blame_replay import BUDGET
-from designer.yields.layers import Here, Runner
+from designer.yields.layers import LocalRunner, Runner
 from designer.yields.study import RunResult, Study
 from designer.yields.study_identity import RULES, checks_hash
 from designer.yields.tolerance_study import Stores, check, tolerance
@@ -120,7 +120,7 @@ class StudyHelp:
                 progress.stage("ngspice")
                 pool = stack.enter_context(SpicePool(options.workers, timeout=SPICE_TIMEOUT))
                 require_ngspice(pool)
-            runner: Runner = Here(options.workers)
+            runner: Runner = LocalRunner(options.workers)
             if options.cluster is not None:
                 from designer.jobs.dask_runner import Cluster
 
@@ -283,7 +283,7 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
     samples = folder.json(place.prefix + TOLERANCE)["samples"]
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
     options = Options(stage.inputs["seed"], samples=samples, rung="exact", blamed=False)
-    help_ = StudyHelp(options.workers, None, Here(options.workers))
+    help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
     return study_of(synthesis, options, help_, check(synthesis, None), stores)
 
 

@@ -98,7 +98,7 @@ class ReportData:
 
     def question_of(self, response: int) -> int | None:
         """The question of the plan that asks for a response; None where it was left out."""
-        asked = self.study.asked
+        asked = self.study.response_indices
         return asked.index(response) if response in asked else None
 
     def blame_of(self, response: int) -> ResponseBlame | None:

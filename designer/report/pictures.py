@@ -67,7 +67,7 @@ def pictures(data: ReportData) -> Pictures:
         out["portraits"] = _portraits(data, element)
         out |= _study_pictures(data, element)
     for one in data.study.maps:
-        label = words.label(data.checked[data.study.asked[one.question]], " ")
+        label = words.label(data.checked[data.study.response_indices[one.question]], " ")
         svg = element(map_plots.map_chart(label, one), f"Yield over {one.over} of {label}.")
         out[f"map {label} {one.over}"] = Picture(svg=svg)
     if data.design.errors.max_error > EXACT:

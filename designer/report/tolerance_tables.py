@@ -118,11 +118,12 @@ def differences(data: ReportData) -> Table | None:
 
 
 def recipes(data: ReportData) -> Table | None:
+    study = data.study
     rows = [(words.name(c), text) for c, text in zip(data.checked, data.starts, strict=False)]
     if not data.starts:
         rows = [
             (words.name(data.checked[i]), recipe.text)
-            for i, recipe in zip(data.study.asked, data.study.recipes or (), strict=False)
+            for i, recipe in zip(study.response_indices, study.recipes or (), strict=False)
         ]
     return table(("response", "how to reach it"), [row for row in rows if row[1]])
 
@@ -197,7 +198,7 @@ def corners(data: ReportData) -> Table | None:
 def maps(data: ReportData) -> Table | None:
     """Window, setting in use and recommended setting of each yield map."""
     columns: dict[str, Callable[[YieldMap], str]] = {
-        "response": lambda one: words.name(data.checked[data.study.asked[one.question]]),
+        "response": lambda one: words.name(data.checked[data.study.response_indices[one.question]]),
         "over": lambda one: " × ".join("ω" if a.name == "omega" else a.name for a in one.axes),
         "nominal window": _window,
         "in use": _in_use,

@@ -173,9 +173,9 @@ def margin_share(answer: Answer, nominal: Orbit) -> float:
         (answer.miss, nominal.miss),
     )
     shares = [
-        mine / theirs
-        for mine, theirs in pairs
-        if math.isfinite(mine) and math.isfinite(theirs) and theirs > 0.0
+        margin / reference
+        for margin, reference in pairs
+        if math.isfinite(margin) and math.isfinite(reference) and reference > 0.0
     ]
     return max(min(shares, default=math.inf), 0.0)
 
@@ -196,16 +196,16 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
 
 
 def ask_boundary(
-    answers: Iterable[Answer], questions: Sequence[Question], known: Iterable[Ask] = ()
+    answers: Iterable[Answer], questions: Sequence[Question], earlier: Iterable[Ask] = ()
 ) -> list[Ask]:
     """The `BOUNDARY_SAMPLES` boards of each response that are nearest to a boundary, from both
-    starts, without what is ``known``."""
+    starts, without the ``earlier`` asks."""
     near: list[list[tuple[float, int]]] = [[] for _ in questions]
     for a in answers:
         far = margin_share(a, questions[a.question].start) if _orbits(a) else math.inf
         if far < math.inf:
             near[a.question].append((far, a.sample))
-    have = {k.key for k in known}
+    have = {k.key for k in earlier}
     return [
         Ask(sample, question, kind, Why.BOUNDARY)
         for question, boards in enumerate(near)
@@ -216,12 +216,12 @@ def ask_boundary(
 
 
 def ask_differing(
-    answers: Iterable[Answer], checks: Iterable[CrossCheck], known: Iterable[Ask] = ()
+    answers: Iterable[Answer], checks: Iterable[CrossCheck], earlier: Iterable[Ask] = ()
 ) -> list[Ask]:
     """From its own orbit, every board on which ngspice finds another response from the nominal one,
-    without what is ``known``: where it stays there, the difference is one of basins."""
+    without the ``earlier`` asks: where it stays there, the difference is one of basins."""
     mine = {(a.sample, a.question): a for a in answers}
-    have = {k.key for k in known}
+    have = {k.key for k in earlier}
     return [
         Ask(c.sample, c.question, StartKind.OWN, Why.DIFFERS)
         for c in checks

@@ -56,14 +56,14 @@ def of_boards(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Answer]:
     """``block`` of what the boards of these samples have become, by an adjustment on the board."""
-    return [answer for answer, _, _ in _asked(plan, boards, indices, jobs, progress)]
+    return [answer for answer, _, _ in _settled_boards(plan, boards, indices, jobs, progress)]
 
 
 def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, GateSubject | None]]:
     """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
-    drawn = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    drawn_boards = draw_many(plan.circuit, plan.spread, plan.seed, indices)
     pairs: list[tuple[Answer, GateSubject | None]] = []
-    for answer, orbit, boards in _asked(plan, drawn, indices, jobs, lambda: None):
+    for answer, orbit, boards in _settled_boards(plan, drawn_boards, indices, jobs, lambda: None):
         subject = None
         if len(orbit.start):
             reduction = boards.reduction(answer.sample - indices.start)
@@ -73,21 +73,21 @@ def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, G
     return pairs
 
 
-def _asked(
-    plan: StudyPlan, drawn: Boards, indices: range, jobs: int, progress: Callable[[], None]
+def _settled_boards(
+    plan: StudyPlan, board_arrays: Boards, indices: range, jobs: int, progress: Callable[[], None]
 ) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
-    boards = Ensemble(drawn, jobs=jobs)
-    asked = plan.asked(indices)
+    boards = Ensemble(board_arrays, jobs=jobs)
+    pairs = plan.rows(indices)
     settled = boards.respond(
-        [i for i, _ in asked],
-        [plan.questions[number].excitation.drive for _, number in asked],
-        np.array([plan.questions[number].start.start for _, number in asked]),
+        [i for i, _ in pairs],
+        [plan.questions[number].excitation.drive for _, number in pairs],
+        np.array([plan.questions[number].start.start for _, number in pairs]),
         jobs=jobs,
         progress=progress,
     )
     twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
     wanted = [images(_nominal_displacement(plan, q), mirror=twins) for q in plan.questions]
-    for (i, number), response in zip(asked, settled, strict=True):
+    for (i, number), response in zip(pairs, settled, strict=True):
         orbit = response.orbit
         verdict, reason = plan.questions[number].judge(orbit)
         waveform = float("nan")
@@ -120,12 +120,12 @@ def images(wanted: Array, *, mirror: bool = False) -> Array:
     return np.array(shifted).reshape(len(shifted), len(wanted))
 
 
-def waveform_error(shown: Array, wanted: Array) -> float:
+def waveform_error(waveform: Array, wanted: Array) -> float:
     """RMS difference of a displacement (m,) and the ``images`` (k, m) that are wanted, from the
     nearest of them, over their peak; nan where they have different periods."""
-    if shown.shape != wanted.shape[1:] or not len(wanted):
+    if waveform.shape != wanted.shape[1:] or not len(wanted):
         return float("nan")
-    square = ((wanted - shown) ** 2).mean(axis=1).min()
+    square = ((wanted - waveform) ** 2).mean(axis=1).min()
     return float(np.sqrt(square) / np.abs(wanted[0]).max())
 
 

@@ -150,8 +150,8 @@ def checks_run(
     ------
     None where the exact rung has no orbit or the response no settings.
     """
-    asked: dict[int, tuple[int, Ask]] = {}
-    known: deque[tuple[int, CrossCheck | None]] = deque()
+    ask_of: dict[int, tuple[int, Ask]] = {}
+    ready_rows: deque[tuple[int, CrossCheck | None]] = deque()
 
     def queries() -> Iterator[Query]:
         first = 0
@@ -161,20 +161,20 @@ def checks_run(
                 if isinstance(query, Query):
                     ready.append((k, ask, query))
                 else:
-                    known.append((k, query))
+                    ready_rows.append((k, query))
             for k, ask, query in sorted(ready, key=lambda one: -one[2].steps):
-                asked[len(asked)] = k, ask
+                ask_of[len(ask_of)] = k, ask
                 yield query
             first += len(block)
 
     for number, (query, answer) in queries_run(pool, queries()):
-        yield from _taken(known)
-        k, ask = asked[number]
+        yield from _drained(ready_rows)
+        k, ask = ask_of[number]
         yield k, _row(ask, answer, query.subject.discard)
-    yield from _taken(known)
+    yield from _drained(ready_rows)
 
 
-def _taken(items: deque[T]) -> Iterator[T]:
+def _drained(items: deque[T]) -> Iterator[T]:
     """The items, each of which is then gone."""
     while items:
         yield items.popleft()
@@ -256,18 +256,18 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     peak = np.abs(orbit.extremes).max(axis=1)
-    x, mode, done, arrived = start, None, 0, 0
+    x, mode, periods, arrived = start, None, 0, 0
     stay = max(STRETCH, least)
-    while done - arrived < stay:
+    while periods - arrived < stay:
         if arrived > MOST_PERIODS:
             return math.inf
-        way = flow.run(x, stay - (done - arrived), mode=mode)
+        way = flow.run(x, stay - (periods - arrived), mode=mode)
         if way.status is not FlowStatus.DONE:
             return math.inf
         gap = (np.abs(way.strobes[:, None] - laps) / peak).max(axis=2).min(axis=1)
         far = np.flatnonzero(gap > REMAINDER)
-        arrived = done + int(far[-1]) + 1 if len(far) else arrived
-        done += len(way.strobes) - 1
+        arrived = periods + int(far[-1]) + 1 if len(far) else arrived
+        periods += len(way.strobes) - 1
         x, mode = way.strobes[-1], way.mode
     return max(least, arrived)
 
@@ -303,12 +303,12 @@ def queries_run(
     """`run_queries` as the answers come, with the number of the query."""
     queue = RunQueue((_Run(q, q.subject, q.settings) for q in queries), _task)
     for number, outcome in remedies.run(pool, queue):
-        index, tried = queue.ended(number)
-        follows = _after(tried, _answer_of(outcome))
+        index, run = queue.ended(number)
+        follows = _after(run, _answer_of(outcome))
         if isinstance(follows, _Run):
             queue.again.append((index, follows))
         else:
-            yield index, (tried.query, follows)
+            yield index, (run.query, follows)
 
 
 @dataclass(frozen=True)
@@ -323,35 +323,35 @@ class _Run:
     before: str | None = None
 
 
-def _task(tried: _Run) -> Task[Read]:
-    return numerics_gate.task(tried.subject, tried.settings)
+def _task(run: _Run) -> Task[Read]:
+    return numerics_gate.task(run.subject, run.settings)
 
 
-def _after(tried: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
+def _after(run: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
     """The run that follows, or the final answer."""
-    query, fine = tried.query, FINER**tried.round
+    query, fine = run.query, FINER**run.round
     answer = replace(answer, finer=fine)
     none, expected = not is_answer(answer.response), answer.response == query.expected
-    same = not none and answer.response == (tried.before or query.expected)
-    if same and (expected or tried.round >= SURE_ROUND):
+    same = not none and answer.response == (run.before or query.expected)
+    if same and (expected or run.round >= SURE_ROUND):
         return answer
-    more = longer(tried.subject)
+    more = longer(run.subject)
     # A few strobes of a motion without a period may look like one.
-    brief = tried.subject.brief and query.expected == OrbitStatus.APERIODIC
+    brief = run.subject.brief and query.expected == OrbitStatus.APERIODIC
     if (
         (answer.response == OrbitStatus.NOT_SETTLED or (brief and not none))
-        and tried.subject.judged < LONG
+        and run.subject.judged < LONG
         and fine * numerics_gate.length(more) <= MOST_AGAIN
     ):
-        return replace(tried, subject=more)
+        return replace(run, subject=more)
     if (
-        tried.round < query.refinements
-        and FINER * fine * numerics_gate.length(tried.subject) <= MOST_AGAIN
+        run.round < query.refinements
+        and FINER * fine * numerics_gate.length(run.subject) <= MOST_AGAIN
     ):
-        finer = replace(tried.settings, max_step=tried.settings.max_step / FINER)
-        before = tried.before if none else answer.response
-        return replace(tried, settings=finer, round=tried.round + 1, before=before)
-    return answer if none or same else _undecided(tried.before, answer)
+        finer = replace(run.settings, max_step=run.settings.max_step / FINER)
+        before = run.before if none else answer.response
+        return replace(run, settings=finer, round=run.round + 1, before=before)
+    return answer if none or same else _undecided(run.before, answer)
 
 
 def longer(subject: GateSubject) -> GateSubject:
@@ -374,8 +374,8 @@ def _undecided(before: str | None, answer: NgspiceAnswer) -> NgspiceAnswer:
 
 
 def _answer_of(outcome: remedies.AidedRun[Read]) -> NgspiceAnswer:
-    tried = " ".join(outcome.tried)
+    aids = " ".join(outcome.tried)
     if isinstance(outcome.result, SimulationFailed):
-        return NgspiceAnswer(str(OrbitStatus.FAILED), outcome.result.reason, tried)
+        return NgspiceAnswer(str(OrbitStatus.FAILED), outcome.result.reason, aids)
     orbit = outcome.result.orbit
-    return NgspiceAnswer(orbit.response, orbit.reason, tried, bool(orbit.symmetric))
+    return NgspiceAnswer(orbit.response, orbit.reason, aids, bool(orbit.symmetric))

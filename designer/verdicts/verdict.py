@@ -128,7 +128,7 @@ class StudyPlan:
         for first in range(0, self.samples, size):
             yield range(first, min(first + size, self.samples))
 
-    def asked(self, indices: range) -> list[tuple[int, int]]:
+    def rows(self, indices: range) -> list[tuple[int, int]]:
         """(place among these samples, question) of every row of a block, in order."""
         return [(i, k) for i in range(len(indices)) for k in range(len(self.questions))]
 

@@ -16,8 +16,8 @@ from .blame_replay import (
 )
 from .layers import (
     LAYERS as LAYERS,
-    Here as Here,
     LayerName as LayerName,
+    LocalRunner as LocalRunner,
     Runner as Runner,
     Step as Step,
     Task as Task,

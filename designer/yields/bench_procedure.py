@@ -75,8 +75,8 @@ def find_on_bench(
     seed : of the readings. Where the pattern is seen nowhere, the setting is the one as built.
     """
     person = _Person(system, question, bands, np.random.default_rng([*seed, TAG]))
-    seen = person.look(AS_BUILT) or person.centre() or person.sweep()
-    return BenchResult(person.setting if seen else AS_BUILT, person.state, seen, person.steps)
+    is_seen = person.look(AS_BUILT) or person.centre() or person.sweep()
+    return BenchResult(person.setting if is_seen else AS_BUILT, person.state, is_seen, person.steps)
 
 
 class _Person:
@@ -113,12 +113,12 @@ class _Person:
         periods = wanted.n * max(-(-WATCHED // wanted.n), 3)
         flow = Flow(self.system, setting.of(self.question.excitation).drive)
         waited = flow.run(self.state, DWELL)
-        shown = flow.run(waited.strobes[-1], periods, mode=waited.mode, points=POINTS)
-        if {waited.status, shown.status} != {FlowStatus.DONE}:
+        run = flow.run(waited.strobes[-1], periods, mode=waited.mode, points=POINTS)
+        if {waited.status, run.status} != {FlowStatus.DONE}:
             self.state = self.question.start.start  # switched off and on again
             return False
-        self.state = shown.strobes[-1]
-        states = shown.strobes[:-1]
+        self.state = run.strobes[-1]
+        states = run.strobes[:-1]
         trace = states[:, self.system.moving]
         self.high, self.low = self._read(float(trace.max())), self._read(float(trace.min()))
         wave = flow.drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS)
@@ -134,19 +134,19 @@ class _Person:
         def uneven() -> float:
             return (self.high - stops[1]) - (stops[-1] - self.low)
 
-        before, here, error = 0.0, min(FIRST_OFFSET, self.bands.offset), uneven()
+        before, offset, error = 0.0, min(FIRST_OFFSET, self.bands.offset), uneven()
         for _ in range(CENTRING_STEPS):
-            if abs(error) <= self.step or here == before:
+            if abs(error) <= self.step or offset == before:
                 break
-            here = round(here, DIGITS)
-            if self.look(Adjustment(offset=here)):
+            offset = round(offset, DIGITS)
+            if self.look(Adjustment(offset=offset)):
                 return True
             now = uneven()
-            slope = (now - error) / (here - before)
+            slope = (now - error) / (offset - before)
             change = -now / slope if slope else 0.0
             change = min(max(change, -2.0 * FIRST_OFFSET), 2.0 * FIRST_OFFSET)
-            before, error = here, now
-            here = min(max(here + change, -self.bands.offset), self.bands.offset)
+            before, error = offset, now
+            offset = min(max(offset + change, -self.bands.offset), self.bands.offset)
         return False
 
     def sweep(self) -> bool:
@@ -154,10 +154,10 @@ class _Person:
         centred = self.setting.offset
         return any(self.look(setting) for setting in _snake(centred, self.bands))
 
-    def _shows(self, trace: Array, seen: Array, wanted: int) -> bool:
+    def _shows(self, trace: Array, signals: Array, wanted: int) -> bool:
         """Whether v1 over whole multiples of the wanted period is the wanted pattern to the eye.
 
-        seen : (k, states + 1) states and generator, of which the stages' outputs are made.
+        signals : (k, states + 1) states and generator, of which the stages' outputs are made.
         """
         laps = trace.reshape(-1, POINTS)
         n = next(
@@ -170,11 +170,11 @@ class _Person:
         )
         if n != wanted:
             return False
-        pulses = [stage.pulses(seen) for stage in self.stages] or [(0, 0)]
-        shown = len(laps) // n
-        if any(count % shown for pair in pulses for count in pair):
+        pulses = [stage.pulses(signals) for stage in self.stages] or [(0, 0)]
+        repeats = len(laps) // n
+        if any(count % repeats for pair in pulses for count in pair):
             return False
-        counts = tuple((upper // shown, lower // shown) for upper, lower in pulses)
+        counts = tuple((upper // repeats, lower // repeats) for upper, lower in pulses)
         return self.question.wanted.accepts(Counts(n, counts))
 
     def _read(self, volts: float) -> float:
@@ -207,10 +207,10 @@ class _Stage:
         inside = min((abs(place) for place in stops.values()), default=peak)
         return cls(row, stops, SEEN * max(peak - inside, 0.0))
 
-    def pulses(self, seen: Array) -> tuple[int, int]:
+    def pulses(self, signals: Array) -> tuple[int, int]:
         """How often the displacement goes far enough beyond the upper and the lower stop to be seen
         on the stage's output; the trace is a loop."""
-        trace = seen @ self.row
+        trace = signals @ self.row
 
         def count(side: int) -> int:
             if side not in self.stops:

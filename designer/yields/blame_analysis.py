@@ -97,8 +97,8 @@ class Blame:
             rows.append(row)
         cost = {"attractors": self.attractors, "orbits": self.orbits, "seconds": self.seconds}
         out = {"samples": self.samples, "seed": self.seed, "responses": rows, "cost": cost}
-        shown: dict[str, Any] = plain(out)
-        return shown
+        document: dict[str, Any] = plain(out)
+        return document
 
 
 def blame(
@@ -106,7 +106,7 @@ def blame(
     answers: Sequence[Answer],
     *,
     lost: int = LOST,
-    kept: int = KEPT,
+    ok: int = KEPT,
     budget: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
@@ -114,7 +114,7 @@ def blame(
 ) -> Blame:
     """Blame the parts for the losses among these answers (as built, exact rung).
 
-    answers : of any of the plan's samples, in any order. lost, kept : boards of each response that
+    answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
     are replayed, at most. budget : steps of the work (``blame_replay``); all of it if None.
     progress : called once for each of the extent's steps. parts : the finished ones of this very
     blame, and where the others go. The same answers and budget give the same blame but for
@@ -131,7 +131,7 @@ def blame(
         return step
 
     parts = StoredParts() if parts is None else parts
-    extent = extent_of(plan, answers, budget, lost=lost, kept=kept)
+    extent = extent_of(plan, answers, budget, lost=lost, ok=ok)
     attractor, orbit = count_as("attractors"), count_as("orbits")
     blamed, cut = replay(plan, extent, parts, jobs, attractor)
     margins = margin_limits.margins(

@@ -135,8 +135,8 @@ class Extent:
     @property
     def hopeless(self) -> list[bool]:
         """Of each question, whether boards were lost and none is ok."""
-        seen = [{a.verdict for a in row} for row in self.rows]
-        return [Verdict.LOST in verdicts and Verdict.OK not in verdicts for verdicts in seen]
+        outcomes = [{a.verdict for a in row} for row in self.rows]
+        return [Verdict.LOST in verdicts and Verdict.OK not in verdicts for verdicts in outcomes]
 
 
 def extent_of(
@@ -145,11 +145,11 @@ def extent_of(
     budget: int | None = None,
     *,
     lost: int = LOST,
-    kept: int = KEPT,
+    ok: int = KEPT,
 ) -> Extent:
     """What a blame of these answers does within a budget of so many steps; without one, all.
 
-    answers : of any of the plan's samples, in any order. lost, kept : boards of each response that
+    answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
     are replayed, at most. The nominal board and the corners are always looked at, and so is one
     board at least of each response that lost any.
     """
@@ -159,20 +159,20 @@ def extent_of(
         tuple(sorted((a for a in answers if a.question == i), key=lambda a: a.sample))
         for i in range(len(plan.questions))
     )
-    again, followed = _replays(rows, (lost, kept)), _in_turn(lost_boards(rows))
+    again, followed = _replays(rows, (lost, ok)), _in_turn(lost_boards(rows))
     samples = sorted({r.sample for r in again})
     changes = _changes(plan.circuit, boards.take(samples)) if samples else []
     around = 2 * len(quantities(plan.circuit, boards))
     least = len(rows) * (around + 2**CORNER)
     costs = (len(changes), ROUNDS + around)
-    whole = least + len(again) * costs[0] + len(followed) * costs[1]
-    if budget is not None and budget < whole:
-        share = max(budget - least, 0) / max(whole - least, 1)  # nothing lost: no more to do
+    total = least + len(again) * costs[0] + len(followed) * costs[1]
+    if budget is not None and budget < total:
+        share = max(budget - least, 0) / max(total - least, 1)  # nothing lost: no more to do
         # The first boards in turn are one of each response.
         again = again[: max(int(share * len(again)), len({r.question for r in again}))]
         followed = followed[: max(int(share * len(followed)), len({q for q, _ in followed}))]
     steps = least + len(again) * costs[0] + len(followed) * costs[1]
-    return Extent(boards, rows, tuple(changes), tuple(again), tuple(followed), steps, whole)
+    return Extent(boards, rows, tuple(changes), tuple(again), tuple(followed), steps, total)
 
 
 def _in_turn(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -189,14 +189,14 @@ def _replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[_R
     rows : the answers to each question, by sample. most : lost and ok boards of each. A question
     that lost no board has none.
     """
-    found = [
+    replays = [
         _Replay(i, a.sample, verdict, place, place / limit)
         for i, row in enumerate(rows)
         if any(a.verdict is Verdict.LOST for a in row)
         for verdict, limit in zip((Verdict.LOST, Verdict.OK), most, strict=True)
         for place, a in enumerate(islice((a for a in row if a.verdict is verdict), limit))
     ]
-    return sorted(found, key=lambda r: (r.turn, r.question, r.sample))
+    return sorted(replays, key=lambda r: (r.turn, r.question, r.sample))
 
 
 def _changes(circuit: Circuit, boards: Boards) -> list[_Change]:
@@ -249,12 +249,12 @@ def replay(
     it is stored.
     """
     first = [r for r in extent.replays if r.before is Verdict.LOST and r.place < PROBE]
-    seen = _all(plan, extent, first, parts, jobs, progress)
-    saved = {r.question for r in first if Verdict.OK in seen[r]}
+    verdicts = _all(plan, extent, first, parts, jobs, progress)
+    saved = {r.question for r in first if Verdict.OK in verdicts[r]}
     cut = [hopeless and i not in saved for i, hopeless in enumerate(extent.hopeless)]
-    rest = [r for r in extent.replays if r not in seen and not cut[r.question]]
-    seen |= _all(plan, extent, rest, parts, jobs, progress)
-    return [_blamed(i, extent.changes, seen) for i in range(len(plan.questions))], cut
+    rest = [r for r in extent.replays if r not in verdicts and not cut[r.question]]
+    verdicts |= _all(plan, extent, rest, parts, jobs, progress)
+    return [_blamed(i, extent.changes, verdicts) for i in range(len(plan.questions))], cut
 
 
 def _all(
@@ -266,20 +266,20 @@ def _all(
     progress: Callable[[], None],
 ) -> dict[_Replay, list[Verdict]]:
     """What each board shows with each change; stored results are not computed again."""
-    seen: dict[_Replay, list[Verdict]] = {}
+    results: dict[_Replay, list[Verdict]] = {}
     for r in replays:
-        known = parts.get(r.part)
-        if known is not None:
-            seen[r] = [_VERDICTS[letter] for letter in known]
+        letters = parts.get(r.part)
+        if letters is not None:
+            results[r] = [_VERDICTS[letter] for letter in letters]
             for _ in extent.changes:
                 progress()
-    missing = [r for r in replays if r not in seen]
+    missing = [r for r in replays if r not in results]
     for start in range(0, len(missing), TOGETHER):
         some = missing[start : start + TOGETHER]
         columns = _some(plan, extent, some, jobs, progress)
-        seen |= {r: list(row) for r, row in zip(some, zip(*columns, strict=True), strict=True)}
-        parts.put({r.part: "".join(str(v)[0] for v in seen[r]) for r in some})
-    return seen
+        results |= {r: list(row) for r, row in zip(some, zip(*columns, strict=True), strict=True)}
+        parts.put({r.part: "".join(str(v)[0] for v in results[r]) for r in some})
+    return results
 
 
 def _some(
@@ -291,30 +291,30 @@ def _some(
 ) -> list[list[Verdict]]:
     """For each change the verdicts of these boards with it."""
     samples = sorted({r.sample for r in replays})
-    drawn = extent.boards.take(samples)
-    asked = [(samples.index(r.sample), plan.questions[r.question]) for r in replays]
-    cases: list[Case] = [(board, q, q.excitation, q.start.start) for board, q in asked]
+    boards = extent.boards.take(samples)
+    pairs = [(samples.index(r.sample), plan.questions[r.question]) for r in replays]
+    cases: list[Case] = [(board, q, q.excitation, q.start.start) for board, q in pairs]
 
     def one(change: _Change) -> list[Verdict]:
-        rows = settled(Ensemble(change.of(drawn)), cases, progress=progress)
+        rows = settled(Ensemble(change.of(boards)), cases, progress=progress)
         return [verdict for _, verdict, _ in rows]
 
     return list(parallel(one, extent.changes, jobs))
 
 
 def _blamed(
-    question: int, changes: Sequence[_Change], seen: dict[_Replay, list[Verdict]]
+    question: int, changes: Sequence[_Change], every: dict[_Replay, list[Verdict]]
 ) -> tuple[BlamedPart, ...]:
-    own = {r: verdicts for r, verdicts in seen.items() if r.question == question}
-    if not own:
+    results = {r: verdicts for r, verdicts in every.items() if r.question == question}
+    if not results:
         return ()
     out = []
     for k, change in enumerate(changes):
-        tally = Counter((r.before, verdicts[k]) for r, verdicts in own.items())
-        replayed, kept = (
+        tally = Counter((r.before, verdicts[k]) for r, verdicts in results.items())
+        replayed, ok = (
             sum(tally[before, now] for now in Verdict if now is not Verdict.FAILED)
             for before in (Verdict.LOST, Verdict.OK)
         )
         avoided, caused = tally[Verdict.LOST, Verdict.OK], tally[Verdict.OK, Verdict.LOST]
-        out.append(BlamedPart(change.name, change.kind, avoided, replayed, caused, kept))
+        out.append(BlamedPart(change.name, change.kind, avoided, replayed, caused, ok))
     return tuple(sorted(out, key=lambda p: (-p.avoided, p.caused, p.name)))

@@ -48,7 +48,7 @@ class Runner(Protocol):
         """(index, rows) as tasks finish; ``step`` is called once a row."""
 
 
-class Here:
+class LocalRunner:
     """This process, with ``jobs`` threads a task. The next task begins before one is done: a block
     ends with its slowest boards, on fewer threads than there are."""
 
@@ -75,31 +75,31 @@ def fill(
 ) -> list[Row]:
     """Every row of a layer with one row for each sample and question, by sample and question.
 
-    What ``store`` holds is not computed again; what is, goes there at once. task : computes the
-    rows of a range of samples. first : a block's edge, where to begin.
+    Rows in ``store`` are not computed again; new rows are written there at once. task : computes
+    the rows of a range of samples. first : a block's edge, where to begin.
     """
     rows: dict[int, list[Row]] = {}
     missing: list[tuple[range, list[Row]]] = []
     for block in plan.blocks(size):
         if block.start < first:
             continue
-        known = [] if store is None else store.read(block)
-        whole, rest = divmod(len(known), len(plan.questions))
-        if rest or (known and known[-1].sample != block.start + whole - 1):
-            known, whole = [], 0
-        for _ in known:
+        stored = [] if store is None else store.read(block)
+        count, rest = divmod(len(stored), len(plan.questions))
+        if rest or (stored and stored[-1].sample != block.start + count - 1):
+            stored, count = [], 0
+        for _ in stored:
             step()
-        if whole < len(block):
-            missing.append((block, known))
+        if count < len(block):
+            missing.append((block, stored))
             continue
-        rows[block.start] = known
-        _put(store, block, known)
+        rows[block.start] = stored
+        _put(store, block, stored)
     if store is not None:
         store.say_ignored()
-    starts = (range(b.start + len(known) // len(plan.questions), b.stop) for b, known in missing)
+    starts = (range(b.start + len(stored) // len(plan.questions), b.stop) for b, stored in missing)
     for index, new in runner.run(map(task, starts), step):
-        block, known = missing[index]
-        rows[block.start] = [*known, *new]
+        block, stored = missing[index]
+        rows[block.start] = [*stored, *new]
         _put(store, block, rows[block.start])
     return [row for start in sorted(rows) for row in rows[start]]
 
@@ -118,22 +118,22 @@ def fill_cross_checks(
     jobs: int,
     step: Step,
     *,
-    known: Iterable[CrossCheck] = (),
+    earlier: Iterable[CrossCheck] = (),
     last: bool = True,
 ) -> list[CrossCheck]:
-    """ngspice's answers to everything that is asked, by sample; as `fill`, in blocks of `CHUNK`.
+    """ngspice's answers to all asks, by sample; as `fill`, in blocks of `CHUNK`.
 
-    known : what need not be asked again. last : nothing further will be asked, so that what
+    earlier : answers that stand already. last : nothing further will be asked, so that what
     ``store`` holds beyond it may go.
     """
-    before, wanted = _by_block(known), _by_block(sorted(asks, key=lambda ask: ask.key))
+    before, wanted = _by_block(earlier), _by_block(sorted(asks, key=lambda ask: ask.key))
     answers: dict[int, dict[tuple[int, int, str], CrossCheck]] = {}
     missing: dict[int, list[Ask]] = {}
-    for number, here in wanted.items():
+    for number, block in wanted.items():
         stored = [] if store is None else store.read(_chunk(number))
         answers[number] = {c.key: c for c in (*stored, *before[number])}
-        missing[number] = [ask for ask in here if ask.key not in answers[number]]
-        for _ in range(len(here) - len(missing[number])):
+        missing[number] = [ask for ask in block if ask.key not in answers[number]]
+        for _ in range(len(block) - len(missing[number])):
             step()
 
     def finish(number: int) -> None:
@@ -159,16 +159,16 @@ def fill_cross_checks(
     if store is not None:
         store.say_ignored()
     return [
-        answers[n][ask.key] for n, here in wanted.items() for ask in here if ask.key in answers[n]
+        answers[n][ask.key] for n, block in wanted.items() for ask in block if ask.key in answers[n]
     ]
 
 
-def known_checks(
-    asks: Iterable[Ask], store: BlockStore[CrossCheck] | None, known: Iterable[CrossCheck] = ()
+def count_answered(
+    asks: Iterable[Ask], store: BlockStore[CrossCheck] | None, earlier: Iterable[CrossCheck] = ()
 ) -> int:
-    """How many of these `fill_cross_checks` would not have to ask again."""
+    """The number of these asks that the store or ``earlier`` answers."""
     wanted = {ask.key for ask in asks}
-    answered = {c.key for c in known}
+    answered = {c.key for c in earlier}
     if store is not None:
         for number in {sample // CHUNK for sample, _, _ in wanted}:
             answered |= {c.key for c in store.read(_chunk(number))}

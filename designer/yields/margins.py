@@ -183,12 +183,12 @@ def margins(
         limit = counted(parts, name, progress, compute_one)
         if limit is not None:
             limits[crossing.question].append(limit)
-    found = []
+    out = []
     for number, row in enumerate(answers):
-        margin = _chosen(Margin(differing, tuple(limits[number])), boards, row)
-        own = [c for c in crossed if c.question == number]
-        found.append(replace(margin, sought=len(own), there=sum(c.there for c in own)))
-    return tuple(found)
+        margin = _foretelling(Margin(differing, tuple(limits[number])), boards, row)
+        sought = [c for c in crossed if c.question == number]
+        out.append(replace(margin, sought=len(sought), there=sum(c.there for c in sought)))
+    return tuple(out)
 
 
 def lost_boards(
@@ -214,18 +214,18 @@ def _stored_crossings(
     progress: Callable[[], None],
 ) -> list[Crossing]:
     """The crossing of each of these (question, sample), those that are stored not sought again."""
-    known: dict[tuple[int, int], Crossing] = {}
+    by_board: dict[tuple[int, int], Crossing] = {}
     for question, sample in lost:
         crossing = parts.get(f"crossing {question} {sample}")
         if crossing is not None:
-            known[question, sample] = crossing
+            by_board[question, sample] = crossing
             for _ in range(ROUNDS):
                 progress()
-    missing = [pair for pair in lost if pair not in known]
-    found = crossings(boards, missing, questions, jobs=jobs, progress=progress)
-    parts.put({f"crossing {c.question} {c.board}": c for c in found})
-    known |= {(c.question, c.board): c for c in found}
-    return [known[pair] for pair in lost]
+    missing = [pair for pair in lost if pair not in by_board]
+    fresh = crossings(boards, missing, questions, jobs=jobs, progress=progress)
+    parts.put({f"crossing {c.question} {c.board}": c for c in fresh})
+    by_board |= {(c.question, c.board): c for c in fresh}
+    return [by_board[pair] for pair in lost]
 
 
 def crossings(
@@ -252,10 +252,10 @@ def crossings(
         farther, halfway = np.minimum(inside + PACE, 1.0), 0.5 * (inside + outside)
         share = np.where(np.isinf(outside), farther, halfway)[going]
         ensemble = Ensemble(between(boards.take([lost[k][1] for k in going]), share))
-        asked = [questions[lost[k][0]] for k in going]
+        questions_left = [questions[lost[k][0]] for k in going]
         cases: list[Case] = [
             (i, q, q.excitation, orbits[k].start)
-            for i, (k, q) in enumerate(zip(going, asked, strict=True))
+            for i, (k, q) in enumerate(zip(going, questions_left, strict=True))
         ]
         rows = settled(ensemble, cases, jobs, progress)
         for k, at, (orbit, verdict, _) in zip(going, share, rows, strict=True):
@@ -394,15 +394,15 @@ def _limit(
     nominal: float,
     slopes: Array,
     differing: tuple[Quantity, ...],
-    drawn: Boards,
+    boards: Boards,
 ) -> Limit | None:
     """None where it does not react to anything, or would be negative on the nominal board."""
     limit = Limit(function.what, function.kind, nominal, 1.0, slopes)
-    sigma = float(Margin(differing, (limit,)).each(drawn).std())
+    sigma = float(Margin(differing, (limit,)).each(boards).std())
     return replace(limit, sigma=sigma) if sigma > 0.0 and nominal > 0.0 else None
 
 
-def _chosen(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> Margin:
+def _foretelling(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> Margin:
     """Of its limits those that foretell the verdicts of even boards, tested on the odd ones."""
     ok, lost = (
         np.array([a.sample for a in answers if a.verdict is verdict], dtype=np.intp)

@@ -179,11 +179,11 @@ def power_up_block(
     recipes : one for each question (``yields.start_recipe_search``). progress : called once a row.
     """
     ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
-    drawn = [phases(plan.seed, question, indices).tolist() for question in plan.questions]
-    asked = plan.asked(indices)
-    starts = [(i, plan.questions[k], recipes[k], drawn[k][i]) for i, k in asked]
+    switch_on = [phases(plan.seed, question, indices).tolist() for question in plan.questions]
+    pairs = plan.rows(indices)
+    starts = [(i, plan.questions[k], recipes[k], switch_on[k][i]) for i, k in pairs]
     rows = []
-    for (i, k), end in zip(asked, switched_on(ensemble, starts, jobs), strict=True):
+    for (i, k), end in zip(pairs, switched_on(ensemble, starts, jobs), strict=True):
         way = end.arrival
         rows.append(
             PowerUp(
@@ -192,7 +192,7 @@ def power_up_block(
                 verdict=end.verdict,
                 response=end.orbit.response,
                 reason=end.reason,
-                phase=drawn[k][i],
+                phase=switch_on[k][i],
                 periods=end.orbit.periods + (0 if way is None else way.periods),
                 clipped=way is not None and way.clipped,
             )

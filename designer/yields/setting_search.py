@@ -70,7 +70,7 @@ class BoardCase:
     """Orbits that were followed on paths to the board."""
 
     @property
-    def found(self) -> Try | None:
+    def best(self) -> Try | None:
         """The setting that works with the greatest margin, if any does."""
         good = [t for t in self.tries if t.verdict is Verdict.OK]
         return max(good, key=lambda t: t.margin) if good else None
@@ -90,15 +90,15 @@ def seek(
 ) -> Sequence[BoardCase]:
     """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
     for propose in _rounds(ensemble.boards, bands):
-        left = [case for case in cases if case.found is None]
+        left = [case for case in cases if case.best is None]
         proposed = zip(left, parallel(propose, left, jobs), strict=True)
-        asked = [(case, setting, start) for case, some in proposed for setting, start in some]
+        proposals = [(case, setting, start) for case, some in proposed for setting, start in some]
         trials: list[Case] = [
             (case.board, case.question, setting.of(case.question.excitation), start)
-            for case, setting, start in asked
+            for case, setting, start in proposals
         ]
         rows = settled(ensemble, trials, jobs)
-        for (case, setting, _), (orbit, verdict, _) in zip(asked, rows, strict=True):
+        for (case, setting, _), (orbit, verdict, _) in zip(proposals, rows, strict=True):
             case.tries.append(Try(setting, orbit, verdict))
     return cases
 
@@ -150,13 +150,13 @@ def _deepest(spots: Sequence[PathSetting], case: BoardCase, bands: Bands) -> lis
     A window may be smaller than ``APART``, so a setting is left out only where the very same was
     tried.
     """
-    known = [AS_BUILT, *(t.setting for t in case.tries)]
-    chosen: list[Adjustment] = []
+    earlier = [AS_BUILT, *(t.setting for t in case.tries)]
+    picked: list[Adjustment] = []
     for spot in sorted(spots, key=lambda spot: -spot.radius):
-        here = spot.setting
-        if here not in known and all(_distance(here, s, bands) > APART for s in chosen):
-            chosen.append(here)
-    return chosen[:SPOTS]
+        setting = spot.setting
+        if setting not in earlier and all(_distance(setting, s, bands) > APART for s in picked):
+            picked.append(setting)
+    return picked[:SPOTS]
 
 
 def _halfway(case: BoardCase, bands: Bands, follow: bool) -> list[Asked]:
@@ -164,16 +164,16 @@ def _halfway(case: BoardCase, bands: Bands, follow: bool) -> list[Asked]:
 
     follow : start from the attractor of the better one; otherwise from the nominal orbit.
     """
-    chosen: list[Asked] = []
+    picked: list[Asked] = []
     for better, worse in _brackets(case, bands):
         middle = Adjustment(*(0.5 * (better.setting.vector + worse.setting.vector)).tolist())
-        known = [setting for setting, _ in chosen]
-        if not _new(case, [*known, middle], bands)[len(known) :]:
+        earlier = [setting for setting, _ in picked]
+        if not _new(case, [*earlier, middle], bands)[len(earlier) :]:
             continue
-        chosen.append((middle, better.orbit.start if follow else case.question.start.start))
-        if len(chosen) == HALVED:
+        picked.append((middle, better.orbit.start if follow else case.question.start.start))
+        if len(picked) == HALVED:
             break
-    return chosen
+    return picked
 
 
 def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
@@ -206,10 +206,10 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
 
 def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
     """Those that differ from what was tried, from as built and from each other."""
-    known = [AS_BUILT, *(t.setting for t in case.tries)]
+    earlier = [AS_BUILT, *(t.setting for t in case.tries)]
     fresh: list[Adjustment] = []
     for setting in settings:
-        if all(_distance(setting, other, bands) > APART for other in (*known, *fresh)):
+        if all(_distance(setting, other, bands) > APART for other in (*earlier, *fresh)):
             fresh.append(setting)
     return fresh
 

@@ -125,13 +125,13 @@ class Recipe:
         """How often it led to the response, and a warning where little is known of boards."""
         if not self.trials:
             return
-        tried = f"it worked from {self.reached} of {self.trials} switch-on phases"
+        text = f"it worked from {self.reached} of {self.trials} switch-on phases"
         if self.board_trials:
-            tried += (
+            text += (
                 f", and at {self.board_reached} of {self.board_trials} starts of "
                 f"{self.able} sample boards"
             )
-        yield tried
+        yield text
         if 2 * self.able < self.boards:
             shows = self.able or "none"
             yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"

@@ -160,18 +160,18 @@ def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) ->
     as_built = settled(sample, cases, jobs)
     able = [i for i, (_, verdict, _) in enumerate(as_built) if verdict is Verdict.OK]
     bench = _Bench(question, nominal, sample, tuple(able), jobs)
-    tried: list[_Trials] = []
+    every: list[_Trials] = []
     for option in candidates(question, nominal.reduction(0).system()):
         doing(str(option.way))
-        known = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
-        if all(known.nominal):
-            known = bench.on_boards(known)
-            if known.certain:
-                return _by_hand(known, bench)
-        tried.append(known)
-    whole = [t if t.boards else bench.on_boards(t) for t in tried]
-    best = max(whole, key=lambda trials: sum(trials.starts))
-    return _by_hand(next(t for t in whole if not t.beaten_by(best)), bench)
+        trials = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
+        if all(trials.nominal):
+            trials = bench.on_boards(trials)
+            if trials.certain:
+                return _by_hand(trials, bench)
+        every.append(trials)
+    complete = [t if t.boards else bench.on_boards(t) for t in every]
+    best = max(complete, key=lambda t: sum(t.starts))
+    return _by_hand(next(t for t in complete if not t.beaten_by(best)), bench)
 
 
 def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
@@ -183,8 +183,10 @@ def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
     first = trials.boards[: len(bench.able)]
 
     def as_well(other: Recipe) -> bool:
-        met = bench.on_boards(bench.on_nominal(_Trials(other)), 1)
-        return sum(met.nominal) >= sum(trials.nominal) and sum(met.boards) >= sum(first)
+        other_trials = bench.on_boards(bench.on_nominal(_Trials(other)), 1)
+        return sum(other_trials.nominal) >= sum(trials.nominal) and sum(other_trials.boards) >= sum(
+            first
+        )
 
     smooth = as_well(recipe.refined())
     slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)

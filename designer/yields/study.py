@@ -81,7 +81,7 @@ class Study:
     """The wanted responses on all engines."""
     plan: StudyPlan
     """What decides the samples."""
-    asked: tuple[int, ...]
+    response_indices: tuple[int, ...]
     """Index of the response that each question of the plan asks for."""
     left_out: dict[int, str]
     """Why a response is no question, by index."""
@@ -116,7 +116,7 @@ class Study:
 
     def rows_of(self, index: int, rows: Sequence[Row] | None) -> tuple[Row, ...]:
         """Those of these rows of a layer that are about response number ``index``, by sample."""
-        return tuple(row for row in rows or () if self.asked[row.question] == index)
+        return tuple(row for row in rows or () if self.response_indices[row.question] == index)
 
     def boards(self) -> pd.DataFrame:
         """A row for each board and response, as built.
@@ -132,7 +132,7 @@ class Study:
         return frame(self.yield_rows())
 
     def _board(self, answer: Answer) -> dict[str, Any]:
-        index = self.asked[answer.question]
+        index = self.response_indices[answer.question]
         values = asdict(answer) | self._head(index) | {"verdict": str(answer.verdict)}
         values["board"] = self.plan.label(answer.sample) if self.plan.labels else None
         return {name: values[name] for name in BOARD_COLUMNS}
@@ -160,7 +160,7 @@ class Study:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out."""
         return tuple(
-            count(self.answers_to(i), self.plan.census) if i in self.asked else None
+            count(self.answers_to(i), self.plan.census) if i in self.response_indices else None
             for i in range(len(self.checked))
         )
 
@@ -171,10 +171,10 @@ class Study:
             two_engine_yield.combine(
                 self.answers_to(i),
                 self.rows_of(i, self.cross_checks),
-                self.plan.questions[self.asked.index(i)],
+                self.plan.questions[self.response_indices.index(i)],
                 census=self.plan.census,
             )
-            if i in self.asked
+            if i in self.response_indices
             else None
             for i in range(len(self.checked))
         )
@@ -182,7 +182,7 @@ class Study:
     @property
     def blame_status(self) -> BlameStatus:
         """How much of the blame there is."""
-        return BlameStatus.of(self.blame, self.blame_wanted and bool(self.asked))
+        return BlameStatus.of(self.blame, self.blame_wanted and bool(self.response_indices))
 
     @property
     def all_on_one_board(self) -> Yield | None:
@@ -192,15 +192,15 @@ class Study:
     def on_one_board(self, rows: Sequence[BoardRow] | None) -> Yield | None:
         """Boards that show every response by these rows of a layer; None unless there are two
         responses at least and each was asked."""
-        if not rows or len(self.asked) < max(len(self.checked), 2):
+        if not rows or len(self.response_indices) < max(len(self.checked), 2):
             return None
         return all_on_one(rows, self.plan.census)
 
     @cached_property
     def _answers(self) -> dict[int, tuple[Answer, ...]]:
-        by: dict[int, list[Answer]] = {index: [] for index in self.asked}
+        by: dict[int, list[Answer]] = {index: [] for index in self.response_indices}
         for a in self.answers:
-            by[self.asked[a.question]].append(a)
+            by[self.response_indices[a.question]].append(a)
         return {index: tuple(rows) for index, rows in by.items()}
 
 

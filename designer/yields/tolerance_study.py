@@ -131,11 +131,11 @@ def tolerance(
     pool = None if rung == "exact" else pool
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
-    asked = tuple(i for i in range(len(checked)) if i not in left_out)
+    indices = tuple(i for i in range(len(checked)) if i not in left_out)
     plan = plan_study(
         synthesis.modelfile,
         synthesis.design,
-        [checked[i] for i in asked],
+        [checked[i] for i in indices],
         synthesis.catalog,
         samples=samples,
         seed=seed,
@@ -144,15 +144,15 @@ def tolerance(
         progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     laps = Laps()
     study = Study(
-        checked, plan, asked, left_out, (), until=until, blame_wanted=blamed, seconds=laps.seconds
+        checked, plan, indices, left_out, (), until=until, blame_wanted=blamed, seconds=laps.seconds
     )
-    if not asked:
+    if not indices:
         return study
     work = Work(
         jobs,
         pool,
         Stores() if stores is None else stores,
-        layers.Here(jobs) if runner is None else runner,
+        layers.LocalRunner(jobs) if runner is None else runner,
         progress,
         rung,
         blame_budget,
@@ -230,7 +230,7 @@ class Work:
         nominal = NOMINAL_SAMPLES
         study = self._with_samples(study, samples)
         both_engines = self.pool is not None and self.engine == "auto"
-        known: tuple[CrossCheck, ...] = ()
+        checks: tuple[CrossCheck, ...] = ()
         while any(_decided(study)):
             asks = self._random(study, nominal)
             study = replace(study, cross_checks=self._checks(study, asks, last=False))
@@ -238,8 +238,8 @@ class Work:
                 # The boards at a boundary are a stratum of their own and may widen it again. They
                 # are others once there are more samples, so these are not kept.
                 asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
-                known = self._checks(study, asks, known=known, store=False)
-                study = replace(study, cross_checks=known)
+                checks = self._checks(study, asks, earlier=checks, store=False)
+                study = replace(study, cross_checks=checks)
             if _widest(study) < until:
                 break
             # Exact samples narrow the first part of an interval, boards in ngspice the second.
@@ -259,7 +259,7 @@ class Work:
 
     def _narrow(self, study: Study, until: float) -> bool:
         """Whether every interval is; says which is not, and why there are no more samples."""
-        silent = [i + 1 for i in study.asked if not _decided(study)[i]]
+        silent = [i + 1 for i in study.response_indices if not _decided(study)[i]]
         if silent:
             self.progress.note(
                 f"no board has an answer to response {', '.join(map(str, silent))}: "
@@ -324,15 +324,15 @@ class Work:
         """With a yield map of each response over each of these settings."""
         maps, parts = [], self.stores.maps(study.plan)
         for over in overs:
-            for number, index in enumerate(study.asked):
+            for number, index in enumerate(study.response_indices):
                 b = study.checked[index].model.b
                 name = f"map {over} {number} {b!r}"
-                found = parts.get(name)
-                if found is None:
+                result = parts.get(name)
+                if result is None:
                     step = self.progress.stage(f"yield map over {over}, response {index + 1}")
-                    found = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
-                    parts.put({name: replace(found, seconds=0.0)})
-                maps.append(found)
+                    result = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                    parts.put({name: replace(result, seconds=0.0)})
+                maps.append(result)
         return replace(study, maps=tuple(maps))
 
     def _rows(
@@ -380,24 +380,25 @@ class Work:
         asks: Sequence[Ask],
         *,
         last: bool = True,
-        known: Sequence[CrossCheck] = (),
+        earlier: Sequence[CrossCheck] = (),
         store: bool = True,
     ) -> tuple[CrossCheck, ...]:
-        """ngspice's answers. known : beside what the study has. store : whether to store them."""
+        """ngspice's answers. earlier : answers beside those of the study. store : whether to store
+        them."""
         plan = study.plan
         asks = [a for a in asks if plan.questions[a.question].settings is not None]
         if self.pool is None or not asks:
             return ()
         rows = self.stores.rows("ngspice", plan) if store else None
-        known = (*known, *study.cross_checks)
-        new = len(asks) - layers.known_checks(asks, rows, known)
+        earlier = (*earlier, *study.cross_checks)
+        new = len(asks) - layers.count_answered(asks, rows, earlier)
         old = f", {len(asks) - new} more are there" if new < len(asks) else ""
         step: layers.Step = _no_step
         if new:
             step = self.progress.stage(f"ngspice, {new} runs{old}", len(asks))
         return tuple(
             layers.fill_cross_checks(
-                plan, asks, rows, self.pool, self.jobs, step, known=known, last=last
+                plan, asks, rows, self.pool, self.jobs, step, earlier=earlier, last=last
             )
         )
 

@@ -68,8 +68,8 @@ class DcTrim:
 
     def as_dict(self) -> dict[str, Any]:
         """What decides a setting beside the plan, as JSON holds it."""
-        own = {p.name: p.value for p in self.circuit.resistors[-3:]}
-        return {"parts": own, "adjustability": self.adjustability}
+        parts = {p.name: p.value for p in self.circuit.resistors[-3:]}
+        return {"parts": parts, "adjustability": self.adjustability}
 
     def on(self, circuit: Circuit) -> DcTrim:
         """The same trimmer in a circuit that differs in its references."""
@@ -101,7 +101,7 @@ class Trimmed(BoardRow):
     """Distance of the orbit from its mirror image (``Orbit.asymmetry``)."""
 
 
-def dc_trim(made: Synthesis) -> DcTrim | None:
+def dc_trim(synthesis: Synthesis) -> DcTrim | None:
     """The trimmer of a design; None where the model file does not ask for a fitted one, or no
     summing node is driven.
 
@@ -109,15 +109,15 @@ def dc_trim(made: Synthesis) -> DcTrim | None:
     ------
     Unreachable : no resistor for it can be bought.
     """
-    if made.modelfile.board.dc_trim != "fitted":
+    if synthesis.modelfile.board.dc_trim != "fitted":
         return None
-    board, _ = board_circuit(made)
+    board, _ = board_circuit(synthesis)
     part = next((p for p in board.fittings if isinstance(p, Trimmer)), None)
     if part is None:
         return None
     series = next(p for p in board.fittings if isinstance(p, Resistor) and part.wiper in p.nets)
-    adjustability = made.catalog.trimmer(part.value).adjustability
-    return DcTrim.of(made.design.circuit, part, series, adjustability)
+    adjustability = synthesis.catalog.trimmer(part.value).adjustability
+    return DcTrim.of(synthesis.design.circuit, part, series, adjustability)
 
 
 def trimmed_boards(trim: DcTrim, plan: StudyPlan, indices: range) -> tuple[Boards, Array]:
@@ -154,10 +154,10 @@ def trimmed_block(
     names = [f.name for f in fields(Trimmed) if f.name not in ("position", "at_end")]
     rows = []
     for answer in answers:
-        here = float(position[answer.sample - indices.start])
-        at_end = min(here, 1.0 - here) < END * (1.0 + 1e-9)
+        wiper = float(position[answer.sample - indices.start])
+        at_end = min(wiper, 1.0 - wiper) < END * (1.0 + 1e-9)
         columns = {name: getattr(answer, name) for name in names}
-        rows.append(Trimmed(**columns, position=rounded(here), at_end=at_end))
+        rows.append(Trimmed(**columns, position=rounded(wiper), at_end=at_end))
     return rows
 
 
@@ -175,9 +175,9 @@ def settings(trim: DcTrim, boards: Boards, seed: int, indices: range) -> Array:
     people = [np.random.default_rng([seed, i, TAG]) for i in indices]
     target = np.full(len(boards), float(wanted[0]))
     if stops:
-        away = [_seen(read[s], step, people) + float(wanted[0] - stops[s][0]) for s in stops]
+        away = [_reading(read[s], step, people) + float(wanted[0] - stops[s][0]) for s in stops]
         target = np.mean(away, axis=0)
-    target = _seen(target, step / FINER, people)
+    target = _reading(target, step / FINER, people)
     position = _turned(trim, boards, target)
     slip = np.array([p.uniform(-1.0, 1.0) for p in people])
     return np.clip(position + trim.adjustability * slip, END, 1.0 - END)
@@ -191,19 +191,19 @@ def _turned(trim: DcTrim, boards: Boards, target: Array) -> Array:
     def off(position: Array) -> Array:
         return at_rest(trim.at(boards, position), clearance)[0] - target
 
-    before, here = np.full(len(boards), END), np.full(len(boards), 1.0 - END)
-    error, now = off(before), off(here)
+    before, setting = np.full(len(boards), END), np.full(len(boards), 1.0 - END)
+    error, now = off(before), off(setting)
     for _ in range(TURNS):
         change = now - error
         safe = np.where(change == 0.0, 1.0, change)
-        move = np.where(change == 0.0, 0.0, -now * (here - before) / safe)
-        before, error = here, now
-        here = np.clip(np.nan_to_num(here + move, nan=0.5), END, 1.0 - END)
-        now = off(here)
-    return here
+        move = np.where(change == 0.0, 0.0, -now * (setting - before) / safe)
+        before, error = setting, now
+        setting = np.clip(np.nan_to_num(setting + move, nan=0.5), END, 1.0 - END)
+        now = off(setting)
+    return setting
 
 
-def _seen(volts: Array, step: float, people: list[np.random.Generator]) -> Array:
+def _reading(volts: Array, step: float, people: list[np.random.Generator]) -> Array:
     """(N,) the mean of a few readings of a screen, each off by up to one step, in whole steps."""
     if step == 0.0:
         return volts

@@ -104,7 +104,7 @@ def tuned_block(
     ------
     KeyError : the answer as built of a board is missing.
     """
-    ensemble, asked = _asked(plan, indices, answers)
+    ensemble, as_built = _answers_as_built(plan, indices, answers)
     nominal = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
 
     def case_of(answer: Answer) -> BoardCase:
@@ -115,12 +115,12 @@ def tuned_block(
             volts = 0.0
         return BoardCase(board, question, round(volts / question.excitation.amplitude, DIGITS))
 
-    cases = {k: case_of(a) for k, a in enumerate(asked) if a.verdict is not Verdict.OK}
+    cases = {k: case_of(a) for k, a in enumerate(as_built) if a.verdict is not Verdict.OK}
     seek(ensemble, list(cases.values()), bands, jobs=jobs)
     rows = []
-    for k, bench in enumerate(_on_bench(plan, indices, ensemble, asked, bands, jobs)):
-        outcome = _outcome(asked[k], cases.get(k))
-        rows.append(Tuned(asked[k].sample, asked[k].question, **outcome, **bench))
+    for k, bench in enumerate(_on_bench(plan, indices, ensemble, as_built, bands, jobs)):
+        outcome = _outcome(as_built[k], cases.get(k))
+        rows.append(Tuned(as_built[k].sample, as_built[k].question, **outcome, **bench))
         progress()
     return rows
 
@@ -138,31 +138,31 @@ def benched_block(
     ------
     KeyError : the answer as built of a board is missing.
     """
-    ensemble, asked = _asked(plan, indices, answers)
-    rows = _on_bench(plan, indices, ensemble, asked, bands, jobs)
+    ensemble, as_built = _answers_as_built(plan, indices, answers)
+    rows = _on_bench(plan, indices, ensemble, as_built, bands, jobs)
     return [row["bench_verdict"] for row in rows]
 
 
-def _asked(
+def _answers_as_built(
     plan: StudyPlan, indices: range, answers: Sequence[Answer]
 ) -> tuple[Ensemble, list[Answer]]:
     """The boards of a block, and their answers as built in the order of its rows."""
-    known = {(a.sample, a.question): a for a in answers}
+    answer_of = {(a.sample, a.question): a for a in answers}
     ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
-    return ensemble, [known[indices[i], number] for i, number in plan.asked(indices)]
+    return ensemble, [answer_of[indices[i], number] for i, number in plan.rows(indices)]
 
 
 def _outcome(answer: Answer, case: BoardCase | None) -> dict[str, Any]:
     """The columns of what exists: the search's where there was one, else the board's as built."""
     setting, response = AS_BUILT, answer.response
     verdict, reason = answer.verdict, answer.reason
-    shown: Answer | Orbit | None = answer
-    if case is not None and case.found is not None:
-        setting, shown = case.found.setting, case.found.orbit
-        verdict, response, reason = Verdict.OK, shown.response, ""
+    orbit: Answer | Orbit | None = answer
+    if case is not None and case.best is not None:
+        setting, orbit = case.best.setting, case.best.orbit
+        verdict, response, reason = Verdict.OK, orbit.response, ""
     elif case is not None:
         verdict, reason = _not_found(answer, case)
-        shown = None
+        orbit = None
     return {
         "verdict": verdict,
         "response": response,
@@ -171,7 +171,7 @@ def _outcome(answer: Answer, case: BoardCase | None) -> dict[str, Any]:
         "tries": 0 if case is None else len(case.tries),
         "unanswered": 0 if case is None else case.unanswered,
         "followed": 0 if case is None else case.followed,
-        **{name: rounded(getattr(shown, name, _NAN)) for name in ("radius", "penetration", "miss")},
+        **{name: rounded(getattr(orbit, name, _NAN)) for name in ("radius", "penetration", "miss")},
     }
 
 
@@ -192,13 +192,13 @@ def _on_bench(
     plan: StudyPlan,
     indices: range,
     ensemble: Ensemble,
-    asked: Sequence[Answer],
+    as_built: Sequence[Answer],
     bands: Bands,
     jobs: int,
 ) -> list[dict[str, Any]]:
     """The columns of what the person finds on each board, and of what it really is.
 
-    asked : the answers as built, in the rows' order.
+    as_built : the answers as built, in the rows' order.
     """
 
     def play(answer: Answer) -> BenchResult:
@@ -211,12 +211,12 @@ def _on_bench(
             failure = f"{type(error).__name__}: {error}"
             return BenchResult(AS_BUILT, question.start.start, False, 0, failure)
 
-    results = list(parallel(play, asked, jobs))
+    results = list(parallel(play, as_built, jobs))
     moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
-    questions = [plan.questions[answer.question] for answer in asked]
+    questions = [plan.questions[answer.question] for answer in as_built]
     cases: list[Case] = [
         (
-            asked[k].sample - indices.start,
+            as_built[k].sample - indices.start,
             questions[k],
             results[k].setting.of(questions[k].excitation),
             results[k].state,
@@ -225,7 +225,7 @@ def _on_bench(
     ]
     judged = iter(settled(ensemble, cases, jobs))
     rows = []
-    for k, (answer, result) in enumerate(zip(asked, results, strict=True)):
+    for k, (answer, result) in enumerate(zip(as_built, results, strict=True)):
         verdict, response, reason = answer.verdict, answer.response, answer.reason
         if k in moved:
             orbit, verdict, reason = next(judged)

@@ -152,19 +152,19 @@ def combine(
     mine = {a.sample: a for a in answers if a.verdict is not Verdict.FAILED}
     nominal = [c for c in checks if c.kind is StartKind.NOMINAL and c.sample in mine]
     survives = {c.sample: c.survives(question) for c in nominal}
-    theirs = {sample: ok for sample, ok in survives.items() if ok is not None}
-    if not theirs:
+    in_ngspice = {sample: ok for sample, ok in survives.items() if ok is not None}
+    if not in_ngspice:
         return None
     ok = sum(a.verdict is Verdict.OK for a in mine.values())
     undecided = [sample for sample, answer in survives.items() if answer is None]
 
-    def strata_of(known: dict[int, bool]) -> list[Stratum]:
-        return _strata(list(mine.values()), known, checks, question)
+    def strata_of(in_ngspice: dict[int, bool]) -> list[Stratum]:
+        return _strata(list(mine.values()), in_ngspice, checks, question)
 
     def estimate_if(verdict: bool) -> float:
-        return interval(ok, strata_of({**theirs, **dict.fromkeys(undecided, verdict)}))[0]
+        return interval(ok, strata_of({**in_ngspice, **dict.fromkeys(undecided, verdict)}))[0]
 
-    strata = tuple(strata_of(theirs))
+    strata = tuple(strata_of(in_ngspice))
     estimate, low, high = interval(ok, strata, census)
     random = [c for c in nominal if c.why in (Why.RANDOM, Why.ALL)]
     agreed = [c.agrees(mine[c.sample]) for c in random]
@@ -222,7 +222,7 @@ def _off(count: int, could: int, stratum: Stratum) -> tuple[float, float]:
 
 def _strata(
     answers: Sequence[Answer],
-    theirs: dict[int, bool],
+    in_ngspice: dict[int, bool],
     checks: Iterable[CrossCheck],
     question: Question,
 ) -> list[Stratum]:
@@ -235,23 +235,23 @@ def _strata(
     for a in answers:
         name = "boundary" if a.sample in near else "slow" if a.radius > SLOW else "rest"
         groups[name].append(a)
-    spoken = [n for n, group in groups.items() if any(a.sample in theirs for a in group)]
+    spoken = [n for n, group in groups.items() if any(a.sample in in_ngspice for a in group)]
     home = next(name for name in ("rest", "slow", "boundary") if name in spoken)
     for name, group in groups.items():
         if name not in spoken:
             groups[home] = groups[home] + group
-    return [_stratum(name, groups[name], theirs) for name in groups if name in spoken]
+    return [_stratum(name, groups[name], in_ngspice) for name in groups if name in spoken]
 
 
-def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> Stratum:
+def _stratum(name: str, answers: Sequence[Answer], in_ngspice: dict[int, bool]) -> Stratum:
     ok = {a.sample: a.verdict is Verdict.OK for a in answers}
-    asked = [sample for sample in ok if sample in theirs]
+    samples = [sample for sample in ok if sample in in_ngspice]
     return Stratum(
         name,
         len(ok),
-        len(asked),
-        sum(theirs[s] and not ok[s] for s in asked),
-        sum(ok[s] and not theirs[s] for s in asked),
+        len(samples),
+        sum(in_ngspice[s] and not ok[s] for s in samples),
+        sum(ok[s] and not in_ngspice[s] for s in samples),
         sum(not o for o in ok.values()),
         sum(ok.values()),
     )
@@ -262,24 +262,24 @@ def differences(
 ) -> list[Disagreement]:
     """Every board on which ngspice shows another n-p-q, or two others at two step sizes, with what
     explains it, if anything does."""
-    known = {a.sample: a for a in answers}
+    answer_of = {a.sample: a for a in answers}
     stayed = {
         c.sample
         for c in checks
-        if c.kind is StartKind.OWN and c.sample in known and c.agrees(known[c.sample])
+        if c.kind is StartKind.OWN and c.sample in answer_of and c.agrees(answer_of[c.sample])
     }
     return [
         Disagreement(
             c.sample,
             c.kind,
             c.why,
-            known[c.sample].response,
+            answer_of[c.sample].response,
             c.either or c.response,
-            margin_share(known[c.sample], question.start),
-            _explain(known[c.sample], c, question, c.sample in stayed),
+            margin_share(answer_of[c.sample], question.start),
+            _explain(answer_of[c.sample], c, question, c.sample in stayed),
         )
         for c in checks
-        if c.sample in known and c.agrees(known[c.sample]) is False
+        if c.sample in answer_of and c.agrees(answer_of[c.sample]) is False
     ]
 
 

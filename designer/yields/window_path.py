@@ -105,82 +105,84 @@ class _Path:
         if orbit is None:
             return []
         wanted = _near((*functions(orbit, symmetric=False), *valleys(orbit)))
-        here = _Point(0.0, np.zeros(3), orbit, wanted, _values(orbit, wanted))
+        current = _Point(0.0, np.zeros(3), orbit, wanted, _values(orbit, wanted))
         still = _Slopes(np.zeros((len(wanted), 4)), np.zeros((4, len(orbit.start))))
-        here = self._at(here, still, 0.0, np.array([0.0, 0.0, first])) or here
+        current = self._at(current, still, 0.0, np.array([0.0, 0.0, first])) or current
         stride = STRIDE
-        while here.share < 1.0 and self._may_go_on:
-            slopes, ahead = self._slopes(here), min(stride, 1.0 - here.share)
+        while current.share < 1.0 and self._may_go_on:
+            slopes, ahead = self._slopes(current), min(stride, 1.0 - current.share)
             there = None
             while there is None and ahead >= SHORTEST:
                 # A valley that closes on the way may open again: only at its end it has a say.
                 trust = MOVE * (ahead / STRIDE if tied else 1.0)
-                move = self._centre(here, slopes, ahead, trust, without="valley")
+                move = self._centre(current, slopes, ahead, trust, without="valley")
                 lenient = ahead == SHORTEST
-                there = self._at(here, slopes, ahead, move, lenient=lenient)
+                there = self._at(current, slopes, ahead, move, lenient=lenient)
                 ahead *= 0.5
             if there is None:
                 break
-            stride, here = min(4.0 * ahead, STRIDE), there
-        if here.share < 1.0:
-            return [PathSetting(self._adjustment(here.setting), -np.inf)]
-        return self._centred(here)
+            stride, current = min(4.0 * ahead, STRIDE), there
+        if current.share < 1.0:
+            return [PathSetting(self._adjustment(current.setting), -np.inf)]
+        return self._centred(current)
 
-    def _centred(self, here: _Point) -> list[PathSetting]:
+    def _centred(self, current: _Point) -> list[PathSetting]:
         """From this point on the board itself to the middle of the window.
 
         Steps of one length at first, whatever they lead to: the functions have kinks where two
         contacts meet, and a climb would stop there. Then a climb from the best.
         """
-        met: list[tuple[float, Adjustment, _Point, _Slopes]] = []
+        points: list[tuple[float, Adjustment, _Point, _Slopes]] = []
 
         def arrive(at: _Point) -> float:
             slopes = self._slopes(at)
             radius = _radius(at.values, slopes.values)
-            met.append((radius, self._adjustment(at.setting), at, slopes))
+            points.append((radius, self._adjustment(at.setting), at, slopes))
             return radius
 
-        arrive(here)
+        arrive(current)
         for _ in range(ROAMING):
-            _, _, at, slopes = met[-1]
+            _, _, at, slopes = points[-1]
             there = self._at(at, slopes, 0.0, self._centre(at, slopes, 0.0, FINE))
             if there is None or not self._may_go_on:
                 break
             arrive(there)
-        best = max(range(len(met)), key=lambda k: met[k][0])
-        radius, _, here, slopes = met[best]
+        best = max(range(len(points)), key=lambda k: points[k][0])
+        radius, _, current, slopes = points[best]
         trust = 0.5 * FINE
         while trust >= FINEST and self._may_go_on:
-            there = self._at(here, slopes, 0.0, self._centre(here, slopes, 0.0, trust))
+            there = self._at(current, slopes, 0.0, self._centre(current, slopes, 0.0, trust))
             if there is None or arrive(there) <= radius:
                 trust *= 0.5
                 continue
-            radius, _, here, slopes = met[-1]
-        return [PathSetting(setting, radius) for radius, setting, _, _ in met]
+            radius, _, current, slopes = points[-1]
+        return [PathSetting(setting, radius) for radius, setting, _, _ in points]
 
     @property
     def _may_go_on(self) -> bool:
         return self.followed + RESERVE <= MOST_FOLLOWED
 
     def _at(
-        self, here: _Point, slopes: _Slopes, ahead: float, move: Array, *, lenient: bool = False
+        self, current: _Point, slopes: _Slopes, ahead: float, move: Array, *, lenient: bool = False
     ) -> _Point | None:
-        """The orbit followed to there; None where it is lost, or one of its functions is.
+        """The orbit followed to there; None where it is lost, or one of its moved is.
 
-        lenient : go on without the functions that are lost.
+        lenient : go on without the moved that are lost.
         """
-        setting = np.clip(here.setting + move, -1.0, 1.0)
-        change = np.append(setting - here.setting, ahead)
-        near = here.orbit.start + change @ slopes.start
-        orbit = self._orbit(here.share + ahead, setting, near)
+        setting = np.clip(current.setting + move, -1.0, 1.0)
+        change = np.append(setting - current.setting, ahead)
+        near = current.orbit.start + change @ slopes.start
+        orbit = self._orbit(current.share + ahead, setting, near)
         if orbit is None:
             return None
-        values = _values(orbit, here.wanted)
+        values = _values(orbit, current.wanted)
         there = np.isfinite(values)
         if not (there.all() or (lenient and there.any())):
             return None
-        known = [f.moved_to(orbit) for f, met in zip(here.wanted, there, strict=True) if met]
-        return _Point(here.share + ahead, setting, orbit, tuple(known), values[there])
+        moved = [
+            f.moved_to(orbit) for f, is_there in zip(current.wanted, there, strict=True) if is_there
+        ]
+        return _Point(current.share + ahead, setting, orbit, tuple(moved), values[there])
 
     def _orbit(self, share: float, setting: Array, near: Array) -> ContinuedOrbit | None:
         self.followed += 1
@@ -197,46 +199,46 @@ class _Path:
     def _adjustment(self, setting: Array) -> Adjustment:
         return Adjustment.at(setting * self.widths, self.bands)
 
-    def _slopes(self, here: _Point) -> _Slopes:
+    def _slopes(self, current: _Point) -> _Slopes:
         """Difference quotients; 0 where there is none."""
-        values, start = np.zeros((len(here.wanted), 4)), np.zeros((4, len(here.orbit.start)))
+        values, start = np.zeros((len(current.wanted), 4)), np.zeros((4, len(current.orbit.start)))
         for k in range(4):
-            if here.share == 1.0 if k == 3 else self.widths[k] == 0.0:
+            if current.share == 1.0 if k == 3 else self.widths[k] == 0.0:
                 continue
             for step in (PROBE, -PROBE):
-                to = np.append(here.setting, here.share)
+                to = np.append(current.setting, current.share)
                 to[k] += step
                 if abs(to[k]) > 1.0:
                     continue
-                orbit = self._orbit(float(to[3]), to[:3], here.orbit.start)
+                orbit = self._orbit(float(to[3]), to[:3], current.orbit.start)
                 if orbit is not None:
-                    change = _values(orbit, here.wanted) - here.values
+                    change = _values(orbit, current.wanted) - current.values
                     values[:, k] = np.nan_to_num(change / step)
-                    start[k] = (orbit.start - here.orbit.start) / step
+                    start[k] = (orbit.start - current.orbit.start) / step
                     break
         return _Slopes(values, start)
 
     def _centre(
-        self, here: _Point, slopes: _Slopes, ahead: float, trust: float, without: str = ""
+        self, current: _Point, slopes: _Slopes, ahead: float, trust: float, without: str = ""
     ) -> Array:
         """(3,) move to the middle of what is left when the board has moved ``ahead``.
 
         without : a kind of function that has no say.
         """
-        values, size = here.values + ahead * slopes.values[:, 3], _size(slopes.values)
-        used = np.array([f.kind != without for f in here.wanted]) & (size > 0.0)
+        values, size = current.values + ahead * slopes.values[:, 3], _size(slopes.values)
+        used = np.array([f.kind != without for f in current.wanted]) & (size > 0.0)
         rows = np.column_stack([-slopes.values[used, :3], size[used]])
-        low = np.maximum(-1.0 - here.setting, -trust)
-        high = np.minimum(1.0 - here.setting, trust)
+        low = np.maximum(-1.0 - current.setting, -trust)
+        high = np.minimum(1.0 - current.setting, trust)
         box = [*zip(low, high, strict=True), (None, 1.0)]
         program = linprog([0.0, 0.0, 0.0, -1.0], rows, values[used], bounds=box)
         return np.zeros(3) if program.x is None else np.asarray(program.x[:3])
 
 
-def _near(found: Sequence[Function]) -> tuple[Function, ...]:
+def _near(every: Sequence[Function]) -> tuple[Function, ...]:
     """Without the extremes that are far from their stop, such as those beyond the other one."""
-    deepest = max((f.value for f in found if f.kind == "contact"), default=np.inf)
-    return tuple(f for f in found if f.extreme is None or f.value < REACH * deepest)
+    deepest = max((f.value for f in every if f.kind == "contact"), default=np.inf)
+    return tuple(f for f in every if f.extreme is None or f.value < REACH * deepest)
 
 
 def _values(orbit: ContinuedOrbit, wanted: Sequence[Function]) -> Array:

@@ -139,12 +139,12 @@ def _worst(
 ) -> Corner | None:
     """The corner of one question."""
     # Measured boards are in no order, so they have no ends.
-    chosen = [x.coordinate for x in ranked if x.total > 0.0 and x.coordinate != BOARD][:CORNER]
-    if not chosen:
+    names = [x.coordinate for x in ranked if x.total > 0.0 and x.coordinate != BOARD][:CORNER]
+    if not names:
         return None
     places = {name: k for k, name in enumerate(plan.spread.coordinates(plan.circuit))}
-    columns = [places[name] for name in chosen]
-    picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
+    columns = [places[name] for name in names]
+    picks = np.array(list(product((0, 1), repeat=len(names))), dtype=np.intp)
     boards = _at(plan, columns, picks)
     question = plan.questions[number]
     start = question.start.start
@@ -152,9 +152,9 @@ def _worst(
     rows = settled(Ensemble(boards), cases, jobs, progress)
     values = margin.of(boards)
     worst = int(np.argmin(values))
-    ends = picks[worst] ^ _falling(plan, columns, chosen, margin)
+    ends = picks[worst] ^ _falling(plan, columns, names, margin)
     return Corner(
-        tuple(chosen),
+        tuple(names),
         tuple("low" if end == 0 else "high" for end in ends),
         float(values[worst]),
         rows[worst][1],
@@ -172,13 +172,13 @@ def _at(plan: StudyPlan, columns: Sequence[int], picks: Places) -> Boards:
 
 
 def _falling(
-    plan: StudyPlan, columns: Sequence[int], chosen: Sequence[str], margin: Margin
+    plan: StudyPlan, columns: Sequence[int], names: Sequence[str], margin: Margin
 ) -> Places:
     """(k,) 1 where the quantity of a coordinate's name falls with it, as a lower limit does."""
-    known = {q.name: q for q in margin.quantities}
-    out = np.zeros(len(chosen), dtype=np.intp)
-    for k, (place, name) in enumerate(zip(columns, chosen, strict=True)):
-        if name in known:
-            first, last = column(_at(plan, [place], np.array([[0], [1]])), known[name])
+    by_name = {q.name: q for q in margin.quantities}
+    out = np.zeros(len(names), dtype=np.intp)
+    for k, (place, name) in enumerate(zip(columns, names, strict=True)):
+        if name in by_name:
+            first, last = column(_at(plan, [place], np.array([[0], [1]])), by_name[name])
             out[k] = last < first
     return out

@@ -229,9 +229,9 @@ def yield_map(
         window, open_ = nominal.window()
         settings = sorted({used, *np.linspace(*window, points).tolist()})
     orbits = nominal.orbits(settings)
-    chosen: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
-    counts = {name: np.zeros((len(settings), len(chosen)), dtype=np.int64) for name in _COUNTS}
-    for column, grade in enumerate(chosen):
+    columns: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
+    counts = {name: np.zeros((len(settings), len(columns)), dtype=np.int64) for name in _COUNTS}
+    for column, grade in enumerate(columns):
         spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
         ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
         tasks = [
@@ -247,7 +247,7 @@ def yield_map(
     axes = [] if over == "grade" else [Axis("b" if over == "b" else "omega", tuple(settings))]
     axes += [Axis("grade", tuple(grades))] if "grade" in over else []
     size = tuple(len(axis.values) for axis in axes)
-    there = np.tile(np.array([[orbit is not None] for orbit in orbits]), (1, len(chosen)))
+    there = np.tile(np.array([[orbit is not None] for orbit in orbits]), (1, len(columns)))
     return YieldMap(
         over=over,
         question=number,
@@ -353,11 +353,11 @@ class _NominalOrbits:
 
     def orbits(self, settings: Sequence[float]) -> list[Orbit | None]:
         """The wanted orbit at each setting; None where the nominal circuit does not show it."""
-        found: dict[float, Orbit | None] = {}
+        orbits: dict[float, Orbit | None] = {}
         for value in sorted(settings, key=lambda v: abs(v - self.used)):
             near = min(self._known, key=lambda known: (abs(known - value), known))
-            found[value] = self._known.get(value) or self._try(value, near)
-        return [found[value] for value in settings]
+            orbits[value] = self._known.get(value) or self._try(value, near)
+        return [orbits[value] for value in settings]
 
     def _try(self, value: float, near: float) -> Orbit | None:
         self.spent += 1

@@ -20,7 +20,7 @@ from designer.cli import entry
 from designer.jobs import dask_runner
 from designer.jobs.dask_runner import Cluster
 from designer.verdicts.verdict import Answer, StudyPlan
-from designer.yields.layers import Here, fill, samples_task
+from designer.yields.layers import LocalRunner, fill, samples_task
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
@@ -47,7 +47,9 @@ def test_a_cluster_gives_equal_files(address: str, tmp_path: Path) -> None:
     p = plan(22)
     for name in ("here", "there"):
         (tmp_path / name).mkdir()
-    rows = fill(p, _store(tmp_path / "here", p), 4, partial(samples_task, p), Here(2), nothing)
+    rows = fill(
+        p, _store(tmp_path / "here", p), 4, partial(samples_task, p), LocalRunner(2), nothing
+    )
     calls: list[int] = []
     with Cluster(address) as there:
         again = fill(

@@ -287,14 +287,14 @@ def test_the_yields_of_a_study_are_counted_from_its_boards(study: designer.Study
     assert list(table["lost"]) == [2, 2]
     partly = replace(
         study,
-        asked=(1,),
+        response_indices=(1,),
         left_out={0: "why not"},
         answers=tuple(replace(a, question=0) for a in study.answers if a.question == 1),
     )
     assert list(partly.yields_table()["left_out"]) == ["why not", ""]
     assert set(partly.boards()["number"]) == {2}
     assert set(partly.boards()["omega"]) == {1.55}
-    none = replace(study, answers=(), asked=(), left_out={0: "a", 1: "b"})
+    none = replace(study, answers=(), response_indices=(), left_out={0: "a", 1: "b"})
     assert none.boards().empty
     assert list(none.boards().columns) == list(study.boards().columns)
 

@@ -53,7 +53,7 @@ def answers(p: int, spread: str, samples: int = 24) -> tuple[Answer, ...]:
 
 @cache
 def offsets_blamed() -> Blame:
-    return blame(plan(2, "offsets"), answers(2, "offsets"), lost=6, kept=2, jobs=2)
+    return blame(plan(2, "offsets"), answers(2, "offsets"), lost=6, ok=2, jobs=2)
 
 
 def margin_of(slopes: dict[str, tuple[float, ...]], nominal: float = 1.0) -> tuple[Margin, Boards]:
@@ -312,10 +312,10 @@ def test_blame_is_the_same_on_one_core_and_says_what_it_cost() -> None:
 
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
-    one = blame(few, some, lost=2, kept=1, jobs=1, progress=step)
-    two = blame(few, list(reversed(some)), lost=2, kept=1, jobs=2)
+    one = blame(few, some, lost=2, ok=1, jobs=1, progress=step)
+    two = blame(few, list(reversed(some)), lost=2, ok=1, jobs=2)
     assert replace(one, seconds=0.0) == replace(two, seconds=0.0)
-    assert calls == extent_of(few, some, lost=2, kept=1).steps >= one.attractors + one.orbits
+    assert calls == extent_of(few, some, lost=2, ok=1).steps >= one.attractors + one.orbits
     plain = one.as_dict()
     assert plain["cost"]["attractors"] == one.attractors
     first = plain["responses"][0]
@@ -345,8 +345,8 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
 ) -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
-    whole = blame(few, some, lost=2, kept=1, jobs=1)
-    total = extent_of(few, some, lost=2, kept=1).steps
+    whole = blame(few, some, lost=2, ok=1, jobs=1)
+    total = extent_of(few, some, lost=2, ok=1).steps
     pieces, steps = _Memory(), 0
 
     def stop_late() -> None:
@@ -357,7 +357,7 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
 
     monkeypatch.setattr(blame_replay, "TOGETHER", 1)
     with pytest.raises(_Stopped):
-        blame(few, some, lost=2, kept=1, jobs=1, progress=stop_late, parts=pieces)
+        blame(few, some, lost=2, ok=1, jobs=1, progress=stop_late, parts=pieces)
     before = dict(pieces.known)
     assert {name.split()[0] for name in before} >= {"replay", "crossing"}
     replayed: list[object] = []
@@ -374,7 +374,7 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
         nonlocal steps
         steps += 1
 
-    again = blame(few, some, lost=2, kept=1, jobs=1, progress=step, parts=pieces)
+    again = blame(few, some, lost=2, ok=1, jobs=1, progress=step, parts=pieces)
     assert replace(again, seconds=0.0) == replace(whole, seconds=0.0)
     assert replayed == []
     assert steps == total
@@ -404,11 +404,11 @@ def test_a_larger_budget_does_the_rest() -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
     pieces = _Memory()
-    part = blame(few, some, lost=2, kept=1, budget=1, jobs=2, parts=pieces)
+    part = blame(few, some, lost=2, ok=1, budget=1, jobs=2, parts=pieces)
     assert part.share < 1.0
     assert part.budget == 1
-    more = blame(few, some, lost=2, kept=1, budget=10**6, jobs=2, parts=pieces)
-    whole = blame(few, some, lost=2, kept=1, jobs=2)
+    more = blame(few, some, lost=2, ok=1, budget=10**6, jobs=2, parts=pieces)
+    whole = blame(few, some, lost=2, ok=1, jobs=2)
     assert replace(more, seconds=0.0) == replace(whole, seconds=0.0)
 
 

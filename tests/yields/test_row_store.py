@@ -22,7 +22,7 @@ from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import BLOCK, Answer, BoardRow, Question, StudyPlan, Verdict
-from designer.yields.layers import Here, fill
+from designer.yields.layers import LocalRunner, fill
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import RULES, study_hash
 
@@ -159,13 +159,13 @@ def test_fill_computes_only_what_is_missing(tmp_path: Path, plan: StudyPlan) -> 
             return lambda jobs, step: _answers(indices)
 
         study = replace(plan, samples=samples)
-        rows = fill(study, _store(tmp_path, study), BLOCK, task, Here(1), lambda: None)
+        rows = fill(study, _store(tmp_path, study), BLOCK, task, LocalRunner(1), lambda: None)
         assert asked == computed
         assert rows == _answers(range(samples))
     fresh = tmp_path / "fresh"
     fresh.mkdir()
     study = replace(plan, samples=251)
-    fill(study, _store(fresh, study), BLOCK, task, Here(1), lambda: None)
+    fill(study, _store(fresh, study), BLOCK, task, LocalRunner(1), lambda: None)
     for path in (fresh / "samples.parquet").iterdir():
         assert path.read_bytes() == (tmp_path / "samples.parquet" / path.name).read_bytes()
 
@@ -270,7 +270,7 @@ def test_blocks_of_another_study_are_ignored_aloud(tmp_path: Path, plan: StudyPl
     def made(study: str) -> list[str]:
         notes: list[str] = []
         task = lambda block: lambda jobs, step: _answers(block)  # noqa: E731
-        fill(plan, store(study, notes), BLOCK, task, Here(1), lambda: None)
+        fill(plan, store(study, notes), BLOCK, task, LocalRunner(1), lambda: None)
         return notes
 
     assert made("a" * 64) == []

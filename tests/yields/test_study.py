@@ -33,7 +33,7 @@ from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
 from designer.yields import layers, tolerance_study
 from designer.yields.blame_analysis import blame
-from designer.yields.layers import CHUNK, Here
+from designer.yields.layers import CHUNK, LocalRunner
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
@@ -104,7 +104,7 @@ class Fixed:
 
 def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
     monkeypatch.setattr(layers, "samples_task", Fixed(lost))
-    work = Work(1, None, Stores(), Here(1), Progress(), "exact")
+    work = Work(1, None, Stores(), LocalRunner(1), Progress(), "exact")
     checked: Any = (None, None)
     return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
 
@@ -154,7 +154,7 @@ def test_a_response_without_an_answer_does_not_drive_the_study(
     notes: list[str] = []
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
-    work = Work(1, None, Stores(), Here(1), said, "exact")
+    work = Work(1, None, Stores(), LocalRunner(1), said, "exact")
     checked: Any = (None, None)
     study = work.grown(Study(checked, plan(200), (0, 1), {}, (), until=0.06))
     assert study.narrow is False
@@ -193,7 +193,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     spec = replace(p.questions[0].spec, expect=None)
     one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
     pool: Any = object()
-    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
     checked: Any = (None,)
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
     monkeypatch.setattr(layers, "samples_task", _first(Near(10**9)))
@@ -230,7 +230,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    work = Work(1, pool, Stores(), Here(1), Progress(), rung)
+    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), rung)
     study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
@@ -264,7 +264,7 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
         for q in (p.questions[0], p.questions[0])
     )
     pool: Any = object()
-    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, (), until=0.05)
     study = work.grown(study)
@@ -333,7 +333,7 @@ def test_only_runs_that_are_not_on_disk_are_announced(
             return store
 
     progress, pool = Listener(), object()
-    work = Work(1, pool, Kept(), Here(1), progress, "auto")  # type: ignore[arg-type]
+    work = Work(1, pool, Kept(), LocalRunner(1), progress, "auto")  # type: ignore[arg-type]
     checked: Any = (None, None)
     study = Study(checked, p, (0, 1), {}, tuple(answers))
     assert len(work._checks(study, asks)) == len(asks) == 120
@@ -359,7 +359,7 @@ def test_a_map_that_is_there_is_not_made_again(
             return pieces
 
     monkeypatch.setattr(tolerance_study, "yield_map", yield_map)
-    work = Work(1, None, Kept(), Here(1), Progress(), "exact")
+    work = Work(1, None, Kept(), LocalRunner(1), Progress(), "exact")
     checked: Any = (SimpleNamespace(model=SimpleNamespace(b=0.25)),) * 2
     study = Study(checked, p, (0, 1), {}, ())
     with pytest.raises(KeyboardInterrupt):

@@ -63,10 +63,10 @@ def test_a_constant_force_is_cured_at_the_first_try() -> None:
     assert judge(lost, asked.spec, asked.start)[0] is Verdict.LOST
     case = BoardCase(0, asked, ratio)
     seek(boards, [case], Bands())
-    assert case.found is not None
+    assert case.best is not None
     assert len(case.tries) == 1
-    assert case.found.setting == Adjustment(offset=ratio)
-    assert case.found.orbit.penetration == pytest.approx(asked.start.penetration, rel=1e-3)
+    assert case.best.setting == Adjustment(offset=ratio)
+    assert case.best.orbit.penetration == pytest.approx(asked.start.penetration, rel=1e-3)
 
 
 @pytest.fixture(scope="module")
