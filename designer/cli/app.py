@@ -159,8 +159,8 @@ def verb(
                 output.show()
             return 0 if output.satisfied else 1
 
-        _, *own, _ = inspect.signature(function, eval_str=True).parameters.values()
-        parameters = [*own, *(_parameter(name) for name in (*shared, *every))]
+        _, *specific, _ = inspect.signature(function, eval_str=True).parameters.values()
+        parameters = [*specific, *(_parameter(name) for name in (*shared, *every))]
         command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         command.__annotations__ = {p.name: p.annotation for p in parameters}
         app.command(rich_help_panel=group, epilog=f"\b\nExample:\n  {example}")(command)

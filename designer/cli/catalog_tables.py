@@ -29,7 +29,7 @@ def checks(name: str, measured: Sequence[FigureCheck]) -> None:
     )
 
 
-def catalog(known: Catalog) -> None:
+def catalog(entries: Catalog) -> None:
     """What can be bought."""
     units = {"resistor": "Ω", "capacitor": "F"}
     table(
@@ -43,7 +43,7 @@ def catalog(known: Catalog) -> None:
                 "grade": f"{100 * f.grade:g} %",
                 "price class": str(f.price),
             }
-            for f in known.families
+            for f in entries.families
         ),
     )
     table(
@@ -56,9 +56,9 @@ def catalog(known: Catalog) -> None:
                 "gain-bandwidth": format_quantity(o.gbw.nominal, "Hz"),
                 "price class": str(o.price),
             }
-            for o in known.opamps
+            for o in entries.opamps
         ),
     )
     for kind in ("Diodes", "References", "Trimmers", "Headers"):
-        names = [entry.name for entry in getattr(known, kind.lower())]
+        names = [entry.name for entry in getattr(entries, kind.lower())]
         say(f"{kind}: {', '.join(names) or 'none'}")

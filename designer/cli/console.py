@@ -27,11 +27,11 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
         say(f"\n{title}: none")
         return
     say(f"\n{title}")
-    shown = Table(*(Column(Text(head)) for head in heads), box=None)
-    shown.padding = (0, gap, 0, 0)
+    rich_table = Table(*(Column(Text(head)) for head in heads), box=None)
+    rich_table.padding = (0, gap, 0, 0)
     for row in rows:
-        shown.add_row(*(Text(cell) for cell in row))
-    _console().print(shown)
+        rich_table.add_row(*(Text(cell) for cell in row))
+    _console().print(rich_table)
 
 
 def _console() -> Console:

@@ -39,7 +39,10 @@ def synthesised(answer: Mapping[str, Any]) -> None:
     if answer.get("better_grades"):
         from designer.spread.part_grades import BetterGrade, better_grades_text
 
-        better = {name: BetterGrade(**g) for name, g in answer["better_grades"].items()}
+        better = {
+            name: BetterGrade(g["asked"], g["bought"])
+            for name, g in answer["better_grades"].items()
+        }
         say(better_grades_text(better))
     certificate = answer["certificate"]
     say(
@@ -73,7 +76,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         f"Responses, {answer['samples']} samples{of_file}",
         (
             {
-                **_asked(r, rows),
+                **_response_cells(r, rows),
                 "model": r["model"] if r["found"] else f"{r['model']} (not what is wanted)",
                 "circuit": r["circuit"],
                 "ngspice": r["ngspice"] or "-",
@@ -136,26 +139,26 @@ def _further(answer: Mapping[str, Any]) -> None:
         "trimmed %": lambda r: r.get("trimmed"),
         "reached %": lambda r: r.get("reached"),
     }
-    shown = {kind: of for kind, of in kinds.items() if any(of(r) for r in rows)}
+    kinds_present = {kind: of for kind, of in kinds.items() if any(of(r) for r in rows)}
     both = any(r.get("combined") for r in rows)
-    if not shown and not both:
+    if not kinds_present and not both:
         return
     table(
         "Further yields",
         (
             {
-                **_asked(r, rows),
-                **{kind: _decided(of(r) or {}) for kind, of in shown.items()},
+                **_response_cells(r, rows),
+                **{kind: _decided(of(r) or {}) for kind, of in kinds_present.items()},
                 **(_both_engines(r) if both else {}),
             }
             for r in rows
         ),
         gap=1,
     )
-    whole = answer.get("all_on_one_board") or {}
+    joint = answer.get("all_on_one_board") or {}
     counts = [
         f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
-        for kind, y in whole.items()
+        for kind, y in joint.items()
         if y is not None
     ]
     if counts:
@@ -183,7 +186,7 @@ def simulated(answer: Mapping[str, Any]) -> None:
         head,
         (
             {
-                **(_asked_in_si if masses else _asked)(r, rows),
+                **(_response_cells_in_si if masses else _response_cells)(r, rows),
                 "response": r["response"]
                 + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
                 "symmetric": YES_NO[r["symmetric"]],
@@ -215,8 +218,8 @@ def _reach(
     cells = {}
     for i, name in enumerate(masses):
         ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
-        shown = (value_text(x, "m") if in_si else f"{x:.6g}" for x in ends)
-        cells[f"x{i + 1} ({name})"] = " to ".join(shown) or "-"
+        ends_text = (value_text(x, "m") if in_si else f"{x:.6g}" for x in ends)
+        cells[f"x{i + 1} ({name})"] = " to ".join(ends_text) or "-"
     if masses:
         return cells
     si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
@@ -348,14 +351,14 @@ def files(folder: Path, reused: bool) -> None:
 
 def untrusted(trust: Mapping[str, Any]) -> list[str]:
     """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
-    known = {what: result for what, result in trust.items() if result is not None}
+    results = {quantity: result for quantity, result in trust.items() if result is not None}
     return [
-        f"{what} not to be trusted here: {'; '.join(result['reasons'])}"
-        for what, result in known.items()
+        f"{quantity} not to be trusted here: {'; '.join(result['reasons'])}"
+        for quantity, result in results.items()
         if result["trusted"] is False
     ] + [
-        f"{what} gave no answer: {'; '.join(result['reasons'])}"
-        for what, result in known.items()
+        f"{quantity} gave no answer: {'; '.join(result['reasons'])}"
+        for quantity, result in results.items()
         if result["trusted"] is None and result["reasons"]
     ]
 
@@ -368,8 +371,8 @@ def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
     return trust
 
 
-def _asked(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """The first cells of a response: what was asked for."""
+def _response_cells(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The first cells of a response: its frequency and the wanted n-p-q."""
     return {
         "ω": f"{row['omega']:g}",
         **_mechanism(row, rows, "frequency_hz"),
@@ -377,9 +380,11 @@ def _asked(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[st
     }
 
 
-def _asked_in_si(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """The same of a model whose plain numbers are SI values, where it has any."""
-    cells = _asked(row, rows)
+def _response_cells_in_si(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+) -> dict[str, str]:
+    """The same cells for a model whose plain numbers are SI values, where it has any."""
+    cells = _response_cells(row, rows)
     if "mechanism" not in cells:
         return cells
     return {"ω [rad/s]": cells["ω"], "frequency": cells["mechanism"], "expected": cells["expected"]}

@@ -25,19 +25,19 @@ def catalog(
     from designer.catalog.catalog import load_catalog
     from designer.cli import catalog_tables
 
-    known = load_catalog()
+    entries = load_catalog()
     if check is None:
         kinds = ("opamps", "families", "diodes", "references", "trimmers", "headers")
-        names = {kind: [entry.name for entry in getattr(known, kind)] for kind in kinds}
-        answer = {"format": 1, **names, "hash": known.hash}
-        return Output(answer, lambda: catalog_tables.catalog(known))
+        names = {kind: [entry.name for entry in getattr(entries, kind)] for kind in kinds}
+        answer = {"format": 1, **names, "hash": entries.hash}
+        return Output(answer, lambda: catalog_tables.catalog(entries))
     from designer.spice.opamp_check import checks
 
     session.progress.stage(f"{check} in ngspice")
-    measured = checks(known.opamp(check))
+    measured = checks(entries.opamp(check))
     rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
     return Output(
-        {"format": 1, "opamp": check, "checks": rows, "hash": known.hash},
+        {"format": 1, "opamp": check, "checks": rows, "hash": entries.hash},
         lambda: catalog_tables.checks(check, measured),
         all(row.agrees for row in measured),
     )

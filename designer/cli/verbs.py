@@ -81,8 +81,8 @@ def _designer(
 ) -> None:
     if version:
         print(f"designer {__version__}")
-        for name, found in _surroundings():
-            print(f"{name:8} {found}")
+        for name, version_text in _surroundings():
+            print(f"{name:8} {version_text}")
         raise typer.Exit
 
 
@@ -361,9 +361,9 @@ def search(
     return _output(outcome, outcome.answer, tables.searched)
 
 
-def _refuse(given: Mapping[str, object], expected: str) -> None:
+def _refuse(options: Mapping[str, object], expected: str) -> None:
     """InputError for the first of these options that has a value."""
-    for name, value in given.items():
+    for name, value in options.items():
         if value not in (None, []):
             raise InputError(None, name, value, expected)
 

@@ -76,8 +76,8 @@ def diagram(sweep: Sweep, points: Sequence[Bifurcation] = (), name: str = "") ->
     _head(figure, title(name, plan, 120))
     rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     for axes, track in zip(rows, strips, strict=False):
-        shown = [w for w in sweep.windows if w.track == track or not plan.followed]
-        _strip(axes, shown, plan.values, track if len(strips) > 1 else "")
+        track_windows = [w for w in sweep.windows if w.track == track or not plan.followed]
+        _strip(axes, track_windows, plan.values, track if len(strips) > 1 else "")
     coloured = _coloured(sweep)
     panels = rows[len(strips) :]
     _clouds(panels, sweep, coloured)

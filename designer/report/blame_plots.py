@@ -34,25 +34,25 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
     """Share of the losses avoided if one part, or one group, were exact: a row for each, a column
     for each response that lost boards. Groups stand above the line, then the parts that help
     most."""
-    shown = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.subjects]
-    if not shown:
+    blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.subjects]
+    if not blamed:
         figure = new_figure(7.4, 1.2)
         say(figure.subplots(), "no board was lost")
         return figure
-    groups, parts = _rows([b for _, b in shown])
+    groups, parts = _rows([b for _, b in blamed])
     rows = groups + parts
     figure = new_figure(7.4, max(0.2 * len(rows) + 1.3, LEAST_HEIGHT))
     axes = figure.subplots()
-    values = np.full((len(rows), len(shown)), np.nan)
-    for j, (_, b) in enumerate(shown):
-        known = {s.name: s for s in b.subjects}
+    values = np.full((len(rows), len(blamed)), np.nan)
+    for j, (_, b) in enumerate(blamed):
+        subject_of = {s.name: s for s in b.subjects}
         for i, name in enumerate(rows):
-            if name in known:
-                values[i, j] = 100.0 * known[name].share
+            if name in subject_of:
+                values[i, j] = 100.0 * subject_of[name].share
     image = axes.imshow(values, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
     axes.set_yticks(range(len(rows)), rows, color=INK)
-    ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in shown]
-    axes.set_xticks(range(len(shown)), ticks, color=INK, size=7)
+    ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in blamed]
+    axes.set_xticks(range(len(blamed)), ticks, color=INK, size=7)
     axes.tick_params(length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)
@@ -68,18 +68,18 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
 @styled
 def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
     """Sobol indices of each response's margin: its largest coordinates, first-order and total."""
-    shown = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
-    if not shown:
+    blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
+    if not blamed:
         figure = new_figure(7.4, 1.2)
         say(figure.subplots(), "nothing limits any response")
         return figure
-    columns = min(3, len(shown))
-    lines = -(-len(shown) // columns)
+    columns = min(3, len(blamed))
+    lines = -(-len(blamed) // columns)
     figure = new_figure(7.4, lines * (0.19 * INDICES_SHOWN + 0.75) + 0.5)
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True)
-    for axes in grid.flat[len(shown) :]:
+    for axes in grid.flat[len(blamed) :]:
         axes.set_axis_off()
-    for axes, (title, b) in zip(grid.flat, shown, strict=False):
+    for axes, (title, b) in zip(grid.flat, blamed, strict=False):
         _indices(axes, title, b)
     figure.supxlabel("share of the margin’s variance [%]", size=8.5)  # wider than one panel
     handles = [

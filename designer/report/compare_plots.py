@@ -74,8 +74,8 @@ def _errors(
     axes.set_xticks(ticks, ["exact", *(f"{t:.10g}" for t in ticks[1:])])
     axes.xaxis.set_minor_locator(NullLocator())
     for i, (row, mark) in enumerate(zip(sizes, marks, strict=True)):
-        drawn = [edge if v <= 100.0 * EXACT else v for v in row]
-        _dots(axes, drawn, i, len(columns), mark)
+        dots = [edge if v <= 100.0 * EXACT else v for v in row]
+        _dots(axes, dots, i, len(columns), mark)
 
 
 def _peaks(
@@ -92,13 +92,13 @@ def _peaks(
     limits = sorted({float(c["saturation"]) for c in columns})
     for limit in limits:
         axes.axvline(limit, color=INK, lw=0.9, ls=(0, (4, 2)))
-    shown: list[float] = []
+    positive: list[float] = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
         values = [_peak(peaks(c).get(n)) for n in names]
-        shown += [v for v in values if v > 0.0]
+        positive += [v for v in values if v > 0.0]
         _dots(axes, values, i, len(columns), mark)
     axes.set_xscale("log")
-    axes.set_xlim(min([*shown, 0.04]) / 2.0, 1.4 * limits[-1])
+    axes.set_xlim(min([*positive, 0.04]) / 2.0, 1.4 * limits[-1])
     plain_numbers(axes.xaxis)
     words = " and ".join(f"{v:g} V" for v in limits)
     axes.set_xlabel(f"peak output [V]; dashed: the op-amps' limit, {words}")

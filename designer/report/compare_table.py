@@ -35,15 +35,15 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     yield "threshold", [_number(c["threshold"], " V") for c in columns]
     yield "op-amp, its limit", [f"{c['opamp']}, {c['saturation']:g} V" for c in columns]
     loads = [peaks(c) for c in columns]
-    for section in dict.fromkeys(name for held in loads for name in held):
-        yield f"  peak {section}", [_peak(held.get(section)) for held in loads]
+    for section in dict.fromkeys(name for section_peaks in loads for name in section_peaks):
+        yield f"  peak {section}", [_peak(section_peaks.get(section)) for section_peaks in loads]
     yield "largest current", [_current(c["largest_current"]) for c in columns]
     for kind in ("typical", "maximum"):
         yield (
             f"{kind} offset / clearance",
             [_number((c["offset"] or {}).get(kind)) for c in columns],
         )
-    yield "responses kept", [_kept(c["responses"]) for c in columns]
+    yield "responses kept", [_wanted_count(c["responses"]) for c in columns]
     for i, response in enumerate(columns[0]["responses"]):
         wanted = f" ({response['expected']})" if response["expected"] else ""
         yield (
@@ -98,5 +98,5 @@ def _current(load: Mapping[str, Any] | None) -> str:
     return NONE if load is None else f"{1e3 * load['ampere']:.3g} mA, {load['section']}"
 
 
-def _kept(responses: Sequence[Mapping[str, Any]]) -> str:
+def _wanted_count(responses: Sequence[Mapping[str, Any]]) -> str:
     return f"{sum(r['kept'] for r in responses)} of {len(responses)}" if responses else NONE

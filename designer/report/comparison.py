@@ -51,7 +51,7 @@ _GAIN = 1e9
 
 
 @dataclass(frozen=True)
-class Shown:
+class SettledResponse:
     """One wanted response on one circuit: what it settles on from the model's own orbit."""
 
     omega: float
@@ -60,7 +60,7 @@ class Shown:
     """The wanted n-p-q; None where any is of interest."""
     orbit: Orbit
     """The orbit that the circuit settles on."""
-    kept: bool
+    is_wanted: bool
     """Whether that is the wanted response (where nothing is wanted, the model's)."""
 
 
@@ -117,8 +117,8 @@ class DesignColumn:
     """What the op-amps' offsets do; None where it does not apply."""
     loads: Loads
     """What its outputs have to give."""
-    shown: tuple[Shown, ...]
-    """What each wanted response settles on."""
+    settled: tuple[SettledResponse, ...]
+    """The orbit that the circuit settles on for each wanted response."""
     bill: Bill
     """What has to be bought."""
 
@@ -135,7 +135,7 @@ def compare(
     model, spec = result.design.model, result.modelfile.circuit
     if not isinstance(model, Dimensionless):
         return ()  # the paper's circuit is for its two masses
-    ours = ComparedCircuit(
+    design = ComparedCircuit(
         OURS,
         f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "
         f"capacitors {' and '.join(spec.capacitors)}",
@@ -144,7 +144,7 @@ def compare(
         result.design.amplitude(),
     )
     out = []
-    for candidate in (*paper_values.candidates(model, spec, result.catalog), ours):
+    for candidate in (*paper_values.candidates(model, spec, result.catalog), design):
         progress(candidate.name)
         out.append(column(candidate, model, result.model_responses, spec, result.catalog))
     return tuple(out)
@@ -173,7 +173,7 @@ def column(
         reason = str(error)
     reduction = Reduction(circuit, nominal_board(circuit))
     drives = [_drive(candidate, model, r) for r in wanted]
-    shown = tuple(
+    settled = tuple(
         _show(reduction, model, errors, r, d) for r, d in zip(wanted, drives, strict=True)
     )
     opamp = catalog.opamp(circuit.opamp)
@@ -189,9 +189,9 @@ def column(
         frequency_error=_frequency_error(candidate, errors),
         offset=offset_share(circuit, opamp),
         loads=loads.over(
-            reduction, *loads.runs([r.omega for r in wanted], drives, [s.orbit for s in shown])
+            reduction, *loads.runs([r.omega for r in wanted], drives, [s.orbit for s in settled])
         ),
-        shown=shown,
+        settled=settled,
         bill=bill_of(circuit, spec, catalog),
     )
 
@@ -210,7 +210,7 @@ def _show(
     errors: CoefficientErrors | None,
     response: ModelResponse,
     drive: Drive,
-) -> Shown:
+) -> SettledResponse:
     """From the model's orbit, or from rest where the circuit has no scale to carry it over."""
     start = np.zeros(len(reduction.circuit.states))
     if errors is not None:
@@ -219,11 +219,14 @@ def _show(
         orbit = settle(Flow(reduction.system(), drive), start)
     except ArithmeticError as error:
         orbit = failed(str(error))
-    kept = matches(orbit, response.spec)
+    is_wanted = matches(orbit, response.spec)
     if response.expected is None:
-        own = response.orbit
-        kept = (orbit.status, orbit.counts.family) == (own.status, own.counts.family)
-    return Shown(response.omega, response.expected, orbit, kept)
+        reference = response.orbit
+        is_wanted = (orbit.status, orbit.counts.family) == (
+            reference.status,
+            reference.counts.family,
+        )
+    return SettledResponse(response.omega, response.expected, orbit, is_wanted)
 
 
 def _k0(model: Dimensionless, errors: CoefficientErrors | None) -> float:
@@ -233,8 +236,8 @@ def _k0(model: Dimensionless, errors: CoefficientErrors | None) -> float:
     """
     if errors is None:
         return float("nan")
-    own = errors.errors["x1'' x1"]
-    off = [e - own for name, e in errors.errors.items() if name.endswith("stop slope")]
+    spring_error = errors.errors["x1'' x1"]
+    off = [e - spring_error for name, e in errors.errors.items() if name.endswith("stop slope")]
     if not off:
         return float("nan")
     mu = model.mu * np.exp(max(off, key=abs))
@@ -337,9 +340,9 @@ def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
 
 def comparison_json(columns: Sequence[DesignColumn]) -> dict[str, Any]:
     """``columns`` in order, and the sources of the printed values where they are one of them."""
-    known = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
+    by_net = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
     answer: dict[str, Any] = {
-        "columns": [_column_json(c) | _paper_names(c, known) for c in columns]
+        "columns": [_column_json(c) | _paper_names(c, by_net) for c in columns]
     }
     printed = [c for c in columns if c.candidate.name == paper_values.AS_PRINTED]
     if printed:
@@ -361,15 +364,15 @@ def in_answer(file: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in file.items() if k in ("columns", "printed_in")}
 
 
-def _paper_names(column: DesignColumn, known: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def _paper_names(column: DesignColumn, by_net: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """``paper_names``: what the paper calls each section, where its op-amps are no quads.
 
-    known : names by the net of the output, of a circuit with the paper's op-amps.
+    by_net : names by the net of the output, of a circuit with the paper's op-amps.
     """
     circuit = column.candidate.circuit
     if circuit.figures is None or circuit.figures.sections == len(QUAD):
         return {}
-    names = {s.name: known.get(s.output, s.name) for s in circuit.sections}
+    names = {s.name: by_net.get(s.output, s.name) for s in circuit.sections}
     return {"paper_names": names} if any(new != old for old, new in names.items()) else {}
 
 
@@ -398,10 +401,10 @@ def _column_json(column: DesignColumn) -> dict[str, Any]:
                 "omega": s.omega,
                 "expected": s.expected,
                 "circuit": s.orbit.response,
-                "kept": s.kept,
+                "kept": s.is_wanted,
                 "reason": s.orbit.reason,
             }
-            for s in column.shown
+            for s in column.settled
         ],
         "peaks": {
             load.section: {k: v for k, v in load.__dict__.items() if k != "section"}

@@ -61,7 +61,7 @@ class ReportData:
         return self.result.modelfile.si
 
     @property
-    def given(self) -> MechanicalModel | Mechanical:
+    def parameters(self) -> MechanicalModel | Mechanical:
         """The parameters as the model file gives them."""
         return self.mechanical or self.design.model
 
@@ -89,17 +89,17 @@ class ReportData:
         return better_grades(self.result.modelfile, self.design.circuit, self.result.catalog)
 
     @property
-    def ngspice_asked(self) -> bool:
-        """Whether ngspice was asked about every response that the nominal circuit shows."""
-        shown = [c for c in self.checked if c.circuit.status is OrbitStatus.PERIODIC]
+    def ngspice_ran(self) -> bool:
+        """Whether ngspice ran every response that the nominal circuit shows."""
+        periodic = [c for c in self.checked if c.circuit.status is OrbitStatus.PERIODIC]
         return any(c.gate is not None for c in self.checked) and all(
-            c.gate is not None for c in shown
+            c.gate is not None for c in periodic
         )
 
     def question_of(self, response: int) -> int | None:
         """The question of the plan that asks for a response; None where it was left out."""
-        asked = self.study.response_indices
-        return asked.index(response) if response in asked else None
+        indices = self.study.response_indices
+        return indices.index(response) if response in indices else None
 
     def blame_of(self, response: int) -> ResponseBlame | None:
         """The blame of a response."""

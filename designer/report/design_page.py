@@ -207,14 +207,14 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
             "from the nominal orbit it has to find the way, over at least 5/(1 − ρ) periods (ρ: "
             "largest multiplier)."
         )
-        asked: list[Block] = [note, ngspice]
+        confirmation: list[Block] = [note, ngspice]
         if ngspice is None:
-            asked = ["ngspice was not asked about any board."]
+            confirmation = ["ngspice was not asked about any board."]
         blocks += [
             response_tables.yield_table(data),
             pictures.get("yields"),
             _one("Board by board", tolerance_tables.boards(data)),
-            PageSection("Does ngspice confirm?", asked),
+            PageSection("Does ngspice confirm?", confirmation),
             _one("How near the boards are to the edge", pictures.get("margins")),
         ]
     kinds = tolerance_tables.kinds(data)
@@ -261,13 +261,13 @@ def _blame(data: ReportData, pictures: Pictures) -> PageSection:
 
 
 def _blame_note(blame: Blame, *, lost: bool) -> str:
-    asked = "No board was lost, so none was asked again. "
+    replays = "No board was lost, so none was asked again. "
     if lost:
-        asked = (
+        replays = (
             "Lost boards were asked again with one part or one group exact and all else as drawn; "
             "shares do not add up, since a board can be lost by several parts together. "
         )
-    return asked + (
+    return replays + (
         "The margin is the distance to the loss, linear in the parts; its indices tell whose "
         "spread moves it, and are worth as much as the verdicts that it foretells. Cost: "
         f"{words.plural(blame.attractors, 'attractor')} and "

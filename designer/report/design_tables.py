@@ -74,11 +74,11 @@ def model_table(model: Dimensionless) -> Table | None:
     return table(("parameter", "value", "what it is"), rows, (1,))
 
 
-def mechanical_table(given: Mechanical) -> Table | None:
+def mechanical_table(parameters: Mechanical) -> Table | None:
     rows = []
     for name, unit in MECHANICAL_UNITS.items():
         kind = _MEANINGS.get(name) or f"{_MEANINGS[name[0]]} {name[1:]}"
-        rows.append((name, words.quantity(getattr(given, name), unit), kind))
+        rows.append((name, words.quantity(getattr(parameters, name), unit), kind))
     return table(("parameter", "value", "what it is"), rows, (1,))
 
 
@@ -148,12 +148,12 @@ def _wanted(design: Design, name: str) -> str:
 
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:
-    scales, own = design.errors.scales, design.model.second_order().own_frequency
+    scales, unit_omega = design.errors.scales, design.model.second_order().own_frequency
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
         (
-            f"generator frequency at ω = {words.number(own)}",
-            words.quantity(scales.frequency(own), "Hz"),
+            f"generator frequency at ω = {words.number(unit_omega)}",
+            words.quantity(scales.frequency(unit_omega), "Hz"),
         ),
     ]
     if si is not None:
@@ -184,11 +184,11 @@ def _thresholds(design: Design) -> list[tuple[str, str]]:
     for number, (clearance, motion) in enumerate(
         zip(system.clearances, relative_motions(system), strict=False)
     ):
-        where = f"v{2 * clearance.mass + 1}"
+        symbol = f"v{2 * clearance.mass + 1}"
         if clearance.other is not None:
-            where = f"{motion.symbol} by the scale of {subscripted(f'x{clearance.mass + 1}')}"
+            symbol = f"{motion.symbol} by the scale of {subscripted(f'x{clearance.mass + 1}')}"
         named = "" if len(system.clearances) == 1 else f" in {clearance.name}"
-        rows.append((f"contact{named} begins at ({where})", _places(design, number)))
+        rows.append((f"contact{named} begins at ({symbol})", _places(design, number)))
     return rows
 
 

@@ -53,9 +53,9 @@ def map_chart(label: str, one: YieldMap) -> Figure:
     x = scale * np.array(one.axes[0].values)
     axes.fill_between(x, 100.0 * one.low, 100.0 * one.high, color=_BAND, lw=0.0)
     axes.plot(x, 100.0 * one.rate, "-o", color=_LINE, ms=3.6, lw=1.2)
-    gone = ~one.there
-    if gone.any():
-        axes.plot(x[gone], np.zeros(gone.sum()), "x", color=MUTED, ms=6, clip_on=False)
+    absent = ~one.there
+    if absent.any():
+        axes.plot(x[absent], np.zeros(absent.sum()), "x", color=MUTED, ms=6, clip_on=False)
     if name == "grade":
         axes.set_xscale("log")
         axes.set_xticks(x, [f"{v:g}" for v in x])
@@ -121,10 +121,10 @@ def _heat(label: str, one: YieldMap) -> Figure:
     axes.set_ylabel(_AXES["grade"])
     axes.axvline(one.used, color=ON_DARK, lw=1.0, ls="--")
     best = one.recommended
-    where = ([], []) if best is None else ([best[0]], [one.axes[1].values.index(best[1])])
+    marker = ([], []) if best is None else ([best[0]], [one.axes[1].values.index(best[1])])
     text = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
     axes.plot(
-        *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {text}"
+        *marker, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {text}"
     )  # fmt: skip
     axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {one.used:.4g}")
     axes.set_facecolor("#d9d9d9")

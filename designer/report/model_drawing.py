@@ -64,13 +64,13 @@ class _Page(MechanicalSheet):
 
     def label(self, name: str, join: str = " = ") -> str:
         """The name, and the value where there is one."""
-        shown = name.lower() if self.plain and name == "B" else name
-        shown = shown.translate(_SUBSCRIPTS)
+        symbol = name.lower() if self.plain and name == "B" else name
+        symbol = symbol.translate(_SUBSCRIPTS)
         if self.model is None:
-            return shown
+            return symbol
         value = getattr(self.model, name)
         text = words.quantity(value, MECHANICAL_UNITS[name]) if self.units else words.number(value)
-        return f"{shown}{join}{text}"
+        return f"{symbol}{join}{text}"
 
     def link(self, x0: float, x1: float, spring: str, damper: str) -> None:
         middle = 0.5 * (x0 + x1)

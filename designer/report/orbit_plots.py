@@ -71,8 +71,8 @@ def time_traces(
     n = max((o.n for o in orbits.values() if o.status is OrbitStatus.PERIODIC), default=0)
     span = n or APERIODIC_PERIODS
     reference = traces.get("model")
-    shown: list[Array] = []
-    for name, trace in _drawn(traces, orbits).items():
+    curves: list[Array] = []
+    for name, trace in _to_draw(traces, orbits).items():
         cycles, x = trace.time / period, _moved(checked, trace, motion)[:, 0]
         if reference is not None and name != "model" and n > 1:
             wanted = _moved(checked, reference, motion)[:, 0]
@@ -81,13 +81,13 @@ def time_traces(
         cycles, x = cycles[keep], x[keep]
         if not len(x):
             continue
-        shown.append(x)
+        curves.append(x)
         if name == "ngspice":
             at = _spaced(cycles / span, x / max(float(np.ptp(x)), 1e-300) * 0.5, 0.035)
             axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
-    limits = axis_limits(np.concatenate([*shown, [0.0]]), motion.gaps)
+    limits = axis_limits(np.concatenate([*curves, [0.0]]), motion.gaps)
     axes.set_ylim(limits)
     axes.set_xlim(0.0, span)
     shade_stops(axes, list(motion.stops), limits, across=True)
@@ -115,8 +115,8 @@ def _orbits(checked: CheckedResponse) -> dict[str, Orbit]:
     return orbits
 
 
-def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str, Trace]:
-    """What there is to draw; a failed run of ngspice is no response and is not drawn."""
+def _to_draw(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str, Trace]:
+    """The traces to draw, by engine; a failed run of ngspice is not drawn."""
     return {
         name: traces[name]
         for name in ENGINES
@@ -139,24 +139,24 @@ def _portrait(
     clearance: int,
 ) -> None:
     orbits = _orbits(checked)
-    drawn = {
+    curves = {
         name: states[np.isfinite(states).all(axis=1)]
-        for name, trace in _drawn(traces, orbits).items()
+        for name, trace in _to_draw(traces, orbits).items()
         for states in [_moved(checked, trace, motion)]
     }
-    every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
+    every = np.concatenate([np.zeros((1, 2)), *curves.values()])
     xlim = axis_limits(every[:, 0], motion.gaps)
     ylim = axis_limits(every[:, 1], ())
     shade_stops(axes, list(motion.stops), xlim)
-    for name, states in drawn.items():
+    for name, states in curves.items():
         if name == "ngspice":
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
     model = checked.model.orbit
     for side, place in motion.stops:
-        here = (model.impact_sides == side) & (model.impact_clearances == clearance)
-        entry = model.impact_velocities[here]
+        at_stop = (model.impact_sides == side) & (model.impact_clearances == clearance)
+        entry = model.impact_velocities[at_stop]
         axes.plot(
             np.full(len(entry), place),
             entry,
@@ -172,10 +172,10 @@ def _portrait(
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set_xlabel(motion.symbol)
     axes.set_ylabel(motion.rate)
-    shown = [f"{name} {orbit.response}" for name, orbit in orbits.items()]
-    text = "   ".join(shown)
+    names = [f"{name} {orbit.response}" for name, orbit in orbits.items()]
+    text = "   ".join(names)
     if len(text) > WIDEST_TITLE:
-        text = "\n".join(shown)
+        text = "\n".join(names)
     wanted = f", wanted {checked.model.expected}" if checked.model.expected else ""
     pad = 17.0 + 11.0 * text.count("\n")
     axes.set_title(

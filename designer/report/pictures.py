@@ -55,13 +55,13 @@ def pictures(data: ReportData) -> Pictures:
     def element(figure: Figure, shows: str) -> Markup:
         return page.element(to_svg(figure), shows)
 
-    given = data.given
+    parameters = data.parameters
     out: dict[str, Picture | Gallery] = {}
-    if isinstance(given, Dimensionless | Mechanical):
-        drawing = element(model_drawing(given), _drawing_label(data))
+    if isinstance(parameters, Dimensionless | Mechanical):
+        drawing = element(model_drawing(parameters), _drawing_label(data))
         out["model"] = Picture(svg=drawing)
-    elif isinstance(given, LumpedSystem):
-        drawing = element(system_drawing(given, si=data.si is not None), _drawing_label(data))
+    elif isinstance(parameters, LumpedSystem):
+        drawing = element(system_drawing(parameters, si=data.si is not None), _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     if data.checked:
         out["portraits"] = _portraits(data, element)
@@ -116,7 +116,7 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
 def _card(data: ReportData, response: int, clearance: int, element: Element) -> Picture:
     """One response, seen in one clearance."""
     c = data.checked[response]
-    drawn, omega = traces(data.design, c), words.number(c.model.omega)
+    curves, omega = traces(data.design, c), words.number(c.model.omega)
     system = data.design.model.at(c.model.b).second_order()
     motion = relative_motions(system)[clearance]
     engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
@@ -126,10 +126,10 @@ def _card(data: ReportData, response: int, clearance: int, element: Element) -> 
     if len(system.clearances) > 1:
         place = f" in {system.clearances[clearance].name}"
         caption = f"{motion.label}{place} · {caption}"
-    portrait = orbit_plots.phase_portrait(c, drawn, motion, clearance)
+    portrait = orbit_plots.phase_portrait(c, curves, motion, clearance)
     shows = element(portrait, f"Phase portrait{place} at ω = {omega}: {engines}.")
     shows += element(
-        orbit_plots.time_traces(c, drawn, motion), f"{motion.symbol} over time at ω = {omega}."
+        orbit_plots.time_traces(c, curves, motion), f"{motion.symbol} over time at ω = {omega}."
     )
     return Picture("", caption, svg=shows, warning=words.problem(c))
 

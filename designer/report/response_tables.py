@@ -148,11 +148,11 @@ def _reasons(answers: Sequence[Answer]) -> str:
     counts = reasons((a.verdict, a.reason) for a in answers)
     named = [(text.replace(": to ", " to "), n) for text, n in counts.items()]
     ranked = sorted(named, key=lambda item: (-item[1], item[0]))
-    shown = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
+    phrases = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
     rest = ranked[REASONS_SHOWN:]
     if rest:
-        shown.append(f"{words.plural(len(rest), 'other outcome')} ({sum(n for _, n in rest)})")
-    return ", ".join(shown)
+        phrases.append(f"{words.plural(len(rest), 'other outcome')} ({sum(n for _, n in rest)})")
+    return ", ".join(phrases)
 
 
 def ngspice_table(data: ReportData) -> Table | None:
@@ -160,13 +160,13 @@ def ngspice_table(data: ReportData) -> Table | None:
     rows = []
     for i, c in enumerate(data.checked):
         for kind, start in STARTED.items():
-            asked = [
+            checks = [
                 h
                 for h in data.study.rows_of(i, data.study.cross_checks)
                 if h.kind is kind and h.response
             ]
-            if asked:
-                cells = _ngspice_cells(data.study.answers_to(i), asked)
+            if checks:
+                cells = _ngspice_cells(data.study.answers_to(i), checks)
                 rows.append((words.name(c), start, *cells))
     columns = (
         "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
@@ -175,11 +175,11 @@ def ngspice_table(data: ReportData) -> Table | None:
     return table(columns, rows, range(2, 7))
 
 
-def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[CrossCheck]) -> tuple[str, ...]:
-    known = {a.sample: a for a in answers}
+def _ngspice_cells(answers: Sequence[Answer], checks: Sequence[CrossCheck]) -> tuple[str, ...]:
+    answer_of = {a.sample: a for a in answers}
     notes: dict[NgspiceVerdict, Counter[str]] = {one: Counter() for one in NgspiceVerdict}
-    for h in asked:
-        answer = known[h.sample]
+    for h in checks:
+        answer = answer_of[h.sample]
         outcome = h.outcome(answer)
         note = h.reason or "no reason given"
         if outcome is NgspiceVerdict.DIFFERED:
@@ -188,8 +188,8 @@ def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[CrossCheck]) -> tu
     counts = [str(notes[one].total()) for one in NgspiceVerdict]
     del notes[NgspiceVerdict.AGREED]
     ranked = sorted((t, n) for counted in notes.values() for t, n in counted.items())
-    shown = ", ".join(f"{t} ({n})" for t, n in ranked[:REASONS_SHOWN])
-    return (str(len(asked)), *counts, shown)
+    text = ", ".join(f"{t} ({n})" for t, n in ranked[:REASONS_SHOWN])
+    return (str(len(checks)), *counts, text)
 
 
 def equation_table(check: EquationCheck) -> Table | None:
@@ -204,10 +204,10 @@ def equation_table(check: EquationCheck) -> Table | None:
 
 
 def provenance_table(data: ReportData) -> Table | None:
-    known = {k: v for k, v in data.result.provenance.items() if k != "spread"}
+    provenance = {k: v for k, v in data.result.provenance.items() if k != "spread"}
     spread = data.plan.spread
     text = f"{spread.name}: {words_of(spread, data.design.circuit)} (part by part in {TOLERANCE})"
-    return table(("what", "value"), [*_flat(known), ("spread", text)])
+    return table(("what", "value"), [*_flat(provenance), ("spread", text)])
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:

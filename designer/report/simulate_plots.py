@@ -139,7 +139,7 @@ def _portrait(axes: Axes, response: Simulated, number: int, units: Mapping[str, 
     every = np.concatenate(curves)
     xlim, ylim = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
     shade_stops(axes, motion.stops, xlim)
-    for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
+    for orbit, curve, look in zip(_traced_orbits(response), curves, _LOOKS, strict=False):
         axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
         for side, gap in motion.stops:
             speeds = orbit.impact_velocities[_at_stop(orbit, number, side)]
@@ -181,12 +181,12 @@ def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str
     period = 2.0 * np.pi / response.omega
     n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
     span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
-    shown = []
-    for orbit, trace, look in zip(_drawn(response), response.traces, _LOOKS, strict=False):
+    curves = []
+    for orbit, trace, look in zip(_traced_orbits(response), response.traces, _LOOKS, strict=False):
         cycles = trace.time / period
         x = motion.of(trace.time, trace.states, response.omega)[:, 0]
-        own = {side: _at_stop(orbit, number, side) for side, _ in motion.stops}
-        times = {side: orbit.impact_times[at] / period for side, at in own.items()}
+        impacts = {side: _at_stop(orbit, number, side) for side, _ in motion.stops}
+        times = {side: orbit.impact_times[at] / period for side, at in impacts.items()}
         if 0 < n < span:  # again, to fill what is shown
             laps = -(-span // n)
             cycles = np.concatenate([cycles + k * n for k in range(laps)])
@@ -195,11 +195,11 @@ def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str
             times = {side: (at + again).ravel() for side, at in times.items()}
         keep = cycles <= span * (1.0 + 1e-9)
         axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
-        shown.append(x[keep])
+        curves.append(x[keep])
         for side, gap in motion.stops:
             at = times[side][times[side] <= span]
             _impacts(axes, at, np.full(len(at), gap), side, look)
-    limits = axis_limits(np.concatenate(shown), motion.gaps)
+    limits = axis_limits(np.concatenate(curves), motion.gaps)
     shade_stops(axes, motion.stops, limits, across=True)
     axes.set_xlim(0.0, span)
     axes.set_ylim(limits)
@@ -222,7 +222,7 @@ def _file(stem: str, kind: str, form: str) -> str:
     return f"{stem}-{kind}.{form}"
 
 
-def _drawn(response: Simulated) -> list[Orbit]:
+def _traced_orbits(response: Simulated) -> list[Orbit]:
     """The orbits of the traces: the one that was found, then its twin."""
     return [o for o in (response.orbit, response.twin) if o is not None]
 
@@ -262,7 +262,7 @@ def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str,
     handles = []
     twin = response.twin
     labels = [response.orbit.response, "" if twin is None else f"{twin.response}, its mirror twin"]
-    for orbit, look, label in zip(_drawn(response), _LOOKS, labels, strict=False):
+    for orbit, look, label in zip(_traced_orbits(response), _LOOKS, labels, strict=False):
         handles.append(Line2D([], [], **look, lw=max(_width(orbit), 1.0), label=label))
     if any(motion.stops for motion in response.motions):
         if len(response.orbit.impact_sides):

@@ -23,11 +23,11 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
     if circuit.references:
         grade = max(spread.grade_of(r) for r in circuit.references)
         parts.append(f"references uniform within ± {_percent(grade)}, diodes exact")
-    for what, law, unit in (
+    for quantity_name, law, unit in (
         ("bias current", spread.bias, "A"),
         ("gain-bandwidth", spread.gain_bandwidth, "Hz"),
     ):
-        parts += [f"{what} {_between(law, unit)}"] if law is not None else []
+        parts += [f"{quantity_name} {_between(law, unit)}"] if law is not None else []
     if spread.gain_bandwidth is not None:
         parts[-1] += f" (which {NO_BANDWIDTH})"
     if spread.supply:
@@ -41,8 +41,8 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
     for grade in sorted({spread.grades[name] for name in better}):
         names = ", ".join(name for name in better if spread.grades[name] == grade)
         parts.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")
-    own = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural_key)
-    parts += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
+    single = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural_key)
+    parts += [f"with a grade or distribution of their own: {', '.join(single)}"] if single else []
     networks = [g for g in spread.groups if not g.reel]
     parts += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]
     for share in sorted({g.share for g in spread.groups if g.reel}):

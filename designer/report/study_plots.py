@@ -59,8 +59,8 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
     every = any(y is not None and y.census for y in yields)
     left.set_xlabel("yield, of all boards [%]" if every else "yield with its 95 % interval [%]")
     right.set_xlabel("share of the samples [%]; counts inside")
-    shown = {v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)}
-    _verdict_key(figure, shown, dict.fromkeys(Verdict, "s"), 7)
+    verdicts = {v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)}
+    _verdict_key(figure, verdicts, dict.fromkeys(Verdict, "s"), 7)
     return figure
 
 
@@ -110,20 +110,20 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
     rows = max(len(labels), 1)
     figure = new_figure(7.4, 0.38 * rows + 1.15)
     left, right = figure.subplots(1, 2, sharey=True)
-    shown: set[Verdict] = set()
+    verdicts: set[Verdict] = set()
     positive: list[float] = []
     for i, row in enumerate(answers):
         for verdict in Verdict:
-            here = [a for a in row if a.verdict is verdict]
-            shift = np.array([_jitter(a.sample) for a in here])
+            boards = [a for a in row if a.verdict is verdict]
+            shift = np.array([_jitter(a.sample) for a in boards])
             for axes, values in (
-                (left, np.array([a.radius for a in here])),
-                (right, np.array([min(a.penetration, a.miss) for a in here])),
+                (left, np.array([a.radius for a in boards])),
+                (right, np.array([min(a.penetration, a.miss) for a in boards])),
             ):
                 fine = np.isfinite(values) & (values > 0.0)
                 if not fine.any():
                     continue
-                shown.add(verdict)
+                verdicts.add(verdict)
                 positive += list(values[fine]) if axes is right else []
                 axes.plot(
                     values[fine],
@@ -148,18 +148,18 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
         right.xaxis.set_major_locator(LogLocator(subs=subs))
         plain_numbers(right.xaxis)
     right.set_xlabel("shallowest contact or nearest miss [V]")
-    _verdict_key(figure, shown, MARKERS, 5)
+    _verdict_key(figure, verdicts, MARKERS, 5)
     return figure
 
 
 def _verdict_key(
-    figure: Figure, shown: Collection[Verdict], markers: Mapping[Verdict, str], size: float
+    figure: Figure, verdicts: Collection[Verdict], markers: Mapping[Verdict, str], size: float
 ) -> None:
     look: dict[str, Any] = {"ls": "", "ms": size}
     handles = [
         Line2D([], [], marker=markers[v], color=VERDICTS[v], label=str(v), **look)
         for v in Verdict
-        if v in shown
+        if v in verdicts
     ]
     if handles:
         figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))

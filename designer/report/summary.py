@@ -19,13 +19,15 @@ def summary(data: ReportData) -> list[str]:
     number = len(data.checked)
     wanted = words.plural(number, "response")
     title = data.result.modelfile.title
-    asked = f"Asked for: an op-amp circuit that behaves like the model “{title}”"
-    out = [f"{asked} and shows {wanted} of it." if number else f"{asked}; no response is named."]
+    purpose = f"Asked for: an op-amp circuit that behaves like the model “{title}”"
+    out = [
+        f"{purpose} and shows {wanted} of it." if number else f"{purpose}; no response is named."
+    ]
     if number:
         bad = [c for c in data.checked if words.problem(c)]
         engines = (
             "the model, the exact circuit and ngspice"
-            if data.ngspice_asked
+            if data.ngspice_ran
             else "the model and the exact circuit (ngspice was not asked)"
         )
         if not bad:
@@ -69,8 +71,8 @@ def _yield_words(data: ReportData) -> str:
     safe = sum(y.ok == y.samples for _, y in rows)
     worst, least = min(decided, key=lambda row: row[1].rate)
     if safe == len(rows):
-        shown = "it" if len(rows) == 1 else f"{words.all_of(len(rows)).lower()} responses"
-        out.append(f"every one shows {shown}: of a thousand, {_of_a_thousand(least)}.")
+        object_ = "it" if len(rows) == 1 else f"{words.all_of(len(rows)).lower()} responses"
+        out.append(f"every one shows {object_}: of a thousand, {_of_a_thousand(least)}.")
     else:
         if safe:
             verb = "survives" if safe == 1 else "survive"
@@ -79,11 +81,11 @@ def _yield_words(data: ReportData) -> str:
             f"the most delicate is {words.name(worst)}, shown by {least.ok} of "
             f"{least.samples - least.failed}: of a thousand boards, {_of_a_thousand(least)}."
         )
-    whole = data.study.all_on_one_board
-    if whole is not None and math.isfinite(whole.rate) and safe < len(rows):
+    joint = data.study.all_on_one_board
+    if joint is not None and math.isfinite(joint.rate) and safe < len(rows):
         out.append(
-            f"{words.all_of(len(data.checked))} responses on one and the same board: {whole.ok} of "
-            f"{whole.samples - whole.failed}; of a thousand, {_of_a_thousand(whole)}."
+            f"{words.all_of(len(data.checked))} responses on one and the same board: {joint.ok} of "
+            f"{joint.samples - joint.failed}; of a thousand, {_of_a_thousand(joint)}."
         )
     failed = sum(y.failed for _, y in rows)
     if failed:
@@ -113,26 +115,26 @@ def tiles(data: ReportData) -> list[tuple[str, str]]:
     good = sum(not words.problem(c) for c in data.checked)
     out = []
     if data.checked:
-        asked = "all engines agree" if data.ngspice_asked else "ngspice was not asked"
-        what = "response" if len(data.checked) == 1 else "responses"
-        out.append((f"{good} of {len(data.checked)}", f"{what} found, {asked}"))
+        engines = "all engines agree" if data.ngspice_ran else "ngspice was not asked"
+        name = "response" if len(data.checked) == 1 else "responses"
+        out.append((f"{good} of {len(data.checked)}", f"{name} found, {engines}"))
     worst = data.design.errors.max_error
     if worst <= EXACT:
         out.append(("exact", "every coefficient of the equations"))
     else:
         out.append((words.error(worst), "largest coefficient error"))
     out.append((str(data.design.distinct_values), "different R and C values"))
-    known = [y for y in data.yields if y and math.isfinite(y.rate)]
-    if known:
-        what = "yield" if len(known) == 1 else "least yield"
-        out.append(_yield_tile(what, min(known, key=lambda y: y.rate)))
-    whole = data.study.all_on_one_board
-    if whole is not None and math.isfinite(whole.rate):
-        out.append(_yield_tile("all on one board", whole))
+    rated = [y for y in data.yields if y and math.isfinite(y.rate)]
+    if rated:
+        name = "yield" if len(rated) == 1 else "least yield"
+        out.append(_yield_tile(name, min(rated, key=lambda y: y.rate)))
+    joint = data.study.all_on_one_board
+    if joint is not None and math.isfinite(joint.rate):
+        out.append(_yield_tile("all on one board", joint))
     return out
 
 
-def _yield_tile(what: str, counted: Yield) -> tuple[str, str]:
+def _yield_tile(name: str, counted: Yield) -> tuple[str, str]:
     low, high = words.span(*counted.interval)
     within = words.limits(counted, f"{low} to {high}\u00a0%")
-    return f"{100 * counted.rate:.0f} %", f"{what} ({within})"
+    return f"{100 * counted.rate:.0f} %", f"{name} ({within})"

@@ -173,8 +173,8 @@ class _Page(MechanicalSheet):
         end = plate + side * _STOP
         self.line([plate, plate], [y - 0.4, y + 0.4], INK, 2.0)
         self.spring(plate, end, y)
-        own = self.values.get(f"{gap.name}.{word}_stiffness")
-        stiffness = own or self.values.get(f"{gap.name}.stiffness", "Hertz")
+        side_stiffness = self.values.get(f"{gap.name}.{word}_stiffness")
+        stiffness = side_stiffness or self.values.get(f"{gap.name}.stiffness", "Hertz")
         preload = self.values.get(f"{gap.name}.preload")
         text = stiffness if preload is None else f"{stiffness}, preload {preload}"
         self.text(0.5 * (plate + end), y - 0.95, text)

@@ -65,7 +65,7 @@ def kinds(data: ReportData) -> Table | None:
     lines = [(words.name(c), *(cell(i) for cell, _ in columns.values()))
              for i, c in enumerate(data.checked)]  # fmt: skip
     if study.all_on_one_board is not None:
-        lines.append(("all on one board", *(_share(whole) for _, whole in columns.values())))
+        lines.append(("all on one board", *(_share(joint) for _, joint in columns.values())))
     return table(("response", *columns), lines, range(1, len(columns) + 1))
 
 
@@ -100,15 +100,15 @@ def differences(data: ReportData) -> Table | None:
             continue
         d = both.disagreement
         low, high = d.interval
-        shown = [
+        boards_text = [
             f"board {x.sample} from {STARTED[x.kind]}: exact circuit {x.exact}, "
             f"ngspice {x.ngspice} ({x.explanation})"
             for x in both.differences[:DIFFERENCES_SHOWN]
         ]
-        more = len(both.differences) - len(shown)
-        shown += [f"{more} more"] if more > 0 else []
+        more = len(both.differences) - len(boards_text)
+        boards_text += [f"{more} more"] if more > 0 else []
         rate = f"{d.count} of {d.of} ({100 * low:.2g} to {100 * high:.2g} %)"
-        rows.append((words.name(c), rate, "; ".join(shown) or "none"))
+        rows.append((words.name(c), rate, "; ".join(boards_text) or "none"))
     columns = (
         "response",
         "another n-p-q in ngspice, of the random boards",

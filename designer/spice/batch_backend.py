@@ -80,15 +80,15 @@ class BatchNgspice:
         check_netlist(netlist)
         with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
             Path(folder, "deck.cir").write_bytes(netlist.encode("utf-8") + b"\n")
-            done = _call([self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"], folder)
-            log = done.stdout.decode("utf-8", "replace") + done.stderr.decode("utf-8", "replace")
+            run = _call([self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"], folder)
+            log = run.stdout.decode("utf-8", "replace") + run.stderr.decode("utf-8", "replace")
             raw = Path(folder, "deck.raw")
             content = raw.read_bytes() if raw.exists() else b""
         try:
-            return read_raw(content), log, done.returncode
+            return read_raw(content), log, run.returncode
         except ValueError as error:
             line = offending_line(log)
-            reason = f"{error} (ngspice exit {done.returncode})" if line is None else quoted(line)
+            reason = f"{error} (ngspice exit {run.returncode})" if line is None else quoted(line)
             raise SimulationFailed(reason, log) from error
 
 
@@ -113,8 +113,8 @@ def program_version() -> str:
 def _version_of(program: str) -> str:
     with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
         text = _call([program, "-n", "--version"], folder).stdout.decode("utf-8", "replace")
-    found = re.search(r"ngspice-(\d[\w.+-]*)", text)
-    return found[1] if found else ""
+    match = re.search(r"ngspice-(\d[\w.+-]*)", text)
+    return match[1] if match else ""
 
 
 def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]:

@@ -120,12 +120,12 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
         raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
     figures = circuit.figures
     vendor = rung == "full" and figures.spice is not None
-    drawn = {} if vendor else board.gain_bandwidth
+    gbw_of = {} if vendor else board.gain_bandwidth
     loads = {} if vendor or rung != "full" else circuit.output_loads(board.values)
     more = {
         s.name: {
             **(opamp_model.load(rung, loads[s.name]) if s.name in loads else {}),
-            **(opamp_model.bandwidth(rung, figures, drawn[s.name]) if s.name in drawn else {}),
+            **(opamp_model.bandwidth(rung, figures, gbw_of[s.name]) if s.name in gbw_of else {}),
         }
         for s in circuit.sections
     }
@@ -251,9 +251,9 @@ def options(settings: SolverSettings) -> str:
 
 
 def voltages(circuit: Circuit, *, stage: bool = True) -> str:
-    """What a run shows: the states, each dead-zone stage's output (``stage``), the generator."""
-    shown = circuit.outputs if stage else circuit.state_nets
-    return " ".join(f"v({net})" for net in (*shown, circuit.generator.net))
+    """The voltages that a run saves: states, outputs of the dead zones (``stage``), generator."""
+    nets = circuit.outputs if stage else circuit.state_nets
+    return " ".join(f"v({net})" for net in (*nets, circuit.generator.net))
 
 
 def title_line(text: str) -> str:

@@ -131,17 +131,17 @@ class EquationCheck:
         }
 
 
-def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> EquationCheck:
+def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -> EquationCheck:
     """Compare the design's deck, in ngspice, with its model.
 
-    found : responses that the model shows; they say how deep contacts are.
+    responses : those of the model; their amplitudes give the depth of contacts.
 
     Raises
     ------
     EnvironmentMissing : see `SpicePool.map`.
     """
     model = design.model.second_order()
-    rests = static_rests(design, model, found)
+    rests = static_rests(design, model, responses)
     centre = _resonance(model)
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
     curve = rests if design.circuit.stops else ()
@@ -250,10 +250,10 @@ def _deck(
     circuit = design.circuit
     board = nominal_board(circuit, ideal=True)
     try:
-        known = rest(Reduction(circuit, board), generator, sides) if nodeset else []
+        volts = rest(Reduction(circuit, board), generator, sides) if nodeset else []
     except ArithmeticError:  # a floating net: ngspice shall say it
-        known = []
-    resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in known)] if known else []
+        volts = []
+    resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in volts)] if volts else []
     text = deck.write(
         circuit,
         board,
@@ -285,8 +285,8 @@ def rest(reduction: Reduction, generator: float, sides: tuple[int, ...]) -> list
     mode = reduction.system().mode(key)
     x = np.linalg.solve(mode.A, -(mode.B * generator + mode.d))
     voltage = reduction.solution(key).voltage
-    known = np.concatenate([x, [generator, 1.0]])
-    return [(net, float(voltage[net] @ known)) for net in circuit.nets]
+    inputs = np.concatenate([x, [generator, 1.0]])
+    return [(net, float(voltage[net] @ inputs)) for net in circuit.nets]
 
 
 def _volts(design: Design, force: float) -> float:
@@ -297,9 +297,9 @@ def _volts(design: Design, force: float) -> float:
 def _ac(
     design: Design, resting: StaticRest, low: float, high: float, *, nodeset: bool
 ) -> SpiceJob[Waveforms]:
-    held = _volts(design, 0.5 * (resting.near + resting.far))
-    source, card = f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, held, resting.sides, nodeset=nodeset)
+    generator = _volts(design, 0.5 * (resting.near + resting.far))
+    source, card = f"DC {generator!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
+    text = _deck(design, source, card, generator, resting.sides, nodeset=nodeset)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
 
 
@@ -311,8 +311,8 @@ def _dc(design: Design, resting: StaticRest, *, nodeset: bool) -> SpiceJob[Wavef
     step = (last - first) / POINTS
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
-    shown = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
-    nets = tuple(dict.fromkeys(net for pair in shown for net in pair))
+    pairs = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
+    nets = tuple(dict.fromkeys(net for pair in pairs for net in pair))
     text = _deck(design, "DC 0", card, near, resting.sides, nodeset=nodeset, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
 
@@ -340,8 +340,8 @@ def _transfer(
     unit = -scales.volts[0] / design.amplitude()
     wanted = unit * transfer(model, omega, sides)
     deviation = np.abs(answer.signals[design.circuit.state_nets[0]] / wanted - 1.0)
-    known = design.errors.max_error * explained(model, omega, sides)
-    bounds = np.expm1(known + _drive_error(design, model, omega, sides)) + FLOOR
+    explained_error = design.errors.max_error * explained(model, omega, sides)
+    bounds = np.expm1(explained_error + _drive_error(design, model, omega, sides)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 

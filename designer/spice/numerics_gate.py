@@ -258,8 +258,8 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
         entries = orbit.impact_times[mine]
         # One further as well: rounding may put an entry on the wrong side of a point.
         after = (entries // apart).astype(int)[:, None] + [1, 2]
-        met = touching[after % len(touching)].any(axis=1)
-        points = [*lengths, *np.ones(int(np.sum(~met)))]
+        is_sampled = touching[after % len(touching)].any(axis=1)
+        points = [*lengths, *np.ones(int(np.sum(~is_sampled)))]
         shortest = min([shortest, *(float(k) * apart for k in points)])
     return shortest
 
@@ -304,8 +304,8 @@ def check(
         outcomes = {}
         for number, outcome in remedies.run(pool, tasks, CURES):
             outcomes[number] = outcome
-            done = f"{len(outcomes)} of {len(tasks)} runs"
-            doing(f"step size {level + 1} of at most {levels}: {done}")
+            text = f"{len(outcomes)} of {len(tasks)} runs"
+            doing(f"step size {level + 1} of at most {levels}: {text}")
         for k, i in enumerate(open_):
             runs = [outcomes[3 * k + j] for j in range(3)]
             results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
@@ -315,22 +315,22 @@ def check(
 def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject]:
     """The subjects with the periods that each has to discard on its rung, from a short run."""
     out = list(subjects)
-    asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    indices = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
     tasks = []
-    for i in asked:
+    for i in indices:
         s = subjects[i]
         contact = shortest_contact(s.orbit, s.system, s.excitation)
         steps = 2 * first_steps(s, contact)
         probe = replace(s, discard=max(settling_periods.PROBE - 4, 0) * s.orbit.n)
         tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
     for k, outcome in remedies.run(pool, tasks):
-        s = subjects[asked[k]]
+        s = subjects[indices[k]]
         if isinstance(outcome.result, Read):
             peak = np.abs(s.orbit.extremes).max(axis=1)
-            found, _ = settling_periods.periods(
+            periods, _ = settling_periods.periods(
                 outcome.result.strobes, s.orbit.n, s.orbit.radius, peak
             )
-            out[asked[k]] = replace(s, discard=min(max(found, DISCARD), MOST_DISCARDED))
+            out[indices[k]] = replace(s, discard=min(max(periods, DISCARD), MOST_DISCARDED))
     return out
 
 

@@ -227,12 +227,12 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
     SimulationFailed : ngspice has no answer for one of them.
     EnvironmentMissing : ngspice is missing.
     """
-    bench, found = OpAmpBench.of(opamp, rung), []
+    bench, out = OpAmpBench.of(opamp, rung), []
 
     def add(name: str, unit: str, figure: Figure | None, measured: float, tolerance: float) -> None:
         if figure is not None:
             expected = figure.nominal
-            found.append(FigureCheck(name, unit, expected, measured, tolerance, figure.assumed))
+            out.append(FigureCheck(name, unit, expected, measured, tolerance, figure.assumed))
 
     add("gain", "V/V", opamp.gain, bench.open_loop_gain(), 0.01)
     add("offset", "V", opamp.offset, bench.offset(), 0.01)
@@ -242,7 +242,7 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
     add("swing into 10 kΩ, low", "V", opamp.saturation, -light[0], 0.01)
     add("swing into 10 kΩ, high", "V", opamp.saturation, light[1], 0.01)
     if rung == "ideal":
-        return found
+        return out
     at = opamp.gbw.nominal / 10.0
     frequency, gain = bench.response(at, 2.0 * at)
     add("gain-bandwidth", "Hz", opamp.gbw, float(abs(gain[0]) * frequency[0]), 0.02)
@@ -250,7 +250,7 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
         add(f"slew, {edge}", "V/s", opamp.slew, slope, 0.02)
     add("recovery", "s", opamp.recovery, bench.recovery(), 0.1)
     if rung == "dynamic":
-        return found
+        return out
     heavy = bench.swing(HEAVY_LOAD)
     add("swing into 2 kΩ, low", "V", opamp.swing_2k, -heavy[0], 0.01)
     add("swing into 2 kΩ, high", "V", opamp.swing_2k, heavy[1], 0.01)
@@ -259,7 +259,7 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
         add(f"short circuit, {side}", "A", opamp.output_current, abs(current), 0.02)
     add("supply current", "A", opamp.supply_current, bench.supply_current()[0], 0.01)
     add("noise at 1 kHz", "V/√Hz", opamp.noise, bench.noise(NOISE_FREQUENCY), 0.01)
-    return found
+    return out
 
 
 def _between(time: NDArray[np.float64], wave: NDArray[np.float64], a: float, b: float) -> float:

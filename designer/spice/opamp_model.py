@@ -107,10 +107,10 @@ def instance(
     voltage at the start of a transient [V]. more : `bandwidth` and `load` of this one; the model's
     own where None. ``ideal`` has neither memory nor bandwidth, and takes none of it.
     """
-    given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
+    parameters = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
     if rung != "ideal":
-        given |= {"start": start, **(more or {})}
-    words = " ".join(f"{key}={literal(value)}" for key, value in given.items())
+        parameters |= {"start": start, **(more or {})}
+    words = " ".join(f"{key}={literal(value)}" for key, value in parameters.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
 
@@ -121,10 +121,10 @@ def bandwidth(rung: Rung, opamp: OpAmp, gbw: float) -> dict[str, float]:
     """
     if rung == "ideal":
         return {}
-    own = {"gbw": gbw}
+    parameters = {"gbw": gbw}
     if rung == "full":
-        own["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
-    return own
+        parameters["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
+    return parameters
 
 
 def load(rung: Rung, ohms: float) -> dict[str, float]:
@@ -241,13 +241,13 @@ def _common_mode(opamp: OpAmp) -> list[str]:
             f"out_upper_limit={literal(-upper)} limit_range=0.01 fraction=FALSE)"
         )
     pull = REVERSAL if opamp.phase_reversal else 0.0
-    for pin, own, seen in (("inside", "p", "seen"), ("inn", "n", "seenn")):
-        cut = f"cut{own}" if upper is not None else f"kept{own}"
-        lines.append(f"Alowest{own} %vd({pin} vee) %vd({cut} vee) lowest")
+    for pin, suffix, node in (("inside", "p", "seen"), ("inn", "n", "seenn")):
+        cut = f"cut{suffix}" if upper is not None else f"kept{suffix}"
+        lines.append(f"Alowest{suffix} %vd({pin} vee) %vd({cut} vee) lowest")
         if upper is not None:
-            lines.append(f"Ahighest{own} %vd({cut} vcc) %vd(kept{own} vcc) highest")
-        sign = f"kept{own} {pin}" if own == "p" else f"{pin} kept{own}"
-        lines.append(f"Epull{own} {seen} kept{own} {sign} {literal(pull)}")
+            lines.append(f"Ahighest{suffix} %vd({cut} vcc) %vd(kept{suffix} vcc) highest")
+        sign = f"kept{suffix} {pin}" if suffix == "p" else f"{pin} kept{suffix}"
+        lines.append(f"Epull{suffix} {node} kept{suffix} {sign} {literal(pull)}")
     return lines
 
 

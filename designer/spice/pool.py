@@ -143,9 +143,9 @@ class SpicePool:
                 return
             self._hand_out(waiting)
             for worker in self._worth_a_look():
-                done = self._look_at(worker, waiting)
-                if done is not None:
-                    yield done
+                result = self._look_at(worker, waiting)
+                if result is not None:
+                    yield result
 
     def _hand_out(self, waiting: deque[_Task]) -> None:
         """Give tasks to ready workers, and start workers for the tasks that are left."""
@@ -219,7 +219,7 @@ class SpicePool:
 
     def _discard(self, worker: _Worker, patience: float = 0.0) -> int | None:
         """End a worker; see `_Worker.end`."""
-        with _interrupts_held():
+        with _interrupts_deferred():
             self._workers.remove(worker)
             return worker.end(patience)
 
@@ -264,7 +264,7 @@ class _Worker:
 
 
 def _end(workers: list[_Worker], folder: Path) -> None:
-    with _interrupts_held():
+    with _interrupts_deferred():
         for worker in workers:
             worker.end()
         workers.clear()
@@ -272,7 +272,7 @@ def _end(workers: list[_Worker], folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _interrupts_deferred() -> Iterator[None]:
     """Put Ctrl-C off until the end of the block, so that no worker gets lost on the way."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -284,17 +284,17 @@ def _interrupts_held() -> Iterator[None]:
 def _start(backend: Backend, folder: Path, workers: list[_Worker]) -> None:
     """Start a worker and enter it in the list, both or neither."""
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
+    parent_end, child_end = context.Pipe()
     process = context.Process(
-        target=work, args=(theirs, backend, str(folder)), name="designer-spice", daemon=True
+        target=work, args=(child_end, backend, str(folder)), name="designer-spice", daemon=True
     )
     # A held signal stays held in the child, so Ctrl-C cannot hit it before it can say that it
     # ignores it. The tracker would lift the hold if it were started inside the block.
     resource_tracker.ensure_running()
-    with _interrupts_held(), theirs:
+    with _interrupts_deferred(), child_end:
         with changed_environment(ONE_THREAD):  # before the child imports numpy
             process.start()
-        workers.append(_Worker(process, ours, folder, time.monotonic() + START_TIMEOUT))
+        workers.append(_Worker(process, parent_end, folder, time.monotonic() + START_TIMEOUT))
 
 
 def _unpack(value: bytes) -> Any:

@@ -76,7 +76,7 @@ def test_printed_values_show_what_the_errata_say(columns: dict[str, DesignColumn
     assert printed.frequency_error == pytest.approx(math.log(357.419 / right), rel=1e-9)
     assert printed.errors is not None
     assert printed.errors.scales.threshold == pytest.approx(13.0 / 210.6, rel=1e-9)
-    assert [s.kept for s in printed.shown] == [True, True]
+    assert [s.is_wanted for s in printed.settled] == [True, True]
 
 
 def test_corrected_values_have_these_right(columns: dict[str, DesignColumn]) -> None:
@@ -95,7 +95,7 @@ def test_f20_by_the_ratio_of_the_driving_resistors() -> None:
     got = comparison.column(candidate, model, [], SPEC, CATALOG)
     assert got.f20 == pytest.approx(1.0 / (1.0 + 3.0), rel=1e-9)
     assert got.b == pytest.approx(0.25, rel=1e-9)
-    assert got.shown == ()
+    assert got.settled == ()
     assert got.loads.sections == ()
     assert got.current is None
 
@@ -188,8 +188,8 @@ def test_no_clearance_no_share() -> None:
     got = comparison.column(candidate, linear, find(linear, [Response(0.9)]), SPEC, CATALOG)
     assert math.isnan(got.k0)
     assert math.isnan(got.b)
-    assert got.shown[0].orbit.response == "1-0-0"
-    assert got.shown[0].kept
+    assert got.settled[0].orbit.response == "1-0-0"
+    assert got.settled[0].is_wanted
     assert comparison_json([got])["columns"][0]["offset"] is None
 
 
@@ -202,7 +202,7 @@ def test_what_cannot_be_computed_leaves_the_rest(monkeypatch: pytest.MonkeyPatch
     got = comparison.column(candidate, PAPER, find(PAPER, [Response(0.85)]), SPEC, CATALOG)
     assert got.errors is None
     assert "x2'' x1" in got.reason
-    assert got.shown[0].orbit.status is OrbitStatus.PERIODIC  # from rest
+    assert got.settled[0].orbit.status is OrbitStatus.PERIODIC  # from rest
     assert got.current is not None
     answer = comparison_json([got])["columns"][0]
     assert answer["max_error"] is None
@@ -248,7 +248,7 @@ def test_a_circuit_that_is_driven_too_hard_says_so() -> None:
     candidate = paper_values.candidates(PAPER, SPEC, CATALOG)[1]
     loud = replace(candidate, amplitude=250.0 * candidate.amplitude)
     got = comparison.column(loud, PAPER, find(PAPER, [Response(0.85)]), SPEC, CATALOG)
-    assert not got.shown[0].kept
+    assert not got.settled[0].is_wanted
     assert got.b == pytest.approx(0.25 / 250.0, rel=1e-6)
     assert max(load.peak for load in got.loads.sections if load.section == "U1A") > 12.9
 
