@@ -105,13 +105,8 @@ class _Search:
         progress: Progress,
     ) -> None:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
-        self.without, self.seed, self.jobs, self.book, self.progress = (
-            without,
-            seed,
-            jobs,
-            book,
-            progress,
-        )
+        self.without, self.seed, self.jobs = without, seed, jobs
+        self.book, self.progress = book, progress
         self.waiting = branches(base, without)
         self.known: list[CureBranch] = []
         self.pictures: list[LinearModel] = []
@@ -172,7 +167,7 @@ class _Search:
             self.progress.stage(f"margins, {branch.name}")
             step = self.progress.stage(f"linear picture, {branch.name}")
             measured = self.before.measured if branch.upgrades == Upgrades() else ()
-            linear_model = picture(
+            model = picture(
                 branch,
                 self.target,
                 fresh(self.seed, 0),
@@ -183,13 +178,13 @@ class _Search:
                 jobs=self.jobs,
                 progress=step,
             )
-            if linear_model is None:
+            if model is None:
                 why = "the nominal circuit does not show every response"
                 self.refused.append(Refused(branch.upgrades, why))
                 continue
-            self.pictures.append(linear_model)
+            self.pictures.append(model)
             if branch.upgrades == Upgrades():  # it has been measured
-                self._learn(0, tuple(0 for _ in linear_model.slots), self.before)
+                self._learn(0, tuple(0 for _ in model.slots), self.before)
             best = self._better(best, len(self.pictures) - 1, target)
         return None if best is None else best[1:]
 
@@ -231,57 +226,52 @@ class _Search:
         self, which: int, target: float
     ) -> tuple[tuple[int, ...], tuple[float, ...]] | None:
         """The cheapest choice on one branch that its picture promises to be enough."""
-        linear_model = self.pictures[which]
-        base = tuple(0 for _ in linear_model.slots)
+        model = self.pictures[which]
+        base = tuple(0 for _ in model.slots)
         shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
         spoiled = frozenset((r, w) for k, r, w in self.spoiled if k == which)
         spoiled |= {
             (r, w)
-            for r, row in enumerate(linear_model.ways)
+            for r, row in enumerate(model.ways)
             for w, way in enumerate(row)
             if (way.margin is None and way.rate < target)
             or (way.hopeless and target >= self.target)
         }
-        if any(
-            all((r, w) in spoiled for w in range(len(row)))
-            for r, row in enumerate(linear_model.ways)
-        ):
+        if any(all((r, w) in spoiled for w in range(len(row))) for r, row in enumerate(model.ways)):
             return None
-        z = linear_model.quantiles(target, linear_model.boards(base))
+        z = model.quantiles(target, model.boards(base))
         enough: dict[tuple[int, ...], tuple[float, ...]] = {}
         earlier: set[tuple[int, ...]] = set()
         for _ in range(TRIES):
-            program = linear_model.program(z, shrink, spoiled)
+            program = model.program(z, shrink, spoiled)
             pick = cheapest(program)
             if pick is None or (pick in earlier and pick in enough):
                 break
             earlier.add(pick)
-            boards = linear_model.boards(pick)
-            promised = linear_model.predicted(pick, boards, shrink)
+            boards = model.boards(pick)
+            promised = model.predicted(pick, boards, shrink)
             short = [r for r, share in enumerate(promised) if share < target]
             if target >= self.target:
                 short = sorted({*short, *self.fell_short.get((which, pick), [])})
             if short:
                 for r in short:
-                    key = r, pick[len(linear_model.parts) + r]
-                    shrink[key] = shrink.get(key, 1.0) * _cut(
-                        program, pick, key, len(linear_model.parts)
-                    )
+                    key = r, pick[len(model.parts) + r]
+                    shrink[key] = shrink.get(key, 1.0) * _cut(program, pick, key, len(model.parts))
             else:
                 enough[pick] = promised
-            z = linear_model.quantiles(target, boards)
+            z = model.quantiles(target, boards)
         if not enough:
             return None
         pick = min(enough, key=lambda p: (self._cost(which, p), p))
         return pick, enough[pick]
 
     def _price(self, which: int, pick: Sequence[int]) -> float:
-        linear_model = self.pictures[which]
-        return linear_model.branch.extra + CureProgram(linear_model.slots, ()).price(pick)
+        model = self.pictures[which]
+        return model.branch.extra + CureProgram(model.slots, ()).price(pick)
 
     def _cost(self, which: int, pick: Sequence[int]) -> float:
-        linear_model = self.pictures[which]
-        return linear_model.branch.extra + CureProgram(linear_model.slots, ()).cost(pick)
+        model = self.pictures[which]
+        return model.branch.extra + CureProgram(model.slots, ()).cost(pick)
 
     def _trial(
         self,
@@ -296,17 +286,17 @@ class _Search:
 
         boards : their number, for each response; None: more until it is decided whether all
         responses reach the target."""
-        linear_model = self.pictures[which]
+        model = self.pictures[which]
         cost = self._price(which, pick)
         step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
-        upgrades = linear_model.upgrades(pick)
-        circuit, spread = linear_model.spread(pick)
+        upgrades = model.upgrades(pick)
+        circuit, spread = model.spread(pick)
         seed = fresh(self.seed, number)
         plans = list[tuple[StudyPlan, float | DcTrim | None]]()
-        for way in linear_model.ways_of(pick):
+        for way in model.ways_of(pick):
             setting: float | DcTrim | None = upgrades.trim if way.kind == "trim" else None
-            if way.kind == TRIMMER and linear_model.trimmer is not None:
-                setting = linear_model.trimmer.on(circuit)
+            if way.kind == TRIMMER and model.trimmer is not None:
+                setting = model.trimmer.on(circuit)
             plans.append((StudyPlan(circuit, spread, seed, MOST, (way.question,)), setting))
         measured: tuple[MeasuredYield, ...]
         if boards is None:
@@ -321,29 +311,27 @@ class _Search:
                 )
                 for plan, trim in plans
             )  # fmt: skip
-        return Trial(linear_model.branch.name, upgrades, cost, predicted, measured, self.target)
+        return Trial(model.branch.name, upgrades, cost, predicted, measured, self.target)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
         """Tighten the demands of ways that promised more than was measured.
 
         Where a response has missed the target, those that are undecided were asked on few boards
         only: nothing is learnt of them."""
-        linear_model = self.pictures[which]
+        model = self.pictures[which]
         short = [r for r, m in enumerate(trial.measured) if m.missed or not m.counts.samples]
         short = short or [r for r, m in enumerate(trial.measured) if not m.reached]
         self.fell_short[which, tuple(pick)] = short
-        boards = linear_model.boards(pick)
-        for r, (way, m) in enumerate(zip(linear_model.ways_of(pick), trial.measured, strict=True)):
+        boards = model.boards(pick)
+        for r, (way, m) in enumerate(zip(model.ways_of(pick), trial.measured, strict=True)):
             if r not in short:
                 continue
-            w = pick[len(linear_model.parts) + r]
+            w = pick[len(model.parts) + r]
             if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
-                step = self.progress.stage(
-                    f"linear picture, {linear_model.branch.name}: response {r + 1}"
-                )
-                linear_model = pictured(linear_model, [(r, w)], self.jobs, step)
-                self.pictures[which] = linear_model
-                way = linear_model.ways[r][w]
+                step = self.progress.stage(f"linear picture, {model.branch.name}: response {r + 1}")
+                model = pictured(model, [(r, w)], self.jobs, step)
+                self.pictures[which] = model
+                way = model.ways[r][w]
             if way.margin is None or not way.margin.limits:
                 self.spoiled.add((which, r, w))
                 continue
@@ -370,20 +358,17 @@ class _Search:
     def _out_of_reach(self) -> str:
         """The responses for which no choice of upgrades is enough, by the linear pictures."""
         best = np.zeros(len(self.base.model_responses))
-        for which, linear_model in enumerate(self.pictures):
+        for which, model in enumerate(self.pictures):
             shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
-            for most in finest(linear_model.parts, linear_model.branch.synthesis.catalog):
-                boards = linear_model.boards(most)
-                for r, row in enumerate(linear_model.ways):
+            for most in finest(model.parts, model.branch.synthesis.catalog):
+                boards = model.boards(most)
+                for r, row in enumerate(model.ways):
                     for w, way in enumerate(row):
                         if way.hopeless:
                             best[r] = max(best[r], way.most)
                         elif (which, r, w) not in self.spoiled:
-                            pick = [
-                                *most,
-                                *(w if k == r else 0 for k in range(len(linear_model.ways))),
-                            ]
-                            best[r] = max(best[r], linear_model.predicted(pick, boards, shrink)[r])
+                            pick = [*most, *(w if k == r else 0 for k in range(len(model.ways)))]
+                            best[r] = max(best[r], model.predicted(pick, boards, shrink)[r])
         short = [
             f"response {r + 1} ({share:.3f} at most)"
             for r, share in enumerate(best)
@@ -396,13 +381,13 @@ class _Search:
         """What limits a response with nothing upgraded, in one line."""
         if number in self.unseen:
             return "the nominal circuit does not show it"
-        linear_model = self.pictures[0] if self.pictures else None
-        margin = None if linear_model is None else linear_model.ways[number][0].margin
-        if linear_model is None or margin is None:
+        model = self.pictures[0] if self.pictures else None
+        margin = None if model is None else model.ways[number][0].margin
+        if model is None or margin is None:
             return ""
-        synthesis = linear_model.branch.synthesis
+        synthesis = model.branch.synthesis
         spread = spread_of(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
-        return limiting(margin, together(synthesis.design.circuit, spread, linear_model.seed)).line
+        return limiting(margin, together(synthesis.design.circuit, spread, model.seed)).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper

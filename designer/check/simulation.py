@@ -320,38 +320,35 @@ def _circuit_orbits(
 def _on_circuit(
     synthesis: Synthesis, scan: bool, traces: bool, sampling: tuple[int, int], spec: Response
 ) -> Simulated:
+    design = synthesis.design
     r, flow, orbits = _circuit_orbits(synthesis, spec, scan)
-    volts, seconds = synthesis.design.volts(r.b), synthesis.design.errors.scales.seconds
+    volts, seconds = design.volts(r.b), design.errors.scales.seconds
     measured = [_measured(flow, o) for o in orbits]
-    scaled = [synthesis.design.in_model_units(o, volts) for o in measured]
-    numbers = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
-    first = _attractors([measured[i] for i in numbers])
+    scaled = [design.in_model_units(o, volts) for o in measured]
+    rows = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
+    first = _attractors([measured[i] for i in rows])
     model = synthesis.modelfile.model.at(r.b)
     box, ground = scale_of(model, r.omega), ground_of(model) * volts
     result = coexistence.of_flow(flow, box, *sampling, first, volts)
     more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
-    numbers += range(len(measured), len(measured) + len(more))
+    rows += range(len(measured), len(measured) + len(more))
     measured += more
-    scaled += [synthesis.design.in_model_units(o, volts) for o in more]
-    twins = {i: _twin(flow, measured[i]) for i in numbers}
+    scaled += [design.in_model_units(o, volts) for o in more]
+    twins = {i: _twin(flow, measured[i]) for i in rows}
     return Simulated(
         r.omega,
         r.expected,
         matches(orbits[0], r.spec),
         scaled[0],
-        tuple(scaled[i] for i in numbers[1:]),
+        tuple(scaled[i] for i in rows[1:]),
         0.0,
-        tuple(
-            None if t is None else synthesis.design.in_model_units(t, volts) for t in twins.values()
-        ),
+        tuple(None if t is None else design.in_model_units(t, volts) for t in twins.values()),
         r.b,
-        settings=_exact_settings(flow, measured[0], float(volts[synthesis.design.moving])),
+        settings=_exact_settings(flow, measured[0], float(volts[design.moving])),
         traces=_traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
-        absolute=tuple(
-            absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in numbers
-        ),
+        absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
         **_of_system(model),
     )
 
@@ -366,30 +363,29 @@ def _in_ngspice(
     rung: Rung,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
-    began = time.perf_counter()
+    began, design = time.perf_counter(), synthesis.design
+    model = synthesis.modelfile.model
     step = progress.stage("responses of the exact circuit", len(specs))
-    reduction = nominal.nominal_reduction(synthesis.design)
+    reduction = nominal.nominal_reduction(design)
     rows, subjects = [], []
     for spec in specs:
         r, _, orbits = _circuit_orbits(synthesis, spec, scan)
-        frequency = synthesis.design.errors.scales.frequency(r.omega)
-        excitation = Excitation(frequency, synthesis.design.amplitude(r.b, r.omega))
-        started = [o for o in orbits if len(o.start)]
-        subjects += [
-            numerics_gate.GateSubject(reduction, excitation, o, rung=rung) for o in started
-        ]
-        rows.append((r, excitation, len(started)))
+        frequency = design.errors.scales.frequency(r.omega)
+        drive = Excitation(frequency, design.amplitude(r.b, r.omega))
+        settled = [o for o in orbits if len(o.start)]
+        subjects += [numerics_gate.GateSubject(reduction, drive, o, rung=rung) for o in settled]
+        rows.append((r, drive, len(settled)))
         step()
     progress.stage("ngspice, numerics gate")
     results = iter(numerics_gate.check(pool, subjects))
     seconds = (time.perf_counter() - began) / max(len(specs), 1)
     out = []
     for r, excitation, count in rows:
-        volts, scale = synthesis.design.volts(r.b), synthesis.design.errors.scales.seconds
+        volts, scale = design.volts(r.b), design.errors.scales.seconds
         gates = [next(results) for _ in range(count)]
         answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
         orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
-        scaled = [synthesis.design.in_model_units(o, volts) for o in orbits]
+        scaled = [design.in_model_units(o, volts) for o in orbits]
         out.append(
             Simulated(
                 r.omega,
@@ -402,10 +398,8 @@ def _in_ngspice(
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
-                absolute=_unmoved(
-                    synthesis.modelfile.model, [scaled[i] for i in _distinct(scaled)]
-                ),
-                **_of_system(synthesis.modelfile.model.at(r.b)),
+                absolute=_unmoved(model, [scaled[i] for i in _distinct(scaled)]),
+                **_of_system(model.at(r.b)),
             )
         )
     return tuple(out)

@@ -51,7 +51,7 @@ _GAIN = 1e9
 
 
 @dataclass(frozen=True)
-class SettledResponse:
+class ComparedResponse:
     """One wanted response on one circuit: what it settles on from the model's own orbit."""
 
     omega: float
@@ -117,7 +117,7 @@ class DesignColumn:
     """What the op-amps' offsets do; None where it does not apply."""
     loads: Loads
     """What its outputs have to give."""
-    settled: tuple[SettledResponse, ...]
+    settled: tuple[ComparedResponse, ...]
     """The orbit that the circuit settles on for each wanted response."""
     bill: Bill
     """What has to be bought."""
@@ -210,7 +210,7 @@ def _show(
     errors: CoefficientErrors | None,
     response: ModelResponse,
     drive: Drive,
-) -> SettledResponse:
+) -> ComparedResponse:
     """From the model's orbit, or from rest where the circuit has no scale to carry it over."""
     start = np.zeros(len(reduction.circuit.states))
     if errors is not None:
@@ -226,7 +226,7 @@ def _show(
             reference.status,
             reference.counts.family,
         )
-    return SettledResponse(response.omega, response.expected, orbit, is_wanted)
+    return ComparedResponse(response.omega, response.expected, orbit, is_wanted)
 
 
 def _k0(model: Dimensionless, errors: CoefficientErrors | None) -> float:

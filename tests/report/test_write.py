@@ -437,7 +437,7 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
 
 def test_without_responses(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=())
-    data = changed(whole, checked=(), answers=(), cross_checks=(), asked=(), plan=plan)
+    data = changed(whole, checked=(), answers=(), cross_checks=(), response_indices=(), plan=plan)
     for text in (words_of(data).text, render_markdown(data)):
         assert "no response is named" in text
         assert "None was asked for." in text

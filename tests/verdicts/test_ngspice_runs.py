@@ -396,7 +396,7 @@ def test_what_was_heard_is_not_asked_again(pool: SpicePool, tmp_path: Path) -> N
     assert said(both(range(1)), last=False) == whole[:4]
     assert said(everything) == whole
     named = [replace(a, why=Why.BOUNDARY) for a in both(range(1))]
-    assert [h.why for h in said(named, known=whole)] == [Why.BOUNDARY] * 4
+    assert [h.why for h in said(named, earlier=whole)] == [Why.BOUNDARY] * 4
     assert counting.jobs == runs
     assert len(_store(tmp_path, p).read(range(10))) == 4
 
