@@ -7,8 +7,9 @@ PYTEST_ARGS ?=
 # Twice quiet: errors only.
 PIP := $(VENV)/bin/python -m pip -qq --no-input --disable-pip-version-check
 LOCK := requirements/constraints.txt
-# A file's tests share what they set up, so a file goes to one process.
-PARALLEL := --numprocesses auto --dist loadfile
+# A file's tests share what they set up, so a file goes to one process, in the order of
+# tests/conftest.py.
+PARALLEL := --numprocesses auto --dist loadfile --no-loadscope-reorder
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
 .PHONY: help env ngspice demo test check-all lint format bench reports picture lock clean

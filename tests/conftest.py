@@ -6,7 +6,9 @@ import gc
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import Generator, Iterator
+from pathlib import Path
 
 # Before anything imports matplotlib.pyplot: tests run without a display.
 os.environ["MPLBACKEND"] = "Agg"
@@ -52,6 +54,19 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         from tests.shared.compile_kernels import compile_kernels
 
         compile_kernels()
+
+
+LONG = ("slow", "kicad", "browser", "wheel", "docs")
+"""Marks of tests that take about a hundred times as long as one without."""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take long come first, so that no process ends long after the other."""
+    work: Counter[Path] = Counter()
+    for item in items:
+        work[item.path] += 100 if any(item.get_closest_marker(name) for name in LONG) else 1
+    items.sort(key=lambda item: (-work[item.path], item.path))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

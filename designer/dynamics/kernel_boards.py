@@ -195,7 +195,10 @@ def _describe(board: DrivenBoard, x: Float, e: int, answers: Answers) -> bool:
     if _lap(board, x, cursor, nothing, strobes[: 2 * n + 1], impacts[: 2 * n]) != DONE:
         return False
     met, facts = trail.met[0], answers.facts[e]
-    answers.graze[e] = trail.graze
+    # Element by element: a whole array would bring its error message, which takes long to compile.
+    for c in range(len(trail.graze)):
+        for k in range(2):
+            answers.graze[e, c, k] = trail.graze[c, k]
     cursor[MEASURE] = 0
     if _lap(board, strobes[2 * n], cursor, nothing, strobes[2 * n :], impacts[2 * n :]) != DONE:
         return False

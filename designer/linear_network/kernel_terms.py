@@ -187,7 +187,8 @@ def _probe(
     """Whether the terms of a probe have parts where ``at`` stands; and the steps."""
     now, begin, end = rules.probes[which]
     other.apart[begin], other.time[begin] = at.apart[now], at.time[now]
-    other.parts[:] = at.parts
+    for i in range(len(at.parts)):
+        other.parts[i] = at.parts[i]
     for i in range(now, len(rules.target)):  # what is not chosen yet
         other.parts[i] = -1
         if rules.first[i]:

@@ -170,10 +170,11 @@ def test_slew(name: str, rung: Rung) -> None:
 def test_recovery_is_the_parameter(name: str, rung: Rung) -> None:
     """No data sheet fixes it for every circuit: swept over two decades, it follows within 4 %.
 
-    A second pole adds its own time constant.
+    A second pole adds its own time constant. The middle of the sweep is the catalogue's figure, of
+    which ``test_every_figure_agrees_with_its_model`` asks the same.
     """
     bench = OpAmpBench.of(CATALOG.opamp(name), rung)
-    for factor in (0.1, 1.0, 10.0):
+    for factor in (0.1, 10.0):
         wanted = factor * recovery(bench.opamp)
         figure = Figure(None, wanted, None, "a test")
         swept = replace(bench, opamp=replace(bench.opamp, recovery=figure))

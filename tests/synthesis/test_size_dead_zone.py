@@ -294,8 +294,11 @@ def test_any_catalogue_is_answered(
         assert found.bound <= found.error <= 0.3 + 1e-9
 
 
-@pytest.mark.parametrize("resistors", [E24, E96, E192, BOTH], ids=["E24", "E96", "E192", "both"])
-@pytest.mark.parametrize("mu", [1.0, 7.3, 49.0])
+@pytest.mark.parametrize(
+    ("resistors", "mu"),
+    [(E24, 1.0), (E24, 49.0), (E96, 7.3), (E192, 1.0), (BOTH, 49.0), (BOTH, 7.3)],
+    ids=["E24-1", "E24-49", "E96-7", "E192-1", "both-49", "both-7"],
+)
 def test_proved_on_whole_catalogues_without_conditions(resistors: Array, mu: float) -> None:
     slope = mu * 2.0123e-5
     found = sized(replace(target(mu), slope=(slope, slope), load=0.0, strict=False), resistors)
