@@ -181,12 +181,14 @@ def job(
     *,
     keep: bool = False,
     whole: bool = False,
+    patience: float = 1.0,
 ) -> SpiceJob[Read]:
     """The run of one subject: what it discards, and at least 4n periods to judge.
 
     Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
     nudge : fraction by which every initial voltage is raised (``remedies``). whole : nothing is
-    left out of the strobes, for a look at the way itself.
+    left out of the strobes, for a look at the way itself. patience : how many times the pool's
+    time it may take.
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
@@ -214,7 +216,7 @@ def job(
         stage=False,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
-    return SpiceJob(text, signals, stop, partial(read, reading=reading))
+    return SpiceJob(text, signals, stop, partial(read, reading=reading), patience=patience)
 
 
 def length(subject: GateSubject) -> int:
@@ -225,10 +227,15 @@ def length(subject: GateSubject) -> int:
 
 
 def task(
-    subject: GateSubject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
+    subject: GateSubject,
+    settings: SolverSettings,
+    *,
+    keep: bool = False,
+    whole: bool = False,
+    patience: float = 1.0,
 ) -> Task[Read]:
     """The run as one that remedies may change."""
-    return Task(partial(job, subject, keep=keep, whole=whole), settings)
+    return Task(partial(job, subject, keep=keep, whole=whole, patience=patience), settings)
 
 
 def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Excitation) -> float:

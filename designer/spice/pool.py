@@ -66,7 +66,7 @@ class SpicePool:
     ----------
     jobs : the most workers at a time.
     backend : ``shared`` (libngspice in the worker) or ``batch`` (a process for every deck).
-    timeout : the longest that one attempt at a job may take, s.
+    timeout : the longest that one attempt at a job may take, s, but for a job's own patience.
     """
 
     def __init__(self, jobs: int, backend: Backend = "shared", timeout: float = 120.0) -> None:
@@ -138,7 +138,7 @@ class SpicePool:
                 job = next(source, None)
                 if job is None:
                     break
-                waiting.append(_Task(next(numbers), pickle.dumps(job)))
+                waiting.append(_Task(next(numbers), pickle.dumps(job), job.patience))
             if not waiting and not busy:
                 return
             self._hand_out(waiting)
@@ -160,7 +160,7 @@ class SpicePool:
                 waiting.appendleft(task)
                 continue
             worker.task = task
-            worker.deadline = time.monotonic() + self._timeout
+            worker.deadline = time.monotonic() + task.patience * self._timeout
         starting = sum(not w.ready for w in self._workers)
         for _ in range(min(len(waiting) - starting, self._jobs - len(self._workers))):
             _start(self._backend, Path(tempfile.mkdtemp(dir=self._folder)), self._workers)
@@ -180,7 +180,10 @@ class SpicePool:
     def _look_at(self, worker: _Worker, waiting: deque[_Task]) -> tuple[int, Any] | None:
         """Take a worker's message, or draw the consequences of its silence."""
         reply: Reply | None = None
-        complaint = f"gave no answer within {self._timeout if worker.ready else START_TIMEOUT:g} s"
+        given = START_TIMEOUT
+        if worker.ready:
+            given = self._timeout * (1.0 if worker.task is None else worker.task.patience)
+        complaint = f"gave no answer within {given:g} s"
         if worker.connection.poll():
             try:
                 reply = pickle.loads(worker.connection.recv_bytes())
@@ -228,6 +231,7 @@ class SpicePool:
 class _Task:
     index: int
     job: bytes
+    patience: float = 1.0
     complaints: list[str] = field(default_factory=list)
 
 

@@ -113,6 +113,8 @@ class SpiceJob(Generic[T_co]):
     of a module or a ``functools.partial`` of one, not a lambda."""
     analysis: Analysis = "tran"
     """The analysis of the deck."""
+    patience: float = 1.0
+    """How many times the pool's time it may take: a run at a finer step takes longer."""
 
 
 def require_version(found: str) -> str:

@@ -56,6 +56,8 @@ counts four times."""
 FINER = 4
 """By how much the step is divided in each round where ngspice disagrees. Half a step may say the
 same by the same error: next to a period doubling it takes a sixteenth to see."""
+MOST_PATIENCE = 16
+"""How many times the pool's time a run at a finer step may take."""
 SURE_ROUND = 2
 """The first round whose answer may charge the exact circuit with a difference, if so many are
 allowed."""
@@ -324,7 +326,8 @@ class _Run:
 
 
 def _task(run: _Run) -> Task[Read]:
-    return numerics_gate.task(run.subject, run.settings)
+    patience = min(FINER**run.round, MOST_PATIENCE)
+    return numerics_gate.task(run.subject, run.settings, patience=patience)
 
 
 def _after(run: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:

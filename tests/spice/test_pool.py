@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -223,7 +224,10 @@ def test_a_job_that_hangs(backend: Backend, folder: Path) -> None:
     # neither ngspice itself nor the analysis may take for ever
     endless = job(last_value, deck(1e3).replace(".tran 5u 2m 0 5u", ".tran 5u 1e6 0 5u"))
     with SpicePool(2, backend, timeout=1.0) as pool:
-        results = dict(pool.map([job(functools.partial(sleep, 60.0)), endless, job(last_value)]))
+        slow = replace(job(functools.partial(sleep, 1.5)), patience=20.0)
+        jobs = [job(functools.partial(sleep, 60.0)), endless, job(last_value), slow]
+        results = dict(pool.map(jobs))
+    assert not isinstance(results[3], SimulationFailed), "a job may be given more time"
     for i in (0, 1):
         assert isinstance(results[i], SimulationFailed)
         assert results[i].reason == "worker gave no answer within 1 s twice"
