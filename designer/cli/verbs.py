@@ -382,6 +382,15 @@ def trade(
             "own].",
         ),
     ] = None,
+    truth: Annotated[
+        Literal["full", "vendor"] | None,
+        option(
+            "--truth",
+            None,
+            "What stands for the board: full op-amps from data-sheet figures, or the vendor's "
+            "macromodel that the catalogue names [full].",
+        ),
+    ] = None,
     seed: OwnSeed = None,
     **shared: Any,
 ) -> Output:
@@ -390,7 +399,7 @@ def trade(
     from designer.jobs import trade_job
 
     result = trade_job.trade(
-        model, out, boards=boards, seed=seed, progress=session.progress, **shared
+        model, out, boards=boards, seed=seed, truth=truth, progress=session.progress, **shared
     )
     return Output(result.answer, lambda: tables.traded(result.answer))
 

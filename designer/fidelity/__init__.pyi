@@ -31,6 +31,9 @@ from .rungs import (
     CIRCUIT as CIRCUIT,
     LEVELS as LEVELS,
     ROUNDS as ROUNDS,
+    TOP as TOP,
+    VENDOR as VENDOR,
+    Truths as Truths,
 )
 from .trade_files import (
     sheet as sheet,

@@ -111,6 +111,7 @@ def _compared(said: Mapping[str, Any]) -> RungError:
             "error": {of: _number(v) for of, v in said["error"].items()},
             "velocity": {of: _number(v) for of, v in said["velocity"].items()},
             "numerical": _number(said["numerical"]),
+            "convergence": _number(said["convergence"]),
         }
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer
+from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer, Truths
 from designer.verdicts.exact_rung import images, waveform_error
 
 BOARD, EQUATIONS = "board", "equations"
@@ -50,8 +50,11 @@ class RungError:
     """Largest relative difference of an impact's velocity, by truth; nan where it does not
     apply."""
     numerical: float
-    """Error against the exact flow of the rung's own equations, or where there is none its own
-    finest run; nan for what it is measured against."""
+    """Error against the exact flow of the rung's own equations; nan where there is none."""
+    convergence: float
+    """RMS difference of x1 from the rung's own finest run, over its peak, where that is all there
+    is to compare it with: of the truth's rung, and of rungs whose equations have no exact flow. It
+    is no error against anything else."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +75,21 @@ class Truth:
     """Whether the motion has a period, by truth."""
     impacts: Mapping[str, bool]
     """Whether it has a period and any impacts in it, by truth."""
+    rung: str = TOP
+    """The rung that stands for the board."""
+
+    def is_itself(self, rung: str, of: str) -> bool:
+        """Whether a rung is measured against itself."""
+        return rung == (self.rung if of == BOARD else MODEL)
 
 
 def compare(
-    label: ResponseLabel, some: Sequence[RungAnswer]
+    label: ResponseLabel, some: Sequence[RungAnswer], truth: Truths = TOP
 ) -> tuple[tuple[RungError, ...], Truth]:
-    """The answers to one response beside both truths, and the board's."""
+    """The answers to one response beside both truths, and the board's. truth : the rung that stands
+    for the board."""
     exact = next(a for a in some if a.rung == MODEL)
-    top = [a for a in some if a.rung == TOP]
+    top = [a for a in some if a.rung == truth]
     if len(top) < 2:  # without a run nothing is sure
         last, drawn = Orbit(OrbitStatus.FAILED), np.zeros(0)
         sure, error, velocity = False, math.nan, math.nan
@@ -101,13 +111,13 @@ def compare(
             {of: alike(a.orbit, orbit) for of, (orbit, _) in against.items()},
             {of: _waveform(a.shown, shown) for of, (_, shown) in against.items()},
             {of: difference(a.orbit, orbit) for of, (orbit, _) in against.items()},
-            _numerical(a, some),
+            *_numerical(a, some),
         )
         for a in some
     )
     periodic = {of: o.status is OrbitStatus.PERIODIC for of, (o, _) in against.items()}
     impacts = {of: periodic[of] and o.counts.total > 0 for of, (o, _) in against.items()}
-    return rows, Truth(label, last.response, sure, error, velocity, periodic, impacts)
+    return rows, Truth(label, last.response, sure, error, velocity, periodic, impacts, truth)
 
 
 def difference(first: Orbit, second: Orbit) -> float:
@@ -144,10 +154,12 @@ def alike(first: Orbit, second: Orbit) -> bool:
     return first.counts.family == second.counts.family
 
 
-def _numerical(answer: RungAnswer, some: Sequence[RungAnswer]) -> float:
-    own = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.rung, answer.rung)
-    finest = [a for a in some if a.rung == own][-1]
-    return math.nan if finest is answer else _waveform(answer.shown, finest.shown)
+def _numerical(answer: RungAnswer, some: Sequence[RungAnswer]) -> tuple[float, float]:
+    """Error against the exact flow of the same equations, and convergence where there is none."""
+    exact = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.rung)
+    finest = [a for a in some if a.rung == (exact or answer.rung)][-1]
+    apart = math.nan if finest is answer else _waveform(answer.shown, finest.shown)
+    return (apart, math.nan) if exact else (math.nan, apart)
 
 
 def _waveform(shown: Array, wanted: Array) -> float:

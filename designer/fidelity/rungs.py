@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from designer.circuit.design import Design
 from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
+from designer.circuit.reduction import Reduction
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
@@ -39,7 +40,7 @@ from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import RUNGS as SPICE_RUNGS, Rung
+from designer.spice.opamp_model import RUNGS as SPICE_RUNGS
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, clearance_rows, read
 from designer.spice.simulator import SimulationFailed, Waveforms
@@ -47,9 +48,13 @@ from designer.spice.simulator import SimulationFailed, Waveforms
 Run = Read | SimulationFailed
 
 RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
-RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS)
-TOP: Rung = "full"
-"""The most faithful rung."""
+RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS, "vendor")
+TOP: Final = "full"
+"""The most faithful rung of our own models."""
+VENDOR: Final = "vendor"
+"""A vendor's macromodel, which the catalogue names: the truth where the user asks for it."""
+Truths = Literal["full", "vendor"]
+"""What may stand for the board."""
 LEVELS = ((4.0, 1e-3), (2.0, 1e-4), (1.0, gate.RELTOL), (0.5, 0.1 * gate.RELTOL))
 """ngspice's largest step over the one that the gate tries first, and its relative tolerance."""
 STEPS = (0.04, 0.02, 0.01, runge_kutta.PAPERS_STEP)
@@ -128,14 +133,16 @@ def measured(
     *,
     levels: Sequence[tuple[float, float]] = LEVELS,
     rounds_: int = ROUNDS,
+    truth: Truths = TOP,
 ) -> RungAnswers:
     """What every rung says of a response of the design, and what it costs.
 
+    truth : "vendor" asks the vendor's macromodel too, which the op-amp then has to have.
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
     """
     one = subject(made, r)
     asked = _Asked(r, made.design.model.at(r.b), made.design, made.design.volts(r.b), one)
-    entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
+    entries = [*_exact(asked), *_spice(asked, pool, clock, levels, truth)]
     entrants = [entrant for _, entrant in entries]
     settings = None
     if one.orbit.status is OrbitStatus.PERIODIC:
@@ -227,32 +234,51 @@ def _runge_kutta(
     return found.orbit, _traced(found, 1.0, system.moving)
 
 
+def in_ngspice(subject: GateSubject, truth: Truths) -> dict[str, GateSubject]:
+    """The subject on every rung of ngspice, by name; with the vendor's macromodel as the truth,
+    ``full`` is the one from the data sheet's figures."""
+    full, figures = subject, subject.circuit.figures
+    if truth == VENDOR and figures is not None:
+        plain = replace(subject.circuit, figures=replace(figures, spice=None))
+        full = replace(subject, reduction=Reduction(plain, subject.board))
+    on = {str(rung): replace(full, rung=rung) for rung in SPICE_RUNGS}
+    return on | ({VENDOR: replace(subject, rung=TOP)} if truth == VENDOR else {})
+
+
 def _spice(
-    asked: _Asked, pool: SpicePool, clock: SpiceClock, levels: Sequence[tuple[float, float]]
+    asked: _Asked,
+    pool: SpicePool,
+    clock: SpiceClock,
+    levels: Sequence[tuple[float, float]],
+    truth: Truths,
 ) -> Iterator[tuple[RungAnswer, Entrant]]:
     subject = asked.subject
     if not len(subject.orbit.start):
         return
     contact = gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
     first = gate.first_steps(subject, contact)
-    on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
+    named = in_ngspice(subject, truth)
+    on = dict(zip(named, gate.warmed(pool, list(named.values())), strict=True))
     ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
     names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
-    asks: list[tuple[GateSubject, int, SolverSettings]] = []
-    for one in on:
+    asks: list[tuple[str, int, SolverSettings]] = []
+    for name, one in on.items():
         for k, own in enumerate(ladder):
             settings = _own(one, own)
-            asks.append((one, k, settings))
-            asks += [(one, k, other) for other in companions(settings)]
-    jobs = [gate.job(one, said, keep=said == _own(one, ladder[k])) for one, k, said in asks]
-    heard = dict(pool.map(jobs))
-    runs: dict[tuple[Rung, int], list[Run]] = {}
-    for i, (one, k, _) in enumerate(asks):
-        runs.setdefault((one.rung, k), []).append(heard[i])
-    for one in on:
+            asks.append((name, k, settings))
+            asks += [(name, k, other) for other in companions(settings)]
+    jobs = [
+        gate.job(on[name], settings, keep=settings == _own(on[name], ladder[k]))
+        for name, k, settings in asks
+    ]
+    answers = dict(pool.map(jobs))
+    runs: dict[tuple[str, int], list[Run]] = {}
+    for i, (name, k, _) in enumerate(asks):
+        runs.setdefault((name, k), []).append(answers[i])
+    for name, one in on.items():
         for k, own in enumerate(ladder):
             settings = _own(one, own)
-            found, half, gear = runs[one.rung, k]
+            found, half, gear = runs[name, k]
             passed = passes(one, found, (half, gear))
             entrant = _timed(one, settings, clock)
             said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
@@ -264,9 +290,7 @@ def _spice(
                 moving = one.system.moving
                 shown = _traced(found, float(asked.volts[moving]), moving)
             yield (
-                RungAnswer(
-                    one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed
-                ),
+                RungAnswer(name, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
                 entrant,
             )
 

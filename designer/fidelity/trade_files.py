@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -23,7 +24,7 @@ from designer.base.figure_style import (
 from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table, table_of
 from designer.base.plain_json import FORMAT, plain
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
-from designer.fidelity.rungs import RUNGS
+from designer.fidelity.rungs import RUNGS, VENDOR
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BoardTrade, LeftOut
 
@@ -35,6 +36,7 @@ TITLES = {
     "ideal": "ngspice, ideal op-amps",
     "dynamic": "ngspice, bandwidth and slew",
     "full": "ngspice, full op-amps",
+    "vendor": "ngspice, the vendor's op-amps",
 }
 _LOOKS = {
     "rk4": ("#0072b2", "s"),
@@ -43,6 +45,7 @@ _LOOKS = {
     "ideal": ("#e6a817", "^"),
     "dynamic": (NGSPICE_COLOUR, "D"),
     "full": ("#8c1c13", "v"),
+    "vendor": ("#5b3a8c", "P"),
 }
 
 
@@ -54,7 +57,7 @@ def trade_json(
     document = {
         "format": FORMAT,
         "title": title,
-        "rungs": [_row(row) for r in found.responses for row in r.rows],
+        "rungs": [_row(row, r.truth) for r in found.responses for row in r.rows],
         "truths": [_truth(r.truth) for r in found.responses],
         "boards": [_boards(b) for b in boards if isinstance(b, BoardTrade)],
         "left_out": [
@@ -67,7 +70,12 @@ def trade_json(
     return dict(plain(document))
 
 
-def _row(row: RungError) -> dict[str, Any]:
+def _row(row: RungError, truth: Truth) -> dict[str, Any]:
+    """No rung has an error against itself: what its steps differ by is its convergence."""
+
+    def against(errors: Mapping[str, float], of: str) -> float:
+        return math.nan if truth.is_itself(row.rung, of) else errors[of]
+
     return {
         **row.label.as_dict(),
         "rung": row.rung,
@@ -77,11 +85,12 @@ def _row(row: RungError) -> dict[str, Any]:
         "reason": row.reason,
         "gate": row.gate,
         "right": dict(row.right),
-        "error": row.error[BOARD],
-        "error_of_equations": row.error[EQUATIONS],
-        "impact_velocity_error": row.velocity[BOARD],
-        "impact_velocity_error_of_equations": row.velocity[EQUATIONS],
+        "error": against(row.error, BOARD),
+        "error_of_equations": against(row.error, EQUATIONS),
+        "impact_velocity_error": against(row.velocity, BOARD),
+        "impact_velocity_error_of_equations": against(row.velocity, EQUATIONS),
         "numerical_error": row.numerical,
+        "convergence": row.convergence,
         "seconds_per_period": row.seconds,
     }
 
@@ -89,6 +98,7 @@ def _row(row: RungError) -> dict[str, Any]:
 def _truth(truth: Truth) -> dict[str, Any]:
     return {
         **truth.label.as_dict(),
+        "rung": truth.rung,
         "response": truth.response,
         "sure": truth.sure,
         "uncertainty": truth.error,
@@ -121,6 +131,7 @@ def _cheapest(c: Cheapest) -> dict[str, Any]:
         "level": c.level,
         "bound": c.bound,
         "measured": c.measured,
+        "convergence": c.convergence,
         "shown": c.shown,
         "seconds": c.seconds,
         "note": c.note,
@@ -141,17 +152,19 @@ def sheet(answer: Mapping[str, Any]) -> str:
         ),
         Markup(
             "The cheapest rung and setting that answers each question, for all responses together, "
-            "and against what its error is measured: `board` is the nominal circuit with full "
-            "op-amps in ngspice at the finest step, `equations` the exact flow of the model, "
-            "`ideal` ngspice with ideal op-amps on the same boards. Where the bound is not kept by "
-            "any rung, the one that comes nearest is named. A setting of ngspice that did not pass "
-            "the numerics gate is never named; the board itself is, by what its two finest steps "
-            "differ by, where nothing less will do."
+            "and against what its error is measured: `board` is the nominal circuit with "
+            f"{_truth_words(answer)} in ngspice at the finest step, `equations` the exact flow of "
+            "the model, `ideal` ngspice with ideal op-amps on the same boards. Where the bound is "
+            "not kept by any rung, the one that comes nearest is named. A setting of ngspice that "
+            "did not pass the numerics gate is never named; the board itself is, by what its two "
+            "finest steps differ by, where nothing less will do."
         ),
         _answers(answer),
         "Seconds are of one drive period of each response, for yields of one board of each. "
         "Measured is the largest error with the uncertainty of what it is measured against, or the "
-        "number of responses with another n-p-q.",
+        "number of responses with another n-p-q. Convergence is what the steps of one rung differ "
+        "by, where that rung is what the others are measured against: it is no error against "
+        "anything else.",
     ]
     sections = [PageSection("By response", _by_response(answer))]
     if answer["boards"]:
@@ -166,6 +179,12 @@ def _boards_asked(answer: Mapping[str, Any]) -> int:
     return int(answer["provenance"]["settings"]["trade"]["boards"])
 
 
+def _truth_words(answer: Mapping[str, Any]) -> str:
+    """The op-amps that stand for the board's."""
+    vendor = any(t.get("rung") == VENDOR for t in answer["truths"])
+    return "the vendor's macromodel of the op-amps" if vendor else "full op-amps"
+
+
 def _answers(answer: Mapping[str, Any]) -> Table | None:
     """What answers each question, of all responses together."""
     alone = len(answer["truths"]) == 1
@@ -174,11 +193,15 @@ def _answers(answer: Mapping[str, Any]) -> Table | None:
         if c["number"] is not None and not alone:
             continue
         kept = {True: "yes", False: "no", None: NONE}[c["shown"]]
-        rung = [TITLES[c["rung"]], c["level"], _measured(c)] if c["rung"] else [NONE] * 3
+        rung = [NONE] * 4
+        if c["rung"]:
+            rung = [TITLES[c["rung"]], c["level"], _measured(c, "measured")]
+            rung.append(_measured(c, "convergence"))
         seconds = _short(c["seconds"]) if c["rung"] else NONE
         rows.append((c["question"], c["of"], *rung, kept, seconds, c["note"]))
     columns = (
-        "question", "against", "rung", "setting", "measured", "kept", "CPU seconds", "note",
+        "question", "against", "rung", "setting", "measured", "convergence", "kept", "CPU seconds",
+        "note",
     )  # fmt: skip
     return table(columns, rows)
 
@@ -194,8 +217,9 @@ def _by_response(answer: Mapping[str, Any]) -> list[Block]:
     return [
         Markup(
             "Error of x₁ (RMS over its peak) against the board, and CPU milliseconds of a drive "
-            "period; another n-p-q than the board's is named. `step ×4` is four times the step "
-            "that the gate tries first, so coarser; `step ×0.5` is finer."
+            "period; another n-p-q than the board's is named. Of the rung that stands for the "
+            "board it is the convergence, the difference from its own finest step. `step ×4` is "
+            "four times the step that the gate tries first, so coarser; `step ×0.5` is finer."
         ),
         table(("rung", "setting", *heads), rows),
     ]
@@ -224,16 +248,19 @@ def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
     ]
 
 
-def _measured(c: Mapping[str, Any]) -> str:
-    if c["measured"] is None:
+def _measured(c: Mapping[str, Any], key: str) -> str:
+    if c[key] is None:
         return NONE
-    return f"{c['measured']:.0f} wrong" if c["question"] == RESPONSE else _percent(c["measured"])
+    return f"{c[key]:.0f} wrong" if c["question"] == RESPONSE else _percent(c[key])
 
 
 def _cell(row: Mapping[str, Any] | None) -> str:
     if row is None:
         return NONE
-    error = _percent(row["error"]) if row["right"][BOARD] else row["response"]
+    error = _percent(row["error"])
+    if row["error"] is None and row["convergence"] is not None:
+        error = f"convergence {_percent(row['convergence'])}"
+    error = error if row["right"][BOARD] else row["response"]
     seconds = row["seconds_per_period"]
     said = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
     return f"{said} (gate not passed)" if row["gate"] is False else said
@@ -254,7 +281,7 @@ KEYS = {"trade": "error", "trade-numerics": "numerical_error"}
 """Pictures, and which error each shows."""
 _AXES = {
     "error": "RMS error of x₁ / peak,\nagainst the board",
-    "numerical_error": "RMS error of x₁ / peak, against\nthe rung's own equations",
+    "numerical_error": "RMS error of x₁ / peak, against the rung's\nown equations, or convergence",
 }
 _PALE = 0.3
 """Opacity of what did not pass the gate."""
@@ -267,9 +294,12 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     against is not shown.
 
     key : "error", against the board, where a line joins what no other rung beats in both; or
-    "numerical_error", against the exact flow of the rung's own equations, or its finest run, so
-    that rungs do not compete.
+    "numerical_error", against the exact flow of the rung's own equations, or where there is none
+    its convergence, so that rungs do not compete.
     """
+    if key == "numerical_error":
+        known = [{**row, key: row[key] or row["convergence"]} for row in answer["rungs"]]
+        answer = {**answer, "rungs": known}
     truths = answer["truths"]
     columns = min(3, len(truths))
     rows = -(-len(truths) // columns)

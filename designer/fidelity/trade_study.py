@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
-from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP
+from designer.fidelity.rungs import CIRCUIT, MODEL, RK4
 from designer.fidelity.yields import BoardTrade, LeftOut
 
 IDEAL = "ideal"
@@ -34,7 +34,7 @@ QUESTIONS = (RESPONSE, IMPACT, WAVE)
 NO_IMPACTS = "no impacts"
 NO_PERIOD = "no period"
 """Why questions do not arise."""
-ITSELF = "the board itself; measured is what its two finest steps differ by"
+ITSELF = "the board itself, which nothing measures here; its two finest steps differ by this"
 """What is said where nothing less than the truth will do."""
 UNSURE = "the two finest steps of the board show different n-p-q, or none"
 """Why a question has no answer."""
@@ -62,7 +62,8 @@ class Cheapest:
     """Largest error that answers the question."""
     measured: float
     """The largest error with the truth's uncertainty, of this rung; for n-p-q the number of
-    responses it has wrong; nan where there is none to measure."""
+    responses it has wrong; nan where there is none to measure, and of a rung that stands for what
+    it would be measured against."""
     shown: bool | None
     """Whether that keeps the bound; where not, the rung is the one that comes nearest, or none
     where the truth is not sure."""
@@ -70,6 +71,8 @@ class Cheapest:
     """CPU time of a drive period, summed over the responses [s]."""
     note: str = ""
     """What else there is to say."""
+    convergence: float = math.nan
+    """In place of ``measured`` where a rung is compared with itself: what its steps differ by."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,8 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
     if open_:
         told = UNSURE if label else f"{UNSURE} (response {', '.join(open_)})"
         return replace(nothing, shown=False, note="; ".join([told, *left_out]))
-    finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == TOP][-1:]
+    truth = asked[0].truth
+    finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == truth.rung][-1:]
     kinds = dict.fromkeys((row.rung, row.level) for r in asked for row in r.rows)
     best: Cheapest | None = None
     for rung, level in kinds:
@@ -138,7 +142,9 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
         one = Cheapest(question, of, label, rung, level, bound, measured, shown, seconds, note)
         if best is None or _rank(one) < _rank(best):
             best = one
-    return best
+    if best is None or best.rung is None or not truth.is_itself(best.rung, of):
+        return best
+    return replace(best, measured=math.nan, convergence=best.measured)
 
 
 def _no_question(question: str, of: str, truth: Truth) -> str:

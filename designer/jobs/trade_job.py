@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import SEED, TRADE_BOARDS, at_least
 from designer.base.design_folder import Folder
+from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
@@ -19,7 +20,7 @@ from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
 from designer.fidelity.rung_errors import compare
-from designer.fidelity.rungs import LEVELS, ROUNDS
+from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, VENDOR, Truths
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.jobs import folder_numbers
@@ -41,7 +42,7 @@ PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png"
 NAMES = (TRADE, SHEET, *PICTURES)
 TIMEOUT = 900.0
 """The longest that one run of ngspice may take, s."""
-RULES = 4
+RULES = 5
 """Raised whenever the same inputs are to give another answer."""
 
 
@@ -55,6 +56,8 @@ class TradeExtent:
     """Levels of ngspice's steps."""
     rounds: int = ROUNDS
     """Rounds of timing."""
+    truth: Truths = TOP
+    """What stands for the board: our full op-amps, or the vendor's macromodel."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ def trade(
     *,
     boards: int | None = None,
     seed: int | None = None,
+    truth: Truths | None = None,
     jobs: int | None = None,
     overwrite: bool = False,
     resume: bool = False,
@@ -98,8 +102,9 @@ def trade(
     """The verb ``trade``: time and error of every rung on a design.
 
     model : a model file or a design folder. out : a folder to write into; a model file without one
-    writes nothing. boards : of each response, for the yield; 0 for none. boards, seed : None for
-    the usual ones, or for the folder's own.
+    writes nothing. boards : of each response, for the yield; 0 for none. truth : what stands for
+    the board, "full" op-amps or the "vendor" macromodel that the catalogue names. boards, seed,
+    truth : None for the usual ones, or for the folder's own.
 
     Raises
     ------
@@ -107,8 +112,11 @@ def trade(
     EnvironmentMissing : ngspice is missing.
     """
     argument = model if isinstance(model, ModelFile) else Path(model)
-    words = {"boards": boards, "seed": seed}
-    numbers = {"boards": TRADE_BOARDS, "seed": SEED} | stated_options(words)
+    words = {"boards": boards, "seed": seed, "truth": truth}
+    usual = {"boards": TRADE_BOARDS, "seed": SEED, "truth": TOP}
+    numbers: dict[str, Any] = usual | stated_options(words)
+    if numbers["truth"] not in (TOP, VENDOR):
+        raise InputError(None, "--truth", numbers["truth"], f"{TOP} or {VENDOR}")
     at_least("--boards", numbers["boards"], 0)
     options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
     options.check()
@@ -122,7 +130,7 @@ def trade(
             Folder(folder), "trade", tuple(words)
         ) | stated_options(words)
         options = replace(options, seed=numbers["seed"])
-    extent = TradeExtent(boards=numbers["boards"])
+    extent = TradeExtent(boards=numbers["boards"], truth=numbers["truth"])
     progress = Progress() if progress is None else progress
     return TradeResult(*answer(modelfile, folder, options, extent, progress))
 
@@ -142,8 +150,14 @@ def measure(
 
     Raises
     ------
+    InputError : the vendor's model is asked for, and there is none.
     EnvironmentMissing : ngspice is missing.
     """
+    figures = synthesis.design.circuit.figures
+    if extent.truth == VENDOR and (figures is None or figures.spice is None):
+        name = "the op-amp" if figures is None else figures.name
+        expected = f"{TOP}: the catalogue has no vendor's model of {name}"
+        raise InputError(None, "--truth", VENDOR, expected)
     count = len(synthesis.model_responses)
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)
@@ -154,9 +168,15 @@ def measure(
             def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
                 progress.stage(f"response {number} of {count}, every rung")
                 measured = trade_rungs.measured(
-                    synthesis, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
+                    synthesis,
+                    r,
+                    pool,
+                    clock,
+                    levels=extent.levels,
+                    rounds_=extent.rounds,
+                    truth=extent.truth,
                 )
-                rows, truth = compare(ResponseLabel.of(number, r), measured.answers)
+                rows, truth = compare(ResponseLabel.of(number, r), measured.answers, extent.truth)
                 return trade_pieces.rungs_json(rows, truth, measured.settings, measured.seconds)
 
             rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))

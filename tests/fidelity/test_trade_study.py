@@ -20,6 +20,9 @@ from designer.base.errors import InputError
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.catalog.vendor_model import PINS, VendorModel
+from designer.circuit.netlist import nominal_board
+from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -132,12 +135,14 @@ def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
     assert truth.sure
     response, impact, wave = (picked(found, q) for q in (RESPONSE, IMPACT, WAVE))
     assert (response.rung, response.measured, response.shown) == ("model", 0.0, True)
+    assert math.isnan(response.convergence), "against something else"
     assert impact.rung == "circuit"
     assert impact.measured == pytest.approx(0.004 + 1e-4, rel=1e-3)
     assert (wave.rung, wave.level) == ("full", "step ×2")
-    assert wave.measured == pytest.approx(0.0005 + 1e-4, rel=1e-3)
+    assert wave.convergence == pytest.approx(0.0005 + 1e-4, rel=1e-3), "of its own steps"
     own = picked(found, WAVE, EQUATIONS)
-    assert (own.rung, own.measured, own.shown) == ("model", 0.0, True)
+    assert (own.rung, own.convergence, own.shown) == ("model", 0.0, True)
+    assert math.isnan(own.measured), "nothing measures itself"
 
 
 def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
@@ -151,7 +156,7 @@ def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
     wave = picked(found, WAVE)
     assert not wave.shown
     assert (wave.rung, wave.level, wave.note) == ("full", "step ×1", "")
-    assert wave.measured == pytest.approx(0.005 + 0.005, rel=1e-3)
+    assert wave.convergence == pytest.approx(0.005 + 0.005, rel=1e-3)
 
 
 def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
@@ -160,9 +165,10 @@ def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
     found = judged(*LADDER[:4], replace(LADDER[5], gate=False), LADDER[6])
     wave = picked(found, WAVE)
     assert (wave.rung, wave.level, wave.shown, wave.note) == ("full", "step ×0.5", True, ITSELF)
-    assert wave.measured == pytest.approx(1e-4, rel=1e-3)
+    assert wave.convergence == pytest.approx(1e-4, rel=1e-3)
+    assert math.isnan(wave.measured)
     assert picked(found, IMPACT).note == ""
-    assert f"| 0.01 % | yes | 0.04 | {ITSELF} |" in told(document(found))
+    assert f"| – | 0.01 % | yes | 0.04 | {ITSELF} |" in told(document(found))
     doubted = judged(*LADDER[:4], *(replace(a, gate=False) for a in LADDER[5:]))
     assert picked(doubted, WAVE).rung == "circuit"  # a truth that its gate speaks against is none
     assert not picked(doubted, WAVE).shown
@@ -186,7 +192,7 @@ def test_a_truth_that_is_not_sure_answers_nothing() -> None:
     for question in (RESPONSE, IMPACT, WAVE):
         one = picked(found, question)
         assert (one.rung, one.shown, one.note) == (None, False, UNSURE)
-    assert f"| {WAVE} | board | – | – | – | no | – | {UNSURE} |" in told(document(found))
+    assert f"| {WAVE} | board | – | – | – | – | no | – | {UNSURE} |" in told(document(found))
     both = cheapest(
         RESPONSE, BOARD, [answered(*LADDER, label=ResponseLabel(2, 2.0, 0.2, "")), *found.responses]
     )
@@ -277,7 +283,7 @@ def test_where_nothing_strikes_no_impact_velocity_is_asked() -> None:
         one = picked(found, IMPACT, of)
         assert (one.rung, one.level, one.shown, one.note) == (None, None, None, NO_IMPACTS)
         assert picked(found, RESPONSE, of).shown
-    assert f"| {IMPACT} | board | – | – | – | – | – | no impacts |" in told(document(found))
+    assert f"| {IMPACT} | board | – | – | – | – | – | – | no impacts |" in told(document(found))
     second = answered(*quiet, label=ResponseLabel(2, 1.55, 1.5, "1-0-0"))
     both = cheapest(IMPACT, BOARD, [answered(*LADDER), second])
     assert both is not None
@@ -488,15 +494,51 @@ def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None
     assert json.loads(json.dumps(answer, allow_nan=False)) == answer
     for row in answer["rungs"]:
         assert {"rung", "settings", "omega", "error", "seconds_per_period"} <= set(row)
-    assert [row["error"] for row in answer["rungs"]][-1] == 0.0
+    by = {(row["rung"], row["level"]): row for row in answer["rungs"]}
+    assert by["full", "step ×0.5"]["error"] is by["full", "step ×2"]["error"] is None
+    assert by["full", "step ×2"]["convergence"] == pytest.approx(0.0005, rel=1e-3)
+    assert by["full", "step ×0.5"]["convergence"] is None, "there is no finer one"
+    assert by["model", "exact"]["error_of_equations"] is None
+    assert by["model", "exact"]["error"] > 0.0
     text = told(answer)
     assert "`--boards 40 --seed 1`" in text
     assert (
-        "| waveform within 0.1 % | board | ngspice, full op-amps | step ×2 | 0.06 % | yes |" in text
+        "| waveform within 0.1 % | board | ngspice, full op-amps | step ×2 | – | 0.06 % | yes |"
+        in text
     )
     assert "| 1: ω = 1.55, b = 0.25 | 40 | 39 | 0 | 1 | 0 | 0 | -2.5 % |" in text
     for key in ("error", "numerical_error"):
         assert len(front(answer, key).axes) == 1
+
+
+def test_the_full_op_amps_err_against_a_vendor_s_macromodel() -> None:
+    """What was convergence while they stood for the board is an error against something else."""
+    beyond = [said("vendor", "step ×1", 0.0101, 0.1), said("vendor", "step ×0.5", 0.01, 0.2)]
+    rows, truth = compare(ONE, [*LADDER, *beyond], "vendor")
+    answer = document(trade([TradedResponse(rows, truth)]))
+    by = {(row["rung"], row["level"]): row for row in answer["rungs"]}
+    assert by["full", "step ×0.5"]["error"] == pytest.approx(0.01, rel=1e-2)
+    assert by["vendor", "step ×1"]["error"] is None
+    assert by["vendor", "step ×1"]["convergence"] == pytest.approx(1e-4, rel=1e-2)
+    assert "the vendor's macromodel of the op-amps" in told(answer)
+    assert len(front(answer).axes) == 1
+
+
+def test_with_a_vendor_s_model_full_is_still_the_data_sheet_s() -> None:
+    made = synthesised()
+    one = rungs.subject(made, made.model_responses[0])
+    assert set(rungs.in_ngspice(one, "full")) == {"ideal", "dynamic", "full"}
+    figures = one.circuit.figures
+    assert figures is not None
+    lines = (".subckt own inp inn out vcc vee", "E42 out 0 inp inn 1e5", ".ends own")
+    vendor = VendorModel("part.lib", "own", PINS, lines, b"")
+    circuit = replace(one.circuit, figures=replace(figures, spice=vendor))
+    asked = replace(one, reduction=Reduction(circuit, nominal_board(circuit)))
+    on = rungs.in_ngspice(asked, "vendor")
+    settings = SolverSettings("trap", one.period / 200.0)
+    decks = {name: numerics_gate.job(of, settings).netlist for name, of in on.items()}
+    assert [name for name, deck in decks.items() if "E42" in deck] == ["vendor"]
+    assert decks["full"] == numerics_gate.job(replace(one, rung="full"), settings).netlist
 
 
 # ---------------------------------------------------------------------------------------------
@@ -608,7 +650,7 @@ def test_trade_measures_a_design_and_keeps_it(
     assert {row["rung"] for row in rows} == {"rk4", "model", "circuit", "ideal", "dynamic", "full"}
     assert all(row["seconds_per_period"] > 0.0 for row in rows)
     by = {rung: [r for r in rows if r["rung"] == rung] for rung in ("rk4", "model", "ideal")}
-    assert by["model"][0]["error_of_equations"] == 0.0
+    assert by["model"][0]["error_of_equations"] is None
     steps = [r["error_of_equations"] for r in by["rk4"]]
     assert steps[-1] < steps[0] / 10.0  # four times eight the steps of a method of order 4
     assert by["ideal"][-1]["numerical_error"] < 1e-3
