@@ -143,11 +143,15 @@ def _facts(outcome: JobOutcome) -> list[str]:
         f"values, {bill.price:.2f} € a board.",
         f"The netlist in ngspice against the equations: {within} of {len(check['findings'])} "
         "comparisons within their bounds.",
-        f"All responses on one board: {answer['all_on_one_board']['built']['ok']} of "
-        f"{answer['all_on_one_board']['built']['samples']}."
-        if answer["all_on_one_board"]
-        else "One response, so every board that shows it shows all.",
+        *_together(answer["all_on_one_board"]["built"]),
     ]
+
+
+def _together(counted: Mapping[str, Any] | None) -> list[str]:
+    """Boards that show every response; nothing where there is only one."""
+    if counted is None:
+        return []
+    return [f"All responses on one board: {counted['ok']} of {counted['samples']}."]
 
 
 def _rules(answer: Mapping[str, Any]) -> list[str]:
