@@ -26,6 +26,7 @@ from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
+from tests.shared.system_text import clearance, system_text, table
 
 FREE = replace(
     CHAIN,
@@ -110,50 +111,14 @@ def test_a_survey_of_three_masses_and_two_clearances() -> None:
         assert len(entries) == point.counts.total or near < 1e-4
 
 
-TEXT = """
-format = 2
-[[mass]]
-name = "hammer"
-mass = 1.0
-[[mass]]
-name = "arm"
-mass = 0.8
-[[mass]]
-name = "casing"
-mass = 1.2
-[[spring]]
-between = ["hammer", "ground"]
-stiffness = 1.0
-[[spring]]
-between = ["hammer", "arm"]
-stiffness = 1.5
-[[spring]]
-between = ["arm", "casing"]
-stiffness = 1.0
-[[damper]]
-between = ["hammer", "ground"]
-damping = 0.2
-[[damper]]
-between = ["hammer", "arm"]
-damping = 0.1
-[[damper]]
-between = ["arm", "casing"]
-damping = 0.1
-[[clearance]]
-name = "A"
-between = ["hammer", "ground"]
-upper = 0.5
-lower = 0.7
-stiffness = 8.0
-[[clearance]]
-name = "B"
-between = ["casing", "arm"]
-upper = 0.2
-stiffness = 10.0
-[[force]]
-on = "hammer"
-amplitude = 1.0
-"""
+TEXT = system_text(
+    {"hammer": 1.0, "arm": 0.8, "casing": 1.2},
+    {("hammer", "ground"): 1.0, ("hammer", "arm"): 1.5, ("arm", "casing"): 1.0},
+    {("hammer", "ground"): 0.2, ("hammer", "arm"): 0.1, ("arm", "casing"): 0.1},
+    clearance("A", "hammer", "ground", upper=0.5, lower=0.7, stiffness=8.0),
+    clearance("B", "casing", "arm", upper=0.2, stiffness=10.0),
+    table("force", on="hammer", amplitude=1.0),
+)
 BRIEF = Course(30, 4, 100)
 
 

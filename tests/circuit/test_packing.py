@@ -25,9 +25,10 @@ from designer.spice.opamp_model import Rung
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT
-from tests.shared.chains import chain, chain_circuit, table
+from tests.shared.chains import chain, chain_circuit
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import CATALOG, bought, one_sided, rectifier, stage
+from tests.shared.system_text import table
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 

@@ -12,80 +12,30 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from designer.cli import entry
+from tests.shared.system_text import clearance, system_text, table
 
 Captured = pytest.CaptureFixture[str]
 
-SHAKEN = """\
-format = 2
-[[mass]]
-name = "block"
-mass = "2 kg"
-[[spring]]
-between = ["block", "ground"]
-stiffness = "8 kN/m"
-[[damper]]
-between = ["block", "ground"]
-damping = "12 N s/m"
-[[clearance]]
-name = "A"
-between = ["block", "ground"]
-upper = "4 mm"
-stiffness = "40 kN/m"
-[base]
-amplitude = "3 mm"
-stops = "fixed"
-[[response]]
-frequency = "11 Hz"
-expect = "1-1-0"
-"""
+SHAKEN = system_text(
+    {"block": "2 kg"},
+    {("block", "ground"): "8 kN/m"},
+    {("block", "ground"): "12 N s/m"},
+    clearance("A", "block", "ground", upper="4 mm", stiffness="40 kN/m"),
+    '[base]\namplitude = "3 mm"\nstops = "fixed"\n',
+    table("response", frequency="11 Hz", expect="1-1-0"),
+)
 
-CHAIN = """\
-format = 2
-[[mass]]
-name = "tool"
-mass = 1.0
-[[mass]]
-name = "ram"
-mass = 2.0
-[[mass]]
-name = "frame"
-mass = 4.0
-[[spring]]
-between = ["tool", "ram"]
-stiffness = 2.0
-[[spring]]
-between = ["ram", "frame"]
-stiffness = 1.0
-[[spring]]
-between = ["frame", "ground"]
-stiffness = 3.0
-[[damper]]
-between = ["tool", "ram"]
-damping = 0.1
-[[damper]]
-between = ["ram", "frame"]
-damping = 0.15
-[[damper]]
-between = ["frame", "ground"]
-damping = 0.2
-[[clearance]]
-name = "A"
-between = ["tool", "ground"]
-upper = 0.5
-lower = 0.3
-upper_stiffness = 20.0
-lower_stiffness = 12.0
-[[clearance]]
-name = "B"
-between = ["tool", "ram"]
-upper = 0.2
-stiffness = 15.0
-[[force]]
-on = "tool"
-amplitude = 1.0
-[[response]]
-omega = 2.0
-"""
+CHAIN = system_text(
+    {"tool": 1.0, "ram": 2.0, "frame": 4.0},
+    {("tool", "ram"): 2.0, ("ram", "frame"): 1.0, ("frame", "ground"): 3.0},
+    {("tool", "ram"): 0.1, ("ram", "frame"): 0.15, ("frame", "ground"): 0.2},
+    clearance(
+        "A", "tool", "ground", upper=0.5, lower=0.3, upper_stiffness=20.0, lower_stiffness=12.0
+    ),
+    clearance("B", "tool", "ram", upper=0.2, stiffness=15.0),
+    table("force", on="tool", amplitude=1.0),
+    table("response", omega=2.0),
+)
 
 
 @pytest.fixture

@@ -11,44 +11,17 @@ from designer.circuit.paper_values import MODEL
 from designer.fidelity import runge_kutta, system_runge_kutta
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
+from tests.shared.system_text import clearance, system_text, table
 
-THREE = """\
-format = 2
-mass = [{name = "a", mass = 1.0}, {name = "b", mass = 2.0}, {name = "c", mass = 0.5}]
-[[spring]]
-between = ["a", "b"]
-stiffness = 1.0
-[[spring]]
-between = ["b", "c"]
-stiffness = 2.0
-[[spring]]
-between = ["c", "ground"]
-stiffness = 1.5
-[[damper]]
-between = ["a", "b"]
-damping = 0.1
-[[damper]]
-between = ["c", "ground"]
-damping = 0.3
-[[clearance]]
-name = "A"
-between = ["a", "ground"]
-upper = 0.3
-lower = 0.5
-stiffness = 9.0
-[[clearance]]
-name = "B"
-between = ["b", "c"]
-upper = 0.1
-upper_stiffness = 4.0
-[[force]]
-on = "b"
-amplitude = -0.4
-constant = 0.1
-[base]
-amplitude = 0.2
-stops = "fixed"
-"""
+THREE = system_text(
+    {"a": 1.0, "b": 2.0, "c": 0.5},
+    {("a", "b"): 1.0, ("b", "c"): 2.0, ("c", "ground"): 1.5},
+    {("a", "b"): 0.1, ("c", "ground"): 0.3},
+    clearance("A", "a", "ground", upper=0.3, lower=0.5, stiffness=9.0),
+    clearance("B", "b", "c", upper=0.1, upper_stiffness=4.0),
+    table("force", on="b", amplitude=-0.4, constant=0.1),
+    '[base]\namplitude = 0.2\nstops = "fixed"\n',
+)
 
 
 def test_smaller_steps_come_to_the_exact_flow() -> None:

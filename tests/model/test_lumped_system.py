@@ -19,41 +19,16 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
 from designer.model.model_file import ModelFile, parse_model_file
 from tests.shared.model_text import PAPER_TABLE, dimensionless
+from tests.shared.system_text import clearance, system_text, table
 
-HAMMER = """\
-format = 2
-[[mass]]
-name = "hammer"
-mass = "2 kg"
-[[mass]]
-name = "casing"
-mass = "3 kg"
-[[spring]]
-between = ["hammer", "casing"]
-stiffness = "60 kN/m"
-[[spring]]
-between = ["casing", "ground"]
-stiffness = "40 kN/m"
-[[damper]]
-between = ["hammer", "casing"]
-damping = "56 N s/m"
-[[damper]]
-between = ["casing", "ground"]
-damping = "24 N s/m"
-[[clearance]]
-name = "A"
-between = ["hammer", "ground"]
-upper = "0.5 mm"
-lower = "0.7 mm"
-stiffness = "540 kN/m"
-[[force]]
-on = "hammer"
-amplitude = "80 N"
-constant = "-19.6 N"
-[[response]]
-frequency = "54 Hz"
-expect = "1-1-1"
-"""
+HAMMER = system_text(
+    {"hammer": "2 kg", "casing": "3 kg"},
+    {("hammer", "casing"): "60 kN/m", ("casing", "ground"): "40 kN/m"},
+    {("hammer", "casing"): "56 N s/m", ("casing", "ground"): "24 N s/m"},
+    clearance("A", "hammer", "ground", upper="0.5 mm", lower="0.7 mm", stiffness="540 kN/m"),
+    table("force", on="hammer", amplitude="80 N", constant="-19.6 N"),
+    table("response", frequency="54 Hz", expect="1-1-1"),
+)
 
 
 def read(text: str) -> ModelFile:

@@ -10,44 +10,15 @@ from designer.model.ascii_sketch import system_sketch
 from designer.model.system_equations import element_rows
 from designer.report.system_drawing import system_drawing
 from tests.model.test_system_equations import FILES, system
+from tests.shared.system_text import clearance, system_text, table
 
-BRANCH = """\
-format = 2
-[[mass]]
-name = "a"
-mass = 1.5
-[[mass]]
-name = "b"
-mass = 2.5
-[[mass]]
-name = "c"
-mass = 3.5
-[[spring]]
-between = ["a", "b"]
-stiffness = 4.5
-[[spring]]
-between = ["b", "ground"]
-stiffness = 5.5
-[[spring]]
-between = ["c", "b"]
-stiffness = 6.5
-[[damper]]
-between = ["c", "ground"]
-damping = 0.25
-[[damper]]
-between = ["a", "b"]
-damping = 0.75
-[[clearance]]
-name = "A"
-between = ["a", "c"]
-upper = 0.5
-lower = 0.3
-stiffness = 12.0
-[[force]]
-on = "c"
-amplitude = 8.5
-constant = -0.125
-"""
+BRANCH = system_text(
+    {"a": 1.5, "b": 2.5, "c": 3.5},
+    {("a", "b"): 4.5, ("b", "ground"): 5.5, ("c", "b"): 6.5},
+    {("c", "ground"): 0.25, ("a", "b"): 0.75},
+    clearance("A", "a", "c", upper=0.5, lower=0.3, stiffness=12.0),
+    table("force", on="c", amplitude=8.5, constant=-0.125),
+)
 SYSTEMS = {**FILES, "branch": BRANCH}
 
 

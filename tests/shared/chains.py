@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
 
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
@@ -17,6 +16,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file
 from tests.shared.stages import CATALOG, SATURATION, SUPPLY
+from tests.shared.system_text import clearance, system_text, table
 
 
 class AnyValue(dict[str, float]):
@@ -26,22 +26,16 @@ class AnyValue(dict[str, float]):
         return 10e-9 if name.startswith("C") else 10e3
 
 
-def table(kind: str, **keys: Any) -> str:
-    """A table of a model file."""
-    lines = [f"{key} = {list(v) if isinstance(v, tuple) else v!r}" for key, v in keys.items()]
-    return "\n".join([f"[[{kind}]]", *lines, ""])
-
-
 def chain_text(masses: int, *more: str) -> str:
     """The model file of masses m1, m2, … with a spring and a damper before, between and behind
     them, a force on the first, and further tables."""
     names = ["ground", *(f"m{i + 1}" for i in range(masses)), "ground"]
-    tables = [table("mass", name=name, mass=1.0) for name in names[1:-1]]
-    for pair in pairwise(names):
-        tables.append(table("spring", between=pair, stiffness=1.0))
-        tables.append(table("damper", between=pair, damping=0.1))
+    pairs = list(pairwise(names))
     force = () if "[[force]]" in "".join(more) else (table("force", on="m1", amplitude=1.0),)
-    return "\n".join(['format = 2\ntitle = "a chain"\n', *tables, *force, *more])
+    title = 'title = "a chain"\n'
+    links = dict.fromkeys(pairs, 1.0), dict.fromkeys(pairs, 0.1)
+    text = system_text(dict.fromkeys(names[1:-1], 1.0), *links, *force, *more)
+    return text.replace("format = 2\n", f"format = 2\n{title}", 1)
 
 
 def chain(masses: int, *more: str) -> MechanicalModel:
@@ -68,15 +62,15 @@ def chain_circuit(
 
 EVEN = {"upper": 0.5, "lower": 0.5, "stiffness": 5.0}
 TWO_GAPS = (
-    table("clearance", name="A", between=("m1", "ground"), **EVEN),
-    table("clearance", name="B", between=("m2", "m3"), **EVEN),
+    clearance("A", "m1", "ground", **EVEN),
+    clearance("B", "m2", "m3", **EVEN),
 )
 """A clearance to ground and one between two masses, for chains of three masses or more."""
-PRELOADED = table("clearance", name="A", between=("m1", "ground"), upper=-0.1, stiffness=4.0)
+PRELOADED = clearance("A", "m1", "ground", upper=-0.1, stiffness=4.0)
 """One stop, in contact at rest."""
 EVERYTHING = (
     *TWO_GAPS,
-    table("clearance", name="C", between=("m4", "ground"), lower=0.3, stiffness=3.0),
+    clearance("C", "m4", "ground", lower=0.3, stiffness=3.0),
     table("force", on="m1", amplitude=1.0, constant=0.2),
     table("force", on="m3", amplitude=-0.5),
 )

@@ -16,16 +16,13 @@ from designer.model.model_file import parse_model_file
 from designer.spice import equation_check
 from designer.spice.numerics_gate import WAVE_BOUND
 from designer.spice.pool import SpicePool
-from tests.shared.chains import chain_text, table
+from tests.shared.chains import chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.system_text import clearance, table
 
 PEAK = 4.0
 """Volts of every state's peak."""
 GROUND = ("m1", "ground")
-
-
-def gap(name: str = "A", between: tuple[str, str] = GROUND, **keys: float) -> str:
-    return table("clearance", name=name, between=between, **keys)
 
 
 def force(**keys: float) -> str:
@@ -34,34 +31,52 @@ def force(**keys: float) -> str:
 
 BASE = "[base]\namplitude = 0.7\n"
 CASES = {
-    "a base that moves": (1, 1.2, "1-1-0", (gap(upper=0.6, stiffness=8.0), BASE)),
+    "a base that moves": (
+        1,
+        1.2,
+        "1-1-0",
+        (clearance("A", *GROUND, upper=0.6, stiffness=8.0), BASE),
+    ),
     "preloaded": (
         1,
         1.5,
         "1-1-1",
-        (gap(upper=0.4, lower=-0.1, upper_stiffness=6.0, lower_stiffness=3.0), force()),
+        (
+            clearance(
+                "A", *GROUND, upper=0.4, lower=-0.1, upper_stiffness=6.0, lower_stiffness=3.0
+            ),
+            force(),
+        ),
     ),
     "unequal sides": (
         1,
         1.2,
         "1-1-1",
-        (gap(upper=0.4, lower=0.6, upper_stiffness=8.0, lower_stiffness=5.0), force()),
+        (
+            clearance("A", *GROUND, upper=0.4, lower=0.6, upper_stiffness=8.0, lower_stiffness=5.0),
+            force(),
+        ),
     ),
-    "a constant force": (1, 1.2, "1-0-1", (gap(lower=0.5, stiffness=8.0), force(constant=-0.3))),
+    "a constant force": (
+        1,
+        1.2,
+        "1-0-1",
+        (clearance("A", *GROUND, lower=0.5, stiffness=8.0), force(constant=-0.3)),
+    ),
     "between masses": (
         2,
         1.2,
         "1-1-1",
-        (gap(between=("m1", "m2"), upper=0.3, lower=0.3, stiffness=5.0), force()),
+        (clearance("A", "m1", "m2", upper=0.3, lower=0.3, stiffness=5.0), force()),
     ),
     "stiffening in steps": (
         1,
         1.2,
         "1-1-0;1-0;1-0",
         (
-            gap(upper=0.3, stiffness=1.0),
-            gap("B", upper=0.5, stiffness=2.0),
-            gap("C", upper=0.6, stiffness=3.0),
+            clearance("A", *GROUND, upper=0.3, stiffness=1.0),
+            clearance("B", *GROUND, upper=0.5, stiffness=2.0),
+            clearance("C", *GROUND, upper=0.6, stiffness=3.0),
             force(),
         ),
     ),
@@ -70,8 +85,8 @@ CASES = {
         1.2,
         "1-1-1;1-0",
         (
-            gap(upper=0.3, lower=0.3, stiffness=5.0),
-            gap("B", ("m2", "ground"), upper=0.2, stiffness=8.0),
+            clearance("A", *GROUND, upper=0.3, lower=0.3, stiffness=5.0),
+            clearance("B", "m2", "ground", upper=0.2, stiffness=8.0),
             force(),
         ),
     ),

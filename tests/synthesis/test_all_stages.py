@@ -13,48 +13,18 @@ from designer.spice import equation_check
 from designer.spice.pool import SpicePool
 from designer.synthesis.attempt import relative_amplitude
 from designer.synthesis.part_checks import check_choices
+from tests.shared.system_text import clearance, system_text, table
 
-TWO = """\
-format = 2
-[[mass]]
-name = "one"
-mass = 1.0
-[[mass]]
-name = "two"
-mass = 1.0
-[[spring]]
-between = ["one", "two"]
-stiffness = 1.0
-[[spring]]
-between = ["two", "ground"]
-stiffness = 1.0
-[[damper]]
-between = ["one", "two"]
-damping = 0.3
-[[damper]]
-between = ["two", "ground"]
-damping = 0.4
-[[clearance]]
-name = "A"
-between = ["one", "ground"]
-upper = 0.5
-lower = 0.6
-upper_stiffness = 5.0
-lower_stiffness = 6.0
-[[clearance]]
-name = "B"
-between = ["one", "two"]
-upper = 0.3
-stiffness = 4.0
-[[force]]
-on = "one"
-amplitude = 1.0
-constant = -0.1
-[[response]]
-omega = 1.3
-[circuit]
-dead_zone = "rectifier"
-"""
+TWO = system_text(
+    {"one": 1.0, "two": 1.0},
+    {("one", "two"): 1.0, ("two", "ground"): 1.0},
+    {("one", "two"): 0.3, ("two", "ground"): 0.4},
+    clearance("A", "one", "ground", upper=0.5, lower=0.6, upper_stiffness=5.0, lower_stiffness=6.0),
+    clearance("B", "one", "two", upper=0.3, stiffness=4.0),
+    table("force", on="one", amplitude=1.0, constant=-0.1),
+    table("response", omega=1.3),
+    '[circuit]\ndead_zone = "rectifier"\n',
+)
 
 
 @pytest.mark.slow
@@ -78,33 +48,17 @@ def test_two_unequal_clearances_one_between_masses_and_a_weight() -> None:
     assert check.passed, check.problem
 
 
-ONE = """\
-format = 2
-[[mass]]
-name = "one"
-mass = 1.0
-[[spring]]
-between = ["one", "ground"]
-stiffness = 1.0
-[[damper]]
-between = ["one", "ground"]
-damping = 0.1
-[[clearance]]
-name = "A"
-between = ["one", "ground"]
-upper = 1.26
-lower = 1.26
-upper_stiffness = 20.0
-lower_stiffness = 2.0
-[[force]]
-on = "one"
-amplitude = 1.5
-[[response]]
-omega = 0.8
-[circuit]
-dead_zone = "rectifier"
-resistors = "E24"
-"""
+ONE = system_text(
+    {"one": 1.0},
+    {("one", "ground"): 1.0},
+    {("one", "ground"): 0.1},
+    clearance(
+        "A", "one", "ground", upper=1.26, lower=1.26, upper_stiffness=20.0, lower_stiffness=2.0
+    ),
+    table("force", on="one", amplitude=1.5),
+    table("response", omega=0.8),
+    '[circuit]\ndead_zone = "rectifier"\nresistors = "E24"\n',
+)
 SHAKEN = (
     ONE.replace('[[force]]\non = "one"\namplitude = 1.5', "[base]\namplitude = 1.0")
     .replace("lower = 1.26\n", "")
