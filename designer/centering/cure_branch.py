@@ -16,6 +16,8 @@ from designer.catalog.entries import OpAmp
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
+from designer.model.circuit_table import DeadZone
+from designer.synthesis.part_checks import stage_refusal
 
 OPAMP, DEAD_ZONE, REFERENCE = "op-amp", "dead zone", "reference"
 GRADE, NETWORK, PLACE, TRIM, TRIMMER = "grade", "network", "place", "trim", "trimmer"
@@ -83,8 +85,10 @@ def branches(
         now = catalog.opamp(spec.opamp)
         names += [o.name for o in better_opamps(now, spec.supply, catalog)]
     zones: list[str | None] = [None]
-    if DEAD_ZONE not in without and base.modelfile.model.second_order().clearances:
-        zones.append("rectifier" if spec.dead_zone == "saturation" else "saturation")
+    clearances = base.modelfile.model.second_order().clearances
+    if DEAD_ZONE not in without and clearances:
+        other: DeadZone = "rectifier" if spec.dead_zone == "saturation" else "saturation"
+        zones += [other] if stage_refusal(clearances, other) is None else []
     for zone in zones:
         for name in names:
             if name is not None or zone is not None:

@@ -12,6 +12,7 @@ from designer.catalog.catalog import Catalog
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.model_file import ModelFile
 from designer.synthesis.limits import NO_AIMS, Aims
+from designer.synthesis.part_checks import stage_refusal
 
 PLACES, TOPOLOGY = "places", "opamp and dead zone"
 LEVERS = ("opamp", "dead zone", "amplitude", "state scales", "noise gain", "time scale")
@@ -77,8 +78,8 @@ class DesignChoice:
 
 
 def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
-    """Every op-amp with every dead zone that the search may take, the file's own first if it is
-    one of them.
+    """Every op-amp with every dead zone that the search may take and that makes the model's
+    clearances, the file's own first if it is one of them; with every dead zone if none makes them.
 
     Raises
     ------
@@ -92,10 +93,12 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
             field = "search.opamps" if error.field == "circuit.opamp" else error.field
             raise InputError(None, field, error.found, error.expected) from None
     opamps = spec.opamps or (file_choice.opamp,)
+    clearances = modelfile.model.second_order().clearances
+    able = [zone for zone in spec.dead_zones if stage_refusal(clearances, zone) is None]
     choices = [
         replace(file_choice, opamp=opamp, dead_zone=zone)
         for opamp in opamps
-        for zone in spec.dead_zones
+        for zone in able or spec.dead_zones
     ]
     return sorted(choices, key=lambda choice: choice != file_choice)
 

@@ -76,13 +76,10 @@ class DeadZoneStage:
     def refused(self, clearance: Clearance) -> InputError | None:
         """Why the stage cannot make this clearance; None if it can."""
         name, stops = clearance.name, [stop for _, stop in clearance.sides]
-        if any(stop.further for stop in stops):
-            return InputError(
-                None,
-                f"clearance {name}",
-                "a stop that stiffens in steps",
-                "one [[clearance]] for each step, at the same place, with rising gaps",
-            )
+        for side, stop in clearance.sides:
+            if stop.further:
+                found = "a stop that stiffens in steps"
+                return InputError(None, f"clearance {name}", found, _as_clearances(side, stop))
         if self.kind == "rectifier":
             return None
         if any(stop.gap <= 0.0 for stop in stops):
@@ -94,6 +91,13 @@ class DeadZoneStage:
         else:
             return None
         return InputError(None, "circuit.dead_zone", found, expected)
+
+
+def _as_clearances(side: int, stop: Side) -> str:
+    """What to write for a stop that stiffens in steps."""
+    word = "upper" if side > 0 else "lower"
+    steps = ", ".join(f"{word} = {gap:.6g} with stiffness = {k:.6g}" for gap, k in stop.springs)
+    return f"one [[clearance]] for each step, at the same place: {steps}"
 
 
 def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:

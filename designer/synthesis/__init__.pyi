@@ -21,6 +21,7 @@ from .part_checks import (
     check_choices as check_choices,
     diode_of as diode_of,
     opamp_of as opamp_of,
+    stage_refusal as stage_refusal,
     unit_circuit as unit_circuit,
 )
 from .parts_choice import (

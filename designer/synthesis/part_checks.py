@@ -21,7 +21,7 @@ from designer.circuit import build
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
-from designer.model.circuit_table import CircuitSpec
+from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.mechanics import Clearance, MechanicalModel
 
 _SECTION = re.compile("[A-OQ-Z]")
@@ -113,23 +113,26 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "no base, or no force with an amplitude: one generator drives both, and their ratio "
             "changes with the frequency",
         )
-    _check_clearances(system.clearances, spec)
+    refusal = stage_refusal(system.clearances, spec.dead_zone)
+    if refusal is not None:
+        raise refusal
 
 
-def _check_clearances(clearances: Sequence[Clearance], spec: CircuitSpec) -> None:
-    """What the stage of this kind cannot make."""
-    stage = DeadZoneStage(spec.dead_zone)
+def stage_refusal(clearances: Sequence[Clearance], kind: DeadZone) -> Refusal:
+    """Why the stage of this kind cannot make these clearances; None if it can."""
+    stage = DeadZoneStage(kind)
     for clearance in clearances:
         refusal = stage.refused(clearance)
         if refusal is not None:
-            raise refusal
-    if len(clearances) > 1 and spec.dead_zone == "saturation":
-        raise InputError(
+            return refusal
+    if len(clearances) > 1 and kind == "saturation":
+        return InputError(
             None,
             "circuit.dead_zone",
             '"saturation", with several clearances',
             '"rectifier": the thresholds of amplifiers that clip do not keep a ratio',
         )
+    return None
 
 
 def buyable(kind: Kind, spec: CircuitSpec, catalog: Catalog) -> Array:

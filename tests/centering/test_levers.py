@@ -19,11 +19,13 @@ from designer.centering.ngspice_check import Agreement
 from designer.centering.operating_points import Scored, score
 from designer.centering.windows import OperatingPoint, Stretch
 from designer.model import find_responses
-from designer.model.model_file import ModelFile
+from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.synthesis import parts_choice
+from tests.shared.chains import chain_text
 from tests.shared.search_cases import catalog, file
+from tests.shared.system_text import clearance
 
 PLACE = 'omega = 0.8\nexpect = "1-2-2"'
 BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
@@ -37,6 +39,12 @@ def test_the_file_s_own_choice_is_first() -> None:
     found = topologies(wider, catalog())
     assert len(found) == 4
     assert found[0] == DesignChoice.of(BOTH.circuit)
+
+
+def test_a_dead_zone_that_cannot_make_the_clearances_is_no_choice() -> None:
+    unequal = clearance("A", "m1", "ground", upper=0.5, lower=0.6, stiffness=5.0)
+    asked = parse_model_file(chain_text(1, unequal, '[circuit]\ndead_zone = "rectifier"\n'))
+    assert [c.dead_zone for c in topologies(asked, catalog())] == ["rectifier"]
 
 
 def test_an_unknown_op_amp_is_refused() -> None:

@@ -93,7 +93,7 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
         (("[[response]]", "[base]\namplitude = 0.1\n[[response]]"), "base.amplitude", "ratio"),
         (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
         (("stiffness = 4.0", 'law = "hertz"\nconstant = 9.0\ndepth = 0.2'),
-         "clearance B", "one [[clearance]] for each step"),
+         "clearance B", "at the same place: upper = 0.3 with stiffness = "),
     ],
 )  # fmt: skip
 def test_what_no_circuit_can_do_is_refused(change: tuple[str, str], field: str, text: str) -> None:
