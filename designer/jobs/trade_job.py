@@ -13,6 +13,7 @@ from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.catalog.catalog import load_catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
@@ -131,8 +132,19 @@ def trade(
         ) | stated_options(words)
         options = replace(options, seed=numbers["seed"])
     extent = TradeExtent(boards=numbers["boards"], truth=numbers["truth"])
+    if extent.truth == VENDOR:
+        _need_vendor_model(modelfile)
     progress = Progress() if progress is None else progress
     return TradeResult(*answer(modelfile, folder, options, extent, progress))
+
+
+def _need_vendor_model(modelfile: ModelFile) -> None:
+    """InputError unless the catalogue names a vendor's model of the wanted op-amp."""
+    spec = modelfile.circuit
+    opamp = load_catalog().opamp(spec.opamp, spec.supply)
+    if opamp.spice is None:
+        expected = f"{TOP}: the catalogue has no vendor's model of {opamp.name}"
+        raise InputError(None, "--truth", VENDOR, expected)
 
 
 def measure(
@@ -150,14 +162,8 @@ def measure(
 
     Raises
     ------
-    InputError : the vendor's model is asked for, and there is none.
     EnvironmentMissing : ngspice is missing.
     """
-    figures = synthesis.design.circuit.figures
-    if extent.truth == VENDOR and (figures is None or figures.spice is None):
-        name = "the op-amp" if figures is None else figures.name
-        expected = f"{TOP}: the catalogue has no vendor's model of {name}"
-        raise InputError(None, "--truth", VENDOR, expected)
     count = len(synthesis.model_responses)
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)

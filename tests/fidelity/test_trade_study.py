@@ -20,8 +20,9 @@ from designer.base.errors import InputError
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.catalog.catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
-from designer.circuit.netlist import nominal_board
+from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.dynamics.kernel_boards import POINTS
@@ -59,6 +60,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import cross_check
+from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 
@@ -524,15 +526,26 @@ def test_the_full_op_amps_err_against_a_vendor_s_macromodel() -> None:
     assert len(front(answer).axes) == 1
 
 
+def test_a_vendor_s_truth_needs_a_vendor_s_model(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "model.toml").write_text(MODEL, encoding="utf-8")
+    words = ["trade", str(tmp_path / "model.toml"), "--out", str(tmp_path / "out")]
+    assert entry.status([*words, "--truth", "vendor", "-q"]) == 2
+    assert "no vendor's model of TL074C" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_with_a_vendor_s_model_full_is_still_the_data_sheet_s() -> None:
-    made = synthesised()
-    one = rungs.subject(made, made.model_responses[0])
+    figures = load_catalog().opamp("TL074C")
+    plain = replace(circuit_of(EXACT), figures=figures)
+    run = replace(orbit(), start=np.zeros(4))
+    reduction = Reduction(plain, nominal_board(plain))
+    one = numerics_gate.GateSubject(reduction, Excitation(400.0, 1.0), run)
     assert set(rungs.in_ngspice(one, "full")) == {"ideal", "dynamic", "full"}
-    figures = one.circuit.figures
-    assert figures is not None
     lines = (".subckt own inp inn out vcc vee", "E42 out 0 inp inn 1e5", ".ends own")
     vendor = VendorModel("part.lib", "own", PINS, lines, b"")
-    circuit = replace(one.circuit, figures=replace(figures, spice=vendor))
+    circuit = replace(plain, figures=replace(figures, spice=vendor))
     asked = replace(one, reduction=Reduction(circuit, nominal_board(circuit)))
     on = rungs.in_ngspice(asked, "vendor")
     settings = SolverSettings("trap", one.period / 200.0)
