@@ -45,15 +45,18 @@ class Ensemble:
     """N boards, reduced once each and asked as often as is wanted.
 
     fast : take the compiled way where it fits; False: ``attractors.settle`` of each board.
-    jobs : threads that reduce.
+    jobs : threads that reduce. bandwidth : as of ``reduction.Reduction``.
     """
 
-    def __init__(self, boards: Boards, *, fast: bool = True, jobs: int = 1) -> None:
+    def __init__(
+        self, boards: Boards, *, fast: bool = True, jobs: int = 1, bandwidth: bool = False
+    ) -> None:
         self.boards = boards
+        self.bandwidth = bandwidth
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
         fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
-        self._modes = _reduced(boards, jobs) if fast and fits else None
+        self._modes = _reduced(boards, jobs, bandwidth) if fast and fits else None
 
     def __len__(self) -> int:
         return len(self.boards)
@@ -63,7 +66,8 @@ class Ensemble:
         known = self._reductions.get(index)
         if known is None:
             board = self.boards.board(index)
-            known = self._reductions[index] = Reduction(self.boards.circuit, board)
+            known = Reduction(self.boards.circuit, board, bandwidth=self.bandwidth)
+            self._reductions[index] = known
         return known
 
     def settle(
@@ -299,13 +303,17 @@ def _faint(orbit: Orbit, drive: Drive) -> bool:
     return orbit.status is OrbitStatus.NOT_SETTLED
 
 
-def _reduced(boards: Boards, jobs: int) -> working.BoardModes:
+def _reduced(boards: Boards, jobs: int, bandwidth: bool) -> working.BoardModes:
     """The first working modes, by ``jobs`` threads."""
     count = len(boards)
     if count <= TOGETHER:
-        return working.BoardModes(boards)
+        return working.BoardModes(boards, bandwidth=bandwidth)
     chunks = [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
-    parts = list(parallel(lambda chunk: working.BoardModes(boards.take(chunk)), chunks, jobs))
+
+    def part(chunk: range) -> working.BoardModes:
+        return working.BoardModes(boards.take(chunk), bandwidth=bandwidth)
+
+    parts = list(parallel(part, chunks, jobs))
     return working.BoardModes.joined(boards, parts)
 
 

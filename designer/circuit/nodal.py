@@ -11,7 +11,7 @@ array here has a leading axis (N,).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,10 @@ class Solution:
     """Row of the current [A] into each state capacitor and through each diode, by name."""
     output: dict[str, Array]
     """Row of the current [A] out of each op-amp section's output, by name."""
+
+
+Solver = Callable[[Array, Array, ModeKey], Array]
+"""y of G y = right for the mode of this key."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,10 @@ class NodalEquations:
             right[..., row, n + 1] = board.drop[d.name]
         return G, right
 
+    def solved(self, key: ModeKey, solver: Solver) -> Solution:
+        """What holds in a mode, its equations solved by ``solver``."""
+        return self.solution(solver(*self.of(key), key))
+
     def solution(self, y: Array) -> Solution:
         """y (..., size, n + 2) by names."""
         c, first = self.circuit, self._first
@@ -117,8 +125,8 @@ class NodalEquations:
         sides = self.sides(key)
         ways: list[Exit] = []
         switches: tuple[Section | Diode, ...] = (*self._sections, *self._diodes)
-        for i, (switch, position) in enumerate(zip(switches, key, strict=True)):
-            for row, to in self._leaving(switch, position, solved):
+        for i, switch in enumerate(switches):
+            for row, to in self.leaving(key, switch, solved):
                 target = (*key[:i], to, *key[i + 1 :])
                 changed = [j for j, s in enumerate(self.sides(target)) if s != sides[j]]
                 j = changed[0] if changed else -1
@@ -161,25 +169,31 @@ class NodalEquations:
                 return side
         return 0
 
-    def _leaving(
-        self, switch: Section | Diode, position: int, solved: Solution
+    def leaving(
+        self, key: ModeKey, switch: Section | Diode, solved: Solution
     ) -> list[tuple[Array, int]]:
-        """Rows that become positive where the switch leaves its position, with the next one."""
-        board = self.board
+        """Rows that become positive where the switch leaves its position in a mode, with the next
+        position."""
+        board, position = self.board, key[self._number[switch.name]]
         if isinstance(switch, Diode):
             if position:
                 return [(-solved.current[switch.name], 0)]
             across = solved.voltage[switch.anode] - solved.voltage[switch.cathode]
-            return [(_plus(across, -np.asarray(board.drop[switch.name])), 1)]
+            return [(plus(across, -np.asarray(board.drop[switch.name])), 1)]
         low, high = board.rails[switch.name]
         if position == 0:
             out = solved.voltage[switch.output]
-            return [(_plus(out, -np.asarray(high)), 1), (_plus(-out, np.asarray(low)), -1)]
-        across = solved.voltage[switch.noninverting] - solved.voltage[switch.inverting]
-        offset = np.asarray(board.offset.get(switch.name, 0.0))
-        across = _plus(across, offset)
-        limit = np.asarray(high if position > 0 else low) * board.inverse_gain
-        return [(-position * _plus(across, -limit), 0)]
+            return [(plus(out, -np.asarray(high)), 1), (plus(-out, np.asarray(low)), -1)]
+        return [(-position * self.overdrive(switch, position, solved), 0)]
+
+    def overdrive(self, section: Section, position: int, solved: Solution) -> Array:
+        """(..., n + 2) differential input of a section at this limit, beyond what it takes to be
+        there [V]: with the limit's sign as long as the section stays."""
+        low, high = self.board.rails[section.name]
+        across = solved.voltage[section.noninverting] - solved.voltage[section.inverting]
+        across = plus(across, np.asarray(self.board.offset.get(section.name, 0.0)))
+        limit = np.asarray(high if position > 0 else low) * self.board.inverse_gain
+        return plus(across, -limit)
 
     def _assemble(self) -> tuple[Array, Array]:
         """What is the same in every mode."""
@@ -234,7 +248,8 @@ class NodalEquations:
         return G, right
 
 
-def _plus(row: Array, constant: Any) -> Array:
+def plus(row: Array, constant: Any) -> Array:
+    """A row over (states, generator, 1) with this added to its constant."""
     out = row.copy()
     out[..., -1] += constant
     return out

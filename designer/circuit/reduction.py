@@ -17,6 +17,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.circuit.netlist import Board, Circuit
 from designer.circuit.nodal import NodalEquations, Solution
+from designer.circuit.nodal_bandwidth import LaggingEquations
 from designer.circuit.stop import Stop
 from designer.circuit.working_modes import working_keys
 from designer.dynamics.piecewise_linear import (
@@ -43,20 +44,25 @@ class Reduction:
 
     Parameters
     ----------
-    circuit, board : what is reduced.
+    circuit, board : what is reduced. bandwidth : whether the op-amps lag behind by their
+    gain-bandwidth and their limits give way to their current (``nodal_bandwidth``).
 
     Raises
     ------
     FloatingCircuit : the nodal equations have no unique answer.
+    ValueError : a bandwidth for a circuit without figures of its op-amp.
     """
 
-    def __init__(self, circuit: Circuit, board: Board) -> None:
+    def __init__(self, circuit: Circuit, board: Board, *, bandwidth: bool = False) -> None:
         self.circuit = circuit
         self.board = board
+        self.bandwidth = bandwidth
         self._solutions: dict[ModeKey, Solution] = {}
 
     @cached_property
     def _equations(self) -> NodalEquations:
+        if self.bandwidth:
+            return LaggingEquations(self.circuit, self.board, _solved)
         return NodalEquations(self.circuit, self.board)
 
     def system(self) -> PiecewiseLinearSystem:
@@ -81,9 +87,7 @@ class Reduction:
         """Every net's voltage and every capacitor's current in this mode."""
         known = self._solutions.get(key)
         if known is None:
-            G, right = self._equations.of(key)
-            known = self._equations.solution(_solved(G, right, key))
-            self._solutions[key] = known
+            known = self._solutions[key] = self._equations.solved(key, _solved)
         return known
 
     def output(self, key: ModeKey, net: str, x: Array, u: Array) -> Array:

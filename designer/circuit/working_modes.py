@@ -13,6 +13,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
+from designer.circuit.nodal_bandwidth import LaggingEquations
 from designer.dynamics import kernel_mode_tables as kernel
 from designer.dynamics.piecewise_linear import ModeKey, motion_of_states
 from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
@@ -64,23 +65,33 @@ class _SolvedMode:
 
 
 def _solved(equations: NodalEquations, key: ModeKey) -> _SolvedMode:
-    G, right = equations.of(key)
-    y, bad = np.zeros_like(right), np.zeros(len(right), dtype=np.int64)
-    solve_all(G, right, y, bad)
-    solution = equations.solution(y)
+    solution = equations.solved(key, _all_solved)
     rates, exits = equations.rates(solution), equations.exits(key, solution)
-    good = (bad == 0) & np.isfinite(rates).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(rates).all(axis=(1, 2)))
     for way in exits:
         good &= np.isfinite(way.row).all(axis=1)
     return _SolvedMode(rates, exits, solution.voltage, good)
 
 
-class BoardModes:
-    """Some of the working modes of N boards, in the form of the fast path."""
+def _all_solved(G: Array, right: Array, key: ModeKey) -> Array:
+    """y of all boards; nan where a board's equations have no unique answer."""
+    y, bad = np.zeros_like(right), np.zeros(len(right), dtype=np.int64)
+    solve_all(G, right, y, bad)
+    y[bad != 0] = np.nan
+    return y
 
-    def __init__(self, boards: Boards, keys: Iterable[ModeKey] = ()) -> None:
+
+class BoardModes:
+    """Some of the working modes of N boards, in the form of the fast path.
+
+    bandwidth : as of ``reduction.Reduction``.
+    """
+
+    def __init__(
+        self, boards: Boards, keys: Iterable[ModeKey] = (), *, bandwidth: bool = False
+    ) -> None:
         circuit = boards.circuit
-        self._boards = boards
+        self._boards, self._bandwidth = boards, bandwidth
         self.targets = GuardTargets(working_keys(circuit))
         between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
         self.modes = empty_modes(
@@ -98,6 +109,7 @@ class BoardModes:
         """Those of some boards, for themselves: what is added to them is not added here."""
         out = object.__new__(BoardModes)
         out._boards, out.targets = self._boards.take(which), self.targets.copy()
+        out._bandwidth = self._bandwidth
         parts = {name: getattr(self.modes, name)[which] for name in OF_EACH}
         rest = {
             name: value.copy()
@@ -126,7 +138,12 @@ class BoardModes:
     def add(self, keys: Iterable[ModeKey]) -> None:
         """Solve further modes; those that are there already are left as they are."""
         new = [key for key in keys if key not in self.targets.numbers]
-        equations = NodalEquations(self._boards.circuit, self._boards.stacked)
+        circuit, board = self._boards.circuit, self._boards.stacked
+        equations = (
+            LaggingEquations(circuit, board, _all_solved)
+            if self._bandwidth
+            else NodalEquations(circuit, board)
+        )
         solved = [_solved(equations, key) for key in new]
         most = max((len(mode.exits) for mode in solved), default=0)
         self.modes = grown(self.modes, len(self.targets.keys) + len(new), most)

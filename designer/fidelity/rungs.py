@@ -1,12 +1,13 @@
 """Every rung on one response of a design: its answer at several steps, and what a period costs.
 
 The rungs, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and the
-exact flow), the nominal circuit by the exact flow, and ngspice with ideal op-amps, with bandwidth
-and slew (``dynamic``), with a macromodel (``full``). The largest step of ngspice is a fraction of
-the period that follows the shortest contact (``numerics_gate.first_steps``): "step ×1, reltol
-1e-05" is what the numerics gate tries first, "step ×4" four times that step, so coarser. The
-tolerance goes with the step, for beside a tight one ngspice takes the small steps anyway. Of each
-setting it is said whether it passes the gate (`passes`).
+exact flow), the nominal circuit by the exact flow, the same with a bandwidth, and ngspice with
+ideal op-amps, with bandwidth and slew (``dynamic``), with a macromodel (``full``). The largest step
+of ngspice is a fraction of the period that follows the shortest contact
+(``numerics_gate.first_steps``): "step ×1, reltol 1e-05" is what the numerics gate tries first,
+"step ×4" four times that step, so coarser. The tolerance goes with the step, for beside a tight one
+ngspice takes the small steps anyway. Of each setting it is said whether it passes the gate
+(`passes`).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
@@ -47,8 +49,8 @@ from designer.spice.simulator import SimulationFailed, Waveforms
 
 Run = Read | SimulationFailed
 
-RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
-RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS, "vendor")
+RK4, MODEL, CIRCUIT, BANDWIDTH = "rk4", "model", "circuit", "bandwidth"
+RUNGS = (RK4, MODEL, CIRCUIT, BANDWIDTH, *SPICE_RUNGS, "vendor")
 TOP: Final = "full"
 """The most faithful rung of our own models."""
 VENDOR: Final = "vendor"
@@ -159,7 +161,7 @@ def measured(
 
 
 def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
-    """Runge-Kutta at its steps, and both exact flows."""
+    """Runge-Kutta at its steps, and the exact flows."""
     r, model, omega = asked.response, asked.model, asked.response.omega
     flow = model_flow(model, omega)
     start = r.orbit.start
@@ -180,19 +182,21 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
         RungAnswer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
         here(MODEL, lambda n: flow.run(start, n), BASELINE),
     )
-    own, subject = asked.subject.orbit, asked.subject
+    subject = asked.subject
     on = Flow(subject.system, subject.excitation.drive)
-    begin = own.start if len(own.start) else np.zeros(on.system.size)
-    yield (
-        RungAnswer(
-            CIRCUIT,
-            "exact",
-            {},
-            _in_model_units(own, asked),
-            _drawn(on, own, float(asked.volts[on.system.moving])),
-        ),
-        here(CIRCUIT, lambda n: on.run(begin, n), BASELINE),
+    yield _of_circuit(CIRCUIT, on, subject.orbit, asked)
+    if subject.circuit.figures is not None:
+        yield _of_circuit(BANDWIDTH, _lagging_flow(subject), _lagging_orbit(subject), asked)
+
+
+def _of_circuit(rung: str, flow: Flow, orbit: Orbit, asked: _Asked) -> tuple[RungAnswer, Entrant]:
+    """The exact flow of the nominal circuit, and its orbit in volts."""
+    begin = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
+    volts = float(asked.volts[flow.system.moving])
+    answer = RungAnswer(
+        rung, "exact", {}, _in_model_units(orbit, asked), _drawn(flow, orbit, volts)
     )
+    return answer, here(rung, lambda n: flow.run(begin, n), BASELINE)
 
 
 @dataclass(frozen=True)
@@ -236,13 +240,16 @@ def _runge_kutta(
 
 def in_ngspice(subject: GateSubject, truth: Truths) -> dict[str, GateSubject]:
     """The subject on every rung of ngspice, by name; with the vendor's macromodel as the truth,
-    ``full`` is the one from the data sheet's figures."""
-    full, figures = subject, subject.circuit.figures
+    ``full`` is the one from the data sheet's figures. Those above ``ideal`` start on the orbit with
+    bandwidth, from which the way is shorter."""
+    figures, near = subject.circuit.figures, replace(subject, start=_lagging_start(subject))
+    full = near
     if truth == VENDOR and figures is not None:
         plain = replace(subject.circuit, figures=replace(figures, spice=None))
-        full = replace(subject, reduction=Reduction(plain, subject.board))
+        full = replace(near, reduction=Reduction(plain, subject.board))
     on = {str(rung): replace(full, rung=rung) for rung in SPICE_RUNGS}
-    return on | ({VENDOR: replace(subject, rung=TOP)} if truth == VENDOR else {})
+    on["ideal"] = replace(on["ideal"], start=subject.start)
+    return on | ({VENDOR: replace(near, rung=TOP)} if truth == VENDOR else {})
 
 
 def _spice(
@@ -293,6 +300,25 @@ def _spice(
                 RungAnswer(name, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
                 entrant,
             )
+
+
+def _lagging_start(subject: GateSubject) -> Array | None:
+    """Start of the orbit of the exact circuit with bandwidth; None where it has none of the kind
+    that there is without."""
+    if subject.circuit.figures is None:
+        return None
+    orbit = _lagging_orbit(subject)
+    return orbit.start if orbit.status is subject.orbit.status else None
+
+
+def _lagging_flow(subject: GateSubject) -> Flow:
+    system = Reduction(subject.circuit, subject.board, bandwidth=True).system()
+    return Flow(system, subject.excitation.drive)
+
+
+def _lagging_orbit(subject: GateSubject) -> Orbit:
+    start = subject.orbit.start
+    return settle(_lagging_flow(subject), start if len(start) else np.zeros(subject.system.size))
 
 
 def _own(subject: GateSubject, ladder: tuple[int, float]) -> SolverSettings:
