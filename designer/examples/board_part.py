@@ -25,6 +25,7 @@ from designer.jobs.export_job import export
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.rules_job import rules
 from designer.jobs.study_job import run
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.relative_motion import relative_motions
 from designer.report import comparison, orbit_plots
 from designer.spice.pool import SpicePool
@@ -87,11 +88,18 @@ def _portraits(made: Synthesis) -> dict[str, tuple[str, Figure]]:
         for index, motion in enumerate(relative_motions(system)):
             figure = orbit_plots.phase_portrait(response, drawn, motion, index)
             caption = (
-                f"{response.circuit.response} at ω = {response.model.omega:.4g}: {motion.label}, "
-                "the model (broad line), the exact circuit (broken line) and ngspice (dots)."
+                f"{response.circuit.response} at ω = {response.model.omega:.4g}: {motion.label}"
+                f"{_named(system, index)}, the model (broad line), the exact circuit (broken line) "
+                "and ngspice (dots)."
             )
             out[f"portrait-{number + 1}-{index + 1}"] = (caption, figure)
     return out
+
+
+def _named(system: SecondOrderSystem, clearance: int) -> str:
+    """Which clearance is seen, where there are several."""
+    several = len(system.clearances) > 1
+    return f" in {system.clearances[clearance].name}" if several else ""
 
 
 def _board(made: Synthesis) -> Figure:
@@ -136,13 +144,18 @@ def _facts(outcome: JobOutcome) -> list[str]:
     proved = "" if bound is None else f", lower bound {bound:.2g}"
     check = answer["equation_check"]
     within = sum(finding["passed"] for finding in check["findings"])
+    others = [
+        f" {finding['name']}: {finding['reason'] or 'outside its bound'}."
+        for finding in check["findings"]
+        if not finding["passed"]
+    ]
     return [
         f"Largest error of a coefficient {answer['max_error']:.2g}; certificate: "
         f"{certificate['status']}{proved}.",
         f"{bill.parts} parts, {bill.packages} packages of op-amps, {bill.distinct} distinct "
         f"values, {bill.price:.2f} € a board.",
         f"The netlist in ngspice against the equations: {within} of {len(check['findings'])} "
-        "comparisons within their bounds.",
+        f"comparisons within their bounds.{''.join(others)}",
         *_together(answer["all_on_one_board"]["built"]),
     ]
 

@@ -43,6 +43,8 @@ from designer.report import system_drawing
 FORMAT = 1
 SAMPLES, SEED = 100, 71
 DATA = "example.json"
+DPI = 125.0
+"""Of the pictures: no file of a report is larger than 150 kB."""
 EXAMPLES: Mapping[str, Example] = {
     "aberdeen": persistence.EXAMPLE,
     "preloaded": grazing_map.EXAMPLE,
@@ -93,7 +95,8 @@ def report(
         "provenance": provenance(file, load_catalog().hash, seed=seed, settings=numbers),
     }
     figures = {name: figure for part in parts for name, figure in part.figures.items()}
-    write_files(out, (DATA, document), _page(file, model, out, numbers, parts), figures)
+    page = _page(file, model, out, numbers, parts)
+    write_files(out, (DATA, document), page, figures, dpi=DPI)
 
 
 def _system(file: ModelFile) -> Evidence:

@@ -27,18 +27,19 @@ def write_files(
     page: Page,
     figures: Mapping[str, Figure],
     forms: Sequence[str] = ("png",),
+    dpi: float = 160.0,
 ) -> None:
     """Write them into the report's folder.
 
     data : name and content of its JSON file, which is written first. figures : by name, without
-    ending. forms : of "png" and "svg".
+    ending. forms : of "png" and "svg". dpi : of the PNG.
     """
     name, document = data
     text = json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False)
     write(out / name, f"{text}\n")
     for title, figure in figures.items():
         for form in forms:
-            write(out / f"{title}.{form}", picture(figure, form))
+            write(out / f"{title}.{form}", picture(figure, form, dpi))
     write(out / README, markdown(page))
 
 
