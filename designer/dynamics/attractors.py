@@ -95,7 +95,8 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
             spent += cost
             if found is not None:
                 return replace(found, periods=spent)
-    still = is_stationary(run.strobes)
+    # Without an impact the motion is linear, and has one attractor, of the drive's own period.
+    still = bool(np.any(run.counts)) and is_stationary(run.strobes)
     if not still:  # a growth too small to be seen at once
         growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
         spent += BLOCK * len(growth.rates)
