@@ -102,7 +102,25 @@ def callee(function: Function) -> Function:
     It costs less time than ``compiled``: nothing is built for a call from Python, nothing is stored
     for it alone, and it is compiled for the types of its arguments, not for each literal number.
     """
-    options = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return _callee(function, {})
+
+
+def leaf(function: Function) -> Function:
+    """``callee`` that makes no array: it does without the counts of references to its arguments,
+    each of which is an atomic operation."""
+    return _callee(function, {"_nrt": False})
+
+
+def embedded(function: Function) -> Function:
+    """``leaf`` whose machine code stands in that of its callers: the innermost parts of a kernel.
+
+    With ``inlined`` the caller would count references.
+    """
+    return _callee(function, {"_nrt": False, "forceinline": True})
+
+
+def _callee(function: Function, more: dict[str, Any]) -> Function:
+    options = OPTIONS | more | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     dispatcher = numba.njit(**options)(function)
     template = dispatcher.get_call_template
 

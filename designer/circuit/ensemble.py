@@ -7,8 +7,9 @@ which it must equal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,15 +19,18 @@ from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics import attractors, kernel_boards as kernel, working_modes
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
 from designer.dynamics.kernel_orbit import CHAOS, FOUND
-from designer.dynamics.orbit import Complex, Orbit, OrbitStatus, failed
+from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 
 CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""
 TOGETHER = 125
 """Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
+QUICK = 3
+"""Stages of settling, 140 drive periods, after which a prediction gives up."""
 FAINT = 5.0 * CHAOS
 """Growth of a tangent vector per drive period below which chaos is not plain."""
 
@@ -104,7 +108,7 @@ class Ensemble:
         def chunk(first: int) -> list[SettledBoard]:
             heed()
             part = slice(first, first + CHUNK)
-            found = self._compiled(index[part], drives[part], states[part])
+            found = self._compiled(index[part], drives[part], states[part], len(kernel.STAGES))
             for k, response in enumerate(found):
                 if response is None:
                     found[k] = self._alone(
@@ -127,7 +131,8 @@ class Ensemble:
     ) -> list[Orbit | None]:
         """``settle`` as far as the compiled way goes: None where it leaves a question open.
 
-        For predictions: what has no period after 140 drive periods, or clips, stays open.
+        For predictions: what has no period after 140 drive periods (``QUICK`` stages), or clips,
+        stays open.
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
@@ -135,7 +140,7 @@ class Ensemble:
         def chunk(first: int) -> list[Orbit | None]:
             heed()
             part = slice(first, first + CHUNK)
-            found = self._compiled(index[part], drives[part], states[part])
+            found = self._compiled(index[part], drives[part], states[part], QUICK)
             progress()
             return [None if r is None else r.orbit for r in found]
 
@@ -185,9 +190,9 @@ class Ensemble:
         return SettledBoard(orbit, trace)
 
     def _compiled(
-        self, which: Index, drives: Sequence[Drive], starts: Array
+        self, which: Index, drives: Sequence[Drive], starts: Array, stages: int
     ) -> list[SettledBoard | None]:
-        """None for each question that the compiled way leaves open."""
+        """None for each question that the compiled way leaves open after so many stages."""
         out: list[SettledBoard | None] = [None] * len(which)
         if self._modes is None:
             return out
@@ -196,20 +201,20 @@ class Ensemble:
         modes = self._modes.take(boards)
         given = np.array([working_modes.drive_of(d, MAX_EVENTS) for d in drives]).reshape(-1, 4)
         while len(asked):
-            answers = self._answers(modes, rows, given[asked], starts[asked])
+            answers = self._answers(modes, rows, given[asked], starts[asked], stages)
             code = answers.whole[:, kernel.CODE]
             found = np.flatnonzero(code == FOUND)
-            multipliers = np.linalg.eigvals(answers.monodromy[found]).astype(complex)
-            for e, multiplier in zip(found, multipliers, strict=True):
-                k = int(asked[e])
-                out[k] = self._response(answers, int(e), drives[k].period, multiplier, modes)
+            periods = [drives[k].period for k in asked[found]]
+            responses = self._responses(answers, found, periods, modes)
+            for k, response in zip(asked[found], responses, strict=True):
+                out[k] = response
             missing = answers.whole[code == kernel.BUILD, kernel.MISSING :][:, :2]
-            modes.add(sorted({modes.targets.beyond(int(m), int(g)) for m, g in missing}))
+            modes.enter({modes.targets.beyond(int(m), int(g)) for m, g in missing})
             asked, rows = asked[code == kernel.BUILD], rows[code == kernel.BUILD]
         return out
 
     def _answers(
-        self, modes: working.BoardModes, rows: Index, drives: Array, starts: Array
+        self, modes: working.BoardModes, rows: Index, drives: Array, starts: Array, stages: int
     ) -> kernel.Answers:
         """What the compiled code says of boards ``rows`` of these modes."""
         count, (_, _, clearances, wide) = len(rows), modes.modes.past.shape
@@ -224,7 +229,7 @@ class Ensemble:
             when=np.zeros((count, kernel.IMPACTS)),
             speed=np.zeros((count, kernel.IMPACTS)),
             stop=np.zeros((count, kernel.IMPACTS, 2), dtype=np.int64),
-            trace=np.zeros((count, kernel.LONGEST * kernel.POINTS)),
+            trace=np.zeros((count, MAX_PERIOD * kernel.POINTS)),
         )
         room = working_modes.driven(modes.modes, drives[0])
         kernel.respond_all(
@@ -232,6 +237,7 @@ class Ensemble:
             rows,
             drives,
             starts,
+            stages,
             working_modes.ANCHORS,
             room.data,
             room.ints,
@@ -242,58 +248,63 @@ class Ensemble:
         )
         return answers
 
-    def _response(
+    def _responses(
         self,
         answers: kernel.Answers,
-        e: int,
-        period: float,
-        multipliers: Complex,
+        found: Index,
+        periods: Sequence[float],
         modes: working.BoardModes,
-    ) -> SettledBoard:
-        """Answer e in the normal form; the rules are those of ``attractors.describe``."""
-        whole, facts = answers.whole[e], answers.facts[e]
-        mode, met = int(whole[kernel.BEGIN]), int(whole[kernel.MET])
-        n, spent, *counts = (int(v) for v in whole[kernel.COUNTED :])
-        first, *more = list(zip(counts[0::2], counts[1::2], strict=True)) or [(0, 0)]
-        graze, size = answers.graze[e], len(self.boards.circuit.states)
-        extremes = answers.extremes[e, :size].copy()
-        floors = attractors.ENGINE_ERROR * np.abs(self._spans(answers.extremes[e])).max(axis=1)
-        near = bool((graze.min(axis=1) < floors).any())
-        grazing = near or facts[kernel.UNDECIDED] > 0.0
-        status = OrbitStatus.GRAZING if grazing else OrbitStatus.PERIODIC
-        radius = float(np.abs(multipliers).max())
-        once = answers.when[e, :met] < n * period
-        orbit = Orbit(
-            status=status,
-            n=n,
-            p=first[0],
-            q=first[1],
-            more=tuple(more),
-            start=answers.start[e].copy(),
-            mode=modes.targets.keys[mode],
-            extremes=extremes,
-            impact_times=answers.when[e, :met][once],
-            impact_velocities=answers.speed[e, :met][once],
-            impact_sides=answers.stop[e, :met, 1][once].astype(float),
-            impact_clearances=answers.stop[e, :met, 0][once],
-            asymmetry=float(facts[kernel.ASYMMETRY]),
-            multipliers=multipliers,
-            lyapunov=float(np.log(radius) / (n * period)) if radius > 0.0 else -np.inf,
-            graze=graze.copy(),
-            reason=f"while classifying period {n}" if grazing else "",
-            periods=spent,
-        )
-        return SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+    ) -> Iterator[SettledBoard]:
+        """Those answers in the normal form; the rules are those of ``attractors.describe``."""
+        multipliers = np.linalg.eigvals(answers.monodromy[found]).astype(complex)
+        radius = np.abs(multipliers).max(axis=1, initial=0.0)
+        graze, facts = answers.graze[found], answers.facts[found]
+        spans = np.abs(answers.extremes[found][:, self._in_clearances]).max(axis=2)
+        near = (graze.min(axis=2) < attractors.ENGINE_ERROR * spans).any(axis=1)
+        grazing = near | (facts[:, kernel.UNDECIDED] > 0.0)
+        size = len(self.boards.circuit.states)
+        for k, e in enumerate(found):
+            whole = answers.whole[e].tolist()
+            n, spent, *counts = whole[kernel.COUNTED :]
+            first, *more = zip(counts[0::2], counts[1::2], strict=True) if counts else [(0, 0)]
+            met = int(np.searchsorted(answers.when[e, : whole[kernel.MET]], n * periods[k]))
+            orbit = Orbit(
+                status=OrbitStatus.GRAZING if grazing[k] else OrbitStatus.PERIODIC,
+                n=n,
+                p=first[0],
+                q=first[1],
+                more=tuple(more),
+                start=answers.start[e].copy(),
+                mode=modes.targets.keys[whole[kernel.BEGIN]],
+                extremes=answers.extremes[e, :size].copy(),
+                impact_times=answers.when[e, :met].copy(),
+                impact_velocities=answers.speed[e, :met].copy(),
+                impact_sides=answers.stop[e, :met, 1].astype(float),
+                impact_clearances=answers.stop[e, :met, 0].copy(),
+                asymmetry=float(facts[k, kernel.ASYMMETRY]),
+                multipliers=multipliers[k],
+                lyapunov=_rate(radius[k], n * periods[k]),
+                graze=answers.graze[e].copy(),
+                reason=f"while classifying period {n}" if grazing[k] else "",
+                periods=spent,
+            )
+            yield SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
 
-    def _spans(self, extremes: Array) -> Array:
-        """(C, 2) extremes of the displacement in each clearance among those of what is watched."""
+    @cached_property
+    def _in_clearances(self) -> Index:
+        """(C,) which of the extremes that are watched is the displacement in each clearance."""
         circuit = self.boards.circuit
-        further = iter(range(len(circuit.states), len(extremes)))
+        further = iter(range(len(circuit.states), len(circuit.states) + len(circuit.stops)))
         rows = [
             circuit.states.index(stop.state) if stop.difference is None else next(further)
             for stop in circuit.stops
         ]
-        return extremes[rows] if rows else np.zeros((0, 2))
+        return np.array(rows, dtype=np.int64)
+
+
+def _rate(radius: float, span: float) -> float:
+    """Growth per unit time of what grows by ``radius`` in ``span``."""
+    return float(np.log(radius) / span) if radius > 0.0 else -np.inf
 
 
 def _faint(orbit: Orbit, drive: Drive) -> bool:

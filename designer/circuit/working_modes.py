@@ -22,16 +22,34 @@ from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
 def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
     """Keys of the modes between which a good board moves, the open one first: each clearance
     open, or on the way into a contact one switch after the other, whatever the others do."""
-    ways = []
+    ways = [[turned for way in stop for turned in way] for stop in _ways(circuit)]
+    return tuple(dict.fromkeys(_key(circuit, turned) for turned in product(*ways)))
+
+
+def keys_beside(circuit: Circuit, key: ModeKey) -> frozenset[ModeKey]:
+    """Keys of the working modes on the way into the same contacts as this one: a board that enters
+    one of them mostly enters the others."""
+    for ways in product(*_ways(circuit)):
+        keys = frozenset(_key(circuit, turned) for turned in product(*ways))
+        if key in keys:
+            return keys
+    return frozenset()
+
+
+def _ways(circuit: Circuit) -> list[list[list[dict[str, int]]]]:
+    """For each clearance the positions of its switches: open, then on the way into each contact."""
+    out = []
     for stop in circuit.stops:
-        positions: list[dict[str, int]] = [{}]
+        ways: list[list[dict[str, int]]] = [[{}]]
         for _, contact in stop.contacts:
             turned: dict[str, int] = {}
+            way = []
             for switch, position in ((contact.switch, contact.position), *contact.others):
                 turned = {**turned, switch: position}
-                positions.append(turned)
-        ways.append(positions)
-    return tuple(dict.fromkeys(_key(circuit, turned) for turned in product(*ways)))
+                way.append(turned)
+            ways.append(way)
+        out.append(ways)
+    return out
 
 
 def first_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
@@ -135,9 +153,16 @@ class BoardModes:
         }
         return out
 
+    def enter(self, keys: Iterable[ModeKey]) -> None:
+        """Solve these working modes and those beside them."""
+        beside = (keys_beside(self._boards.circuit, key) for key in keys)
+        self.add(sorted(frozenset().union(*beside)))
+
     def add(self, keys: Iterable[ModeKey]) -> None:
         """Solve further modes; those that are there already are left as they are."""
         new = [key for key in keys if key not in self.targets.numbers]
+        if not new:
+            return
         circuit, board = self._boards.circuit, self._boards.stacked
         equations = (
             LaggingEquations(circuit, board, _all_solved)

@@ -46,7 +46,6 @@ from .kernel_algebra import (
     substitute as substitute,
 )
 from .kernel_boards import (
-    LONGEST as LONGEST,
     POINTS as POINTS,
 )
 from .kernel_crossing import (

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee
+from designer.base.jit import callee, leaf
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 
-@callee
+@leaf
 def factor(a: Float, order: Int) -> float:
     """a ← its triangular factors, rows exchanged by ``order``; the smallest pivot."""
     size, least = len(a), np.inf
@@ -43,7 +43,7 @@ def factor(a: Float, order: Int) -> float:
     return float(least)
 
 
-@callee
+@leaf
 def substitute(a: Float, order: Int, r: Float, y: Float) -> None:
     """y ← the solution for the right-hand sides r (size, k), by the factors of ``factor``."""
     size, k = len(a), r.shape[1]

@@ -1,8 +1,8 @@
 """Compiled answers of many boards: where each settles, by the rules of ``dynamics.attractors``.
 
 The usual way (settle, polish, describe) is compiled, for n states and C clearances. What is
-unusual on it is left to the caller: a period above ``LONGEST``, none after 140 drive periods, a
-mode that is no working one. A working mode that has not been built yet is asked for.
+unusual on it is left to the caller: no period after 800 drive periods, a mode that is no working
+one. A working mode that has not been built yet is asked for.
 """
 
 from __future__ import annotations
@@ -32,12 +32,10 @@ Int = NDArray[np.int64]
 
 POINTS = 128
 """Of an orbit per drive period, for its asymmetry and its waveform."""
-LONGEST = 4
-"""Longest period that is polished."""
 IMPACTS = 512
 """Impacts of an orbit over two laps that there is room for."""
-STAGES = (20, 20, 100)
-"""Drive periods that are run between two looks for a period."""
+STAGES = (20, 20, 100, 660)
+"""Drive periods that are run between two looks for a period, as in ``dynamics.attractors``."""
 ASK, BUILD = 1, 2
 """Answers beside FOUND: nothing that the compiled code decides, the caller settles it; a mode that
 has to be built before the question is put again."""
@@ -71,7 +69,7 @@ class Answers(NamedTuple):
     stop: Int
     """(E, IMPACTS, 2) clearances and sides of the impacts over two laps."""
     trace: Float
-    """(E, LONGEST · POINTS) the state that moves most in the first clearance, over n periods."""
+    """(E, MAX_PERIOD · POINTS) the state that moves most in the first clearance, over n periods."""
 
 
 class Anchors(NamedTuple):
@@ -153,14 +151,14 @@ _polish = polisher(_lap)
 
 
 @inlined
-def _respond(board: DrivenBoard, x: Float, e: int, answers: Answers) -> int:
+def _respond(board: DrivenBoard, x: Float, stages: int, e: int, answers: Answers) -> int:
     """``attractors.settle`` from x (n,) as long as the way is the usual one: FOUND or ASK."""
     n, columns = len(x), 2 * board.driven.modes.side.shape[1]
     cursor, counted = np.zeros(CURSOR, dtype=np.int64), answers.whole[e, COUNTED:]
     peak, point, monodromy = np.zeros(n), answers.start[e], answers.monodromy[e]
     end, nothing = x.copy(), np.zeros((0, 0))
     cursor[MODE], counted[SPENT] = -1, 0
-    for stage in range(3):
+    for stage in range(stages):
         length = STAGES[stage]
         strobes = np.zeros((length + 1, n))
         impacts = np.zeros((length, columns), dtype=np.int64)
@@ -171,7 +169,7 @@ def _respond(board: DrivenBoard, x: Float, e: int, answers: Answers) -> int:
         if not _peaks(board, end, cursor[MODE], peak):
             return ASK
         counted[SPENT] += length + 1
-        code = _polish(board, strobes, cursor[MODE], LONGEST, peak, point, monodromy, counted)
+        code = _polish(board, strobes, cursor[MODE], peak, point, monodromy, counted)
         if code == FOUND and _describe(board, point, e, answers):
             return FOUND
         if code != NONE:
@@ -250,6 +248,7 @@ def respond_all(
     which: Int,
     drives: Float,
     starts: Float,
+    stages: int,
     anchors: Anchors,
     data: Float,
     ints: Int,
@@ -260,8 +259,8 @@ def respond_all(
 ) -> None:
     """Each of E questions: board which[e] under drives[e] from starts[e].
 
-    which : (E,); drives : (E, 4) as ``DrivenModes.drive``; starts : (E, n). data, ints, width, far,
-    unit : room for tables.
+    which : (E,); drives : (E, 4) as ``DrivenModes.drive``; starts : (E, n). stages : of settling,
+    after which a question is left to the caller. data, ints, width, far, unit : room for tables.
     """
     n = len(unit)
     trail = RunTrail(
@@ -284,6 +283,6 @@ def respond_all(
         period = 2.0 * np.pi / drives[e, 0]
         board = DrivenBoard(driven, period, anchors, trail, missing)
         missing[0] = -1
-        code = _respond(board, starts[e], e, answers)
+        code = _respond(board, starts[e], stages, e, answers)
         answers.whole[e, CODE] = BUILD if missing[0] >= 0 else code
         answers.whole[e, MISSING], answers.whole[e, MISSING + 1] = missing[0], missing[1]

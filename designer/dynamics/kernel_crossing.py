@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, inlined
+from designer.base.jit import embedded, leaf
 
 Float = NDArray[np.float64]
 Expand = Callable[[Float, Any, float, Float], float]
@@ -44,7 +44,7 @@ SCRATCH = STACK + 6 * (ROOM + 2)
 # ``k & 7`` and the like tell the compiler that an index is not negative: no wrap-around.
 
 
-@callee
+@leaf
 def series_value(work: Float, s: float) -> tuple[float, float, float]:
     """Value, rate and half the second derivative a time s from the expanded part."""
     f = work[COEF + TERMS - 1]
@@ -56,7 +56,7 @@ def series_value(work: Float, s: float) -> tuple[float, float, float]:
     return f, d, e
 
 
-@callee
+@leaf
 def suspect_step(
     h: float, rest: float, low: float, high: float, count: int, work: Float, k: int
 ) -> int:
@@ -85,7 +85,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
     about the part nearest to t into COEF and returns that part's time.
     """
 
-    @callee
+    @leaf
     def halve(data: Float, m: Any, target: float, sign: float, work: Float, o: int) -> None:
         """Put both halves of the interval at o on the stack, the earlier one on top."""
         a, b, t = work[o], work[o + 1], 0.5 * (work[o] + work[o + 1])
@@ -95,7 +95,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
         work[o + 8], work[o + 9], work[o + 10], work[o + 11] = work[o + 2], work[o + 3], f, d
         work[o], work[o + 1], work[o + 2], work[o + 3] = t, b, f, d
 
-    @inlined
+    @embedded
     def newton(
         data: Float, m: Any, o: int, h: float, target: float, sign: float, work: Float
     ) -> float:
@@ -128,7 +128,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
             t = u
         return float(t)
 
-    @inlined
+    @embedded
     def first_rise(
         data: Float, m: Any, k: int, h: float, m4: float, target: float, sign: float,
         tangency: float, undecided: Float, work: Float,
@@ -170,7 +170,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
             top += 2
         return float(time)
 
-    @inlined
+    @embedded
     def find_crossing(
         data: Float, m: Any, k: int, h: float, m4: float, low: float, high: float,
         tangency: float, undecided: Float, work: Float,
@@ -189,7 +189,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
                     first, through = time, int(side)
         return first, through
 
-    @callee
+    @leaf
     def turning_value(
         data: Float, m: Any, low: float, high: float, t: float, rate: float, h: float,
         work: Float,
@@ -208,7 +208,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
         f, _, _ = series_value(work, t - expand(data, m, t, work))
         return float(f)
 
-    @callee
+    @leaf
     def turning_values(
         data: Float, m: Any, end: float, h: float, m4: float, work: Float,
         values: Float,

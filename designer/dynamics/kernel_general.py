@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, compiled
+from designer.base.jit import callee, compiled, leaf
 from designer.dynamics.kernel_orbit import DIVERGED, DONE, PAUSED, TOO_MANY_EVENTS, UNKNOWN_MODE
 
 Float = NDArray[np.float64]
@@ -87,7 +87,7 @@ class Log(NamedTuple):
     """(1,) time spent clipped."""
 
 
-@callee
+@leaf
 def _value(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, -1, -1):
@@ -95,7 +95,7 @@ def _value(c: Float, s: float) -> float:
     return total
 
 
-@callee
+@leaf
 def _slope(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, 0, -1):
@@ -103,7 +103,7 @@ def _slope(c: Float, s: float) -> float:
     return total
 
 
-@callee
+@leaf
 def _curvature_bound(c: Float, end: float) -> float:
     """Bound of |p''| on [0, end]."""
     total = 0.0
@@ -112,7 +112,7 @@ def _curvature_bound(c: Float, end: float) -> float:
     return total
 
 
-@callee
+@leaf
 def _root(c: Float, a: float, b: float) -> float:
     """The root of p in [a, b], where p is monotone and changes sign: Newton kept by bisection."""
     rising = _value(c, b) > _value(c, a)
@@ -205,7 +205,7 @@ def _stationary(c: Float, end: float, found: Float) -> int:
     return count
 
 
-@callee
+@leaf
 def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
     """out = Σ s^k (M h)^k/k! z, by columns of the table."""
     n = z.shape[0]
@@ -269,7 +269,7 @@ def _jump(
             phi[i, k] += leap[i] * along / rate
 
 
-@callee
+@leaf
 def _series(rows: Float, z: Float, c: Float) -> None:
     """c ← Taylor coefficients of a guard or a depth from its rows (ORDER + 1, N)."""
     for k in range(c.shape[0]):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, compiled, inlined
+from designer.base.jit import callee, compiled, embedded, leaf
 from designer.dynamics.kernel_crossing import (
     COEF,
     LAST,
@@ -71,7 +71,7 @@ class ModalTables(NamedTuple):
     """(3 · WIDTH,) values; mode 0 open, 1 upper contact, 2 lower contact; see the columns above."""
 
 
-@callee
+@leaf
 def _jump(data: Float, m: int, part: int, work: Float) -> None:
     """POINT = state ``part`` parts after NOW."""
     o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
@@ -85,7 +85,7 @@ def _jump(data: Float, m: int, part: int, work: Float) -> None:
     work[POINT + 5] = cs * cw - sn * sw
 
 
-@callee
+@leaf
 def _expand(data: Float, m: int, t: float, work: Float) -> float:
     """Time of the part nearest to t; COEF = Taylor series of displacement - CENTRE about it."""
     o = (m & 3) * WIDTH
@@ -99,7 +99,7 @@ def _expand(data: Float, m: int, t: float, work: Float) -> float:
     return float(part * data[o + STEP + 1])
 
 
-@callee
+@leaf
 def _carry(data: Float, m: int, part: int, phi: Float) -> None:
     """phi (4, k), in modal coordinates, ← ``part`` parts on."""
     o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
@@ -109,7 +109,7 @@ def _carry(data: Float, m: int, part: int, phi: Float) -> None:
         phi[2, j], phi[3, j] = data[o + 4] * c + data[o + 5] * d, data[o + 6] * c + data[o + 7] * d
 
 
-@callee
+@leaf
 def _turn(data: Float, o: int, phi: Float) -> None:
     """phi ← the 4 x 4 matrix that stands at o, by columns, times phi."""
     o &= 0xFFFF
@@ -120,7 +120,7 @@ def _turn(data: Float, o: int, phi: Float) -> None:
             phi[i, j] += data[o + 8 + i] * c + data[o + 12 + i] * d
 
 
-@callee
+@leaf
 def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
     """NOW ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
     o = (m & 3) * WIDTH
@@ -147,7 +147,7 @@ def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
             phi[2, j], phi[3, j] = (r2 + p2 * s2) * c + s2 * d, r2 * d - q2 * s2 * c
 
 
-@callee
+@leaf
 def _apply(data: Float, o: int, work: Float, place: int) -> None:
     """work[place : place + 4] ← the (4, 7) matrix that stands at o, by columns, times (NOW,
     1)."""
@@ -167,7 +167,7 @@ def _apply(data: Float, o: int, work: Float, place: int) -> None:
         work[place + i] = free + (data[o + 8 + i] * c + data[o + 12 + i] * d) + drive
 
 
-@callee
+@leaf
 def _fourth_derivative(data: Float, m: int, work: Float) -> float:
     """A bound of |d⁴ displacement/dt⁴| from here on: a mode's motion cannot grow."""
     o = (m & 3) * WIDTH + BOUND
@@ -177,7 +177,7 @@ def _fourth_derivative(data: Float, m: int, work: Float) -> float:
     return float(first + second + data[o + 8])
 
 
-@callee
+@leaf
 def _scan(data: Float, m: int, work: Float) -> None:
     """F, D = displacement and rate at the nodes."""
     o = (m & 3) * WIDTH + SCAN
@@ -217,7 +217,7 @@ def unwatched() -> Watch:
     return Watch(none, none, none, np.zeros(1, dtype=np.int64))
 
 
-@callee
+@leaf
 def mode_of(data: Float, x: Float) -> int:
     """Open, upper or lower contact, by the displacement x[0]."""
     if x[0] > data[LIMIT + 1]:
@@ -228,7 +228,7 @@ def mode_of(data: Float, x: Float) -> int:
 _find_crossing, _turning_values = searches(_expand)
 
 
-@inlined
+@embedded
 def _first_crossing(
     data: Float, m: int, m4: float, left: float, undecided: Float, work: Float
 ) -> tuple[float, int]:
@@ -246,7 +246,7 @@ def _first_crossing(
     return first, side
 
 
-@callee
+@leaf
 def _least(
     data: Float, m: int, m4: float, end: float, work: Float, values: Float, least: float
 ) -> float:

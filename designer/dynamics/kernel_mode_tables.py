@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee
+from designer.base.jit import callee, leaf
 from designer.dynamics.kernel_algebra import spectral_radius
 from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, STEPS, TERMS
 from designer.dynamics.kernel_orbit import DONE, LEFT
@@ -24,8 +24,11 @@ Unit = tuple[float, ...]
 FAR, UNBUILT = -1, -2
 """In place of a mode beyond a guard: a boundary that is only proved to be far; a mode that has not
 been built yet."""
-TAIL = 20
-"""Terms of a bound about a time: the most that is left out is 1.4**20/20! = 3e-16 of it."""
+BLOCK_TERMS, STEP_TERMS = 16, 9
+"""Terms of a bound about the middle of a block and of a step: the most that is left out is
+1.4**16/16! = 1e-11 and 0.2**9/9! = 1e-12 of it."""
+ONE = (0.0,)
+"""For a block of one row."""
 
 # ``DrivenModes.data`` begins with the state at the start of a block, and one within it. They stand
 # there because a loop that reads one array and writes another vectorises.
@@ -137,124 +140,134 @@ def _there(modes: Modes) -> NDArray[np.bool_]:
     return np.arange(modes.target.shape[1]) < modes.guards[:, None]
 
 
-table_places, function_places = callee(places), callee(row_places)
+table_places, function_places = leaf(places), leaf(row_places)
 
 
-@callee
-def _times(unit: Unit, row: Float, M: Float, w: float, out: Float) -> None:
-    """out (wide,) = row · the generator (wide, wide) whose upper rows are M (n, wide)."""
-    n = len(unit)
-    for j in range(n + 3):
+@leaf
+def _times(unit: Unit, rows: Unit, R: Float, M: Float, w: float, out: Float) -> None:
+    """out (wide, r) = R (wide, r) · the generator (wide, wide) whose upper rows are M (n, wide).
+
+    r = len(rows) rows stand side by side, so that a loop over them vectorises.
+    """
+    n, r = len(unit), len(rows)
+    for j in range(r * (n + 3)):
         out[j] = 0.0
     for k in range(n):
         for j in range(n + 3):
-            out[j] += row[k] * M[k, j]
-    out[n] -= w * row[n + 1]
-    out[n + 1] += w * row[n]
+            for i in range(r):
+                out[r * j + i] += R[r * k + i] * M[k, j]
+    for i in range(r):
+        out[r * n + i] -= w * R[r * (n + 1) + i]
+        out[r * (n + 1) + i] += w * R[r * n + i]
 
 
-@callee
-def _along(unit: Unit, row: Float, jump: Float, out: Float) -> None:
-    """out (wide,) = row · the propagator of a table line."""
-    n = len(unit)
+@leaf
+def _along(unit: Unit, rows: Unit, R: Float, jump: Float, out: Float) -> None:
+    """out (wide, r) = R (wide, r) · the propagator of a table line."""
+    n, r = len(unit), len(rows)
     for j in range(n + 3):
-        total = 0.0
-        for k in range(n):
-            total += row[k] * jump[n * j + k]
-        out[j] = total
-    turn = n * (n + 3)
-    out[n] += row[n] * jump[turn + 1] - row[n + 1] * jump[turn]
-    out[n + 1] += row[n] * jump[turn] + row[n + 1] * jump[turn + 1]
-    out[n + 2] += row[n + 2]
+        for i in range(r):
+            total = 0.0
+            for k in range(n):
+                total += R[r * k + i] * jump[n * j + k]
+            out[r * j + i] = total
+    sine, cosine = jump[n * (n + 3)], jump[n * (n + 3) + 1]
+    for i in range(r):
+        out[r * n + i] += R[r * n + i] * cosine - R[r * (n + 1) + i] * sine
+        out[r * (n + 1) + i] += R[r * n + i] * sine + R[r * (n + 1) + i] * cosine
+        out[r * (n + 2) + i] += R[r * (n + 2) + i]
 
 
-@callee
+@leaf
 def _moduli(
     unit: Unit,
-    row: Float,
+    rows: Unit,
+    R: Float,
     M: Float,
     w: float,
     jump: Float,
-    order: int,
+    terms: int,
     half: float,
     work: Float,
     bound: Float,
 ) -> None:
-    """bound (wide,) ← at least an entrywise bound of |row · M^order · exp(M t)| within ``half`` of
-    the time of ``jump``. work : (3, wide)."""
-    wide = len(unit) + 3
+    """bound (wide, r) ← at least an entrywise bound of |R · exp(M t)| within ``half`` of the time
+    of ``jump``, by so many terms about that time. work : (3, wide · r)."""
+    count = len(rows) * (len(unit) + 3)
     now, then, total = work[0], work[1], work[2]
-    for j in range(wide):
-        now[j], total[j] = row[j], 0.0
-    for _ in range(order):
-        _times(unit, now, M, w, then)
-        for j in range(wide):
-            now[j] = then[j]
-    _along(unit, now, jump, then)
-    for j in range(wide):
-        now[j] = then[j]
-    for k in range(TAIL):
-        for j in range(wide):
+    _along(unit, rows, R, jump, now)
+    for j in range(count):
+        total[j] = abs(now[j])
+    for k in range(1, terms):
+        _times(unit, rows, now, M, w, then)
+        for j in range(count):
+            now[j] = then[j] * half / k
             total[j] += abs(now[j])
-        _times(unit, now, M, w, then)
-        for j in range(wide):
-            now[j] = then[j] * half / (k + 1)
-    for j in range(wide):
+    for j in range(count):
         bound[j] = max(bound[j], 1.001 * total[j])
 
 
-@callee
-def _function(
-    unit: Unit, table: Float, o: int, row: Float, M: Float, w: float, jumps: Float, work: Float
-) -> None:
-    """Tables of the linear function row · z, at o; no limits. work : (4, wide)."""
-    n, wide = len(unit), len(unit) + 3
+@leaf
+def _functions(
+    unit: Unit, rows: Unit, table: Float, o: int, R: Float, M: Float, w: float, jumps: Float,
+    work: Float,
+) -> None:  # fmt: skip
+    """Tables of the linear functions R · z, one after the other from o; no limits.
+
+    R : (wide, r), a column of each function side by side; left as R · M⁴. work : (4, wide · r).
+    """
+    n, wide, r = len(unit), len(unit) + 3, len(rows)
     local, fourth, limits = function_places(n)
-    now, then = work[0], work[1]
-    for j in range(wide):
-        now[j] = row[j]
-    for v in range(2):
-        for k in range(NODES):
-            _along(unit, now, jumps[k * PARTS], work[2])
+    _, _, _, _, one = table_places(n)
+    rate, along = work[0], work[1]
+    _times(unit, rows, R, M, w, rate)
+    for k in range(NODES):
+        for v in range(2):
+            _along(unit, rows, rate if v == 1 else R, jumps[k * PARTS], along)
             for j in range(wide):
-                table[o + SCAN + 2 * NODES * j + NODES * v + k] = work[2, j]
-        _times(unit, row, M, w, now)
-    for j in range(wide):
-        now[j] = row[j]
+                for i in range(r):
+                    table[o + one * i + SCAN + 2 * NODES * j + NODES * v + k] = along[r * j + i]
+    now, then, fifth = work[0], work[1], work[3]
+    for j in range(wide * r):
+        now[j] = R[j]
     for k in range(TERMS):
         for j in range(wide):
-            table[o + local + TERMS * j + k] = now[j]
-        _times(unit, now, M, w, then)
-        for j in range(wide):
+            for i in range(r):
+                table[o + one * i + local + TERMS * j + k] = now[r * j + i]
+        _times(unit, rows, now, M, w, then)
+        for j in range(wide * r):
             now[j] = then[j] / (k + 1)
-    for j in range(wide):
-        work[3, j] = 0.0
-    _moduli(unit, row, M, w, jumps[LAST // 2], 4, 0.5 * STEPS * table[H], work, work[3])
-    for j in range(wide):
-        table[o + fourth + j] = work[3, j]
-    table[o + limits + LOW], table[o + limits + HIGH] = -np.inf, np.inf
+            if k == 3:
+                R[j] = 24.0 * now[j]
+    for j in range(wide * r):
+        fifth[j] = 0.0
+    half = 0.5 * STEPS * table[H]
+    _moduli(unit, rows, R, M, w, jumps[LAST // 2], BLOCK_TERMS, half, work, fifth)
+    for i in range(r):
+        at = o + one * i
+        for j in range(wide):
+            table[at + fourth + j] = fifth[r * j + i]
+        table[at + limits + LOW], table[at + limits + HIGH] = -np.inf, np.inf
 
 
-@callee
+@leaf
 def _propagators(unit: Unit, M: Float, w: float, part: float, jumps: Float, work: Float) -> None:
     """jumps (LAST + 1, ·) ← the propagator over each number of parts; each from two of half its
     length. Until the end they stand there less the identity, whose rounding would grow with their
-    number. work : (2, wide)."""
+    number. work : (2, wide · n)."""
     n, wide = len(unit), len(unit) + 3
     turn = n * wide
-    row, other = work[0], work[1]
+    now, then = work[0], work[1]
     for k in range(LAST + 1):
         jumps[k, turn], jumps[k, turn + 1] = np.sin(k * part * w), np.cos(k * part * w)
     for j in range(turn):
         jumps[0, j] = jumps[1, j] = 0.0
-    for i in range(n):  # row i of exp(M part), as a row of the identity carried along
-        for j in range(wide):
-            row[j] = 1.0 if i == j else 0.0
-        for k in range(1, 14):
-            _times(unit, row, M, w, other)
-            for j in range(wide):
-                row[j] = other[j] * part / k
-                jumps[1, n * j + i] += row[j]
+    _identity(unit, now)
+    for k in range(1, 14):
+        _times(unit, unit, now, M, w, then)
+        for j in range(turn):
+            now[j] = then[j] * part / k
+            jumps[1, j] += now[j]
     for k in range(2, LAST + 1):
         _join(
             unit, jumps[k // 2], jumps[k - k // 2], np.sin(0.5 * (k - k // 2) * part * w), jumps[k]
@@ -264,7 +277,16 @@ def _propagators(unit: Unit, M: Float, w: float, part: float, jumps: Float, work
             jumps[k, n * i + i] += 1.0
 
 
-@callee
+@leaf
+def _identity(unit: Unit, R: Float) -> None:
+    """R (wide, n) ← the states as functions of z."""
+    n = len(unit)
+    for j in range(n + 3):
+        for i in range(n):
+            R[n * j + i] = 1.0 if i == j else 0.0
+
+
+@leaf
 def _join(unit: Unit, a: Float, b: Float, half: float, out: Float) -> None:
     """out ← the propagator over b, then a, all less the identity. half : sine of half b's turn."""
     n = len(unit)
@@ -272,17 +294,16 @@ def _join(unit: Unit, a: Float, b: Float, half: float, out: Float) -> None:
     less = -2.0 * half * half
     for j in range(n + 3):
         for i in range(n):
-            out[n * j + i] = a[n * j + i] + b[n * j + i]
-        for q in range(n):
-            factor = b[n * j + q]
-            for i in range(n):
-                out[n * j + i] += a[n * q + i] * factor
+            total = a[n * j + i] + b[n * j + i]
+            for q in range(n):
+                total += a[n * q + i] * b[n * j + q]
+            out[n * j + i] = total
     for i in range(n):
         out[sine + i] += a[sine + i] * less - a[cosine + i] * b[turn]
         out[cosine + i] += a[sine + i] * b[turn] + a[cosine + i] * less
 
 
-@callee
+@leaf
 def _over(guard: Float, amplitude: float, offset: float, row: Float) -> None:
     """row (wide,) over z of a row (n + 2,) over (states, drive, 1)."""
     n = guard.shape[0] - 2
@@ -292,7 +313,7 @@ def _over(guard: Float, amplitude: float, offset: float, row: Float) -> None:
     row[n + 2] = guard[n + 1] + guard[n] * offset
 
 
-@callee
+@leaf
 def _generator(driven: DrivenModes, m: int, M: Float) -> None:
     """M (n, wide) of mode m, x' = M z."""
     modes, board, n = driven.modes, driven.board, len(driven.unit)
@@ -319,7 +340,7 @@ def fill(driven: DrivenModes, m: int) -> int:
     wide, omega = n + 3, driven.drive[0]
     if modes.good[board, m] == 0:
         return LEFT
-    M, work, row = np.zeros((n, wide)), np.zeros((4, wide)), np.zeros(wide)
+    M, work, row = np.zeros((n, wide)), np.zeros((6, wide * n)), np.zeros(wide)
     _generator(driven, m, M)
     rate = max(spectral_radius(modes.A[board, m], 5), omega)
     if not (rate > 0.0 and rate < np.inf):
@@ -330,44 +351,44 @@ def fill(driven: DrivenModes, m: int) -> int:
     count = wide * n + 2
     jumps = table[jump : jump + (LAST + 1) * count].reshape((LAST + 1, count))
     _propagators(unit, M, omega, h / PARTS, jumps, work)
-    for i in range(n):
-        _state(unit, table, i, M, omega, jumps, row, work)
+    _states(unit, table, M, omega, jumps, work)
     depths = n + len(modes.watched)
     for r in range(len(modes.watched)):
         displacement = modes.displacement[board, modes.watched[r]]
         _over(displacement, driven.drive[1], driven.drive[2], row)
-        _function(unit, table, rows + (n + r) * one, row, M, omega, jumps, work)
+        _functions(unit, ONE, table, rows + (n + r) * one, row, M, omega, jumps, work)
     for c in range(modes.side.shape[1]):
         if modes.side[m, c] != 0:
             _over(modes.past[board, m, c], driven.drive[1], driven.drive[2], row)
-            _function(unit, table, rows + (depths + c) * one, row, M, omega, jumps, work)
+            _functions(unit, ONE, table, rows + (depths + c) * one, row, M, omega, jumps, work)
     _guards(driven, m, M, jumps, row, work)
     driven.ints[m, FILLED] = 1
     return DONE
 
 
-@callee
-def _state(
-    unit: Unit, table: Float, i: int, M: Float, w: float, jumps: Float, row: Float, work: Float
-) -> None:
-    """Tables of state i."""
+@leaf
+def _states(unit: Unit, table: Float, M: Float, w: float, jumps: Float, work: Float) -> None:
+    """Tables of all states. work : (6, wide · n)."""
     n, wide = len(unit), len(unit) + 3
     _, way, second, rows, one = table_places(n)
     local, _, _ = function_places(n)
+    R, bound = work[4], work[5]
+    _identity(unit, R)
+    _functions(unit, unit, table, rows, R, M, w, jumps, work)
     for j in range(wide):
-        row[j] = 1.0 if i == j else 0.0
-    _function(unit, table, rows + i * one, row, M, w, jumps, work)
-    bound, half = work[3], 0.5 * table[H]
-    for j in range(wide):
-        bound[j] = 0.0
-        for k in range(TERMS):
-            table[NEAR + (TERMS * j + k) * n + i] = table[rows + i * one + local + TERMS * j + k]
+        for i in range(n):
+            o = rows + i * one + local + TERMS * j
+            R[n * j + i], bound[n * j + i] = 2.0 * table[o + 2], 0.0
+            for k in range(TERMS):
+                table[NEAR + (TERMS * j + k) * n + i] = table[o + k]
     for k in range(STEPS):
-        _moduli(unit, row, M, w, jumps[PARTS * k + PARTS // 2], 2, half, work, bound)
+        middle = jumps[PARTS * k + PARTS // 2]
+        _moduli(unit, unit, R, M, w, middle, STEP_TERMS, 0.5 * table[H], work, bound)
     for j in range(wide):
-        table[second + n * j + i] = bound[j] * table[H] * table[H] / 8.0
-        for k in range(STEPS - 1):
-            table[way + (STEPS - 1) * n * j + n * k + i] = jumps[PARTS * (k + 1), n * j + i]
+        for i in range(n):
+            table[second + n * j + i] = bound[n * j + i] * table[H] * table[H] / 8.0
+            for k in range(STEPS - 1):
+                table[way + (STEPS - 1) * n * j + n * k + i] = jumps[PARTS * (k + 1), n * j + i]
 
 
 @callee
@@ -398,7 +419,7 @@ def _guards(driven: DrivenModes, m: int, M: Float, jumps: Float, row: Float, wor
             ints[GUARDS + 2 * other + LOW] = g
             continue
         _over(guard, amplitude, offset, row)
-        _function(unit, table, first + count * one, row, M, w, jumps, work)
+        _functions(unit, ONE, table, first + count * one, row, M, w, jumps, work)
         table[first + count * one + limits + HIGH] = 0.0
         ints[GUARDS + 2 * count + HIGH], ints[GUARDS + 2 * count + LOW] = g, -1
         count += 1
@@ -409,7 +430,7 @@ def _guards(driven: DrivenModes, m: int, M: Float, jumps: Float, row: Float, wor
         _distant(table, table.shape[0] - (2 * n + 1) * driven.far + k, driven.far, row)
 
 
-@callee
+@leaf
 def _opposite(guards: Float, clearance: Int, ints: Int, count: int, g: int) -> int:
     """The watched function, of ``count``, that guard g is the other limit of, or -1."""
     for r in range(count):
@@ -422,7 +443,7 @@ def _opposite(guards: Float, clearance: Int, ints: Int, count: int, g: int) -> i
     return -1
 
 
-@callee
+@leaf
 def _distant(table: Float, o: int, far: int, row: Float) -> None:
     """A far boundary's column at o: parts of C by sign, then the largest of what is left."""
     n = row.shape[0] - 3

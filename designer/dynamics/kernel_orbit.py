@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, inlined
+from designer.base.jit import callee, inlined, leaf
 from designer.dynamics.kernel_algebra import factor, spectral_radius, substitute
 
 Float = NDArray[np.float64]
@@ -30,7 +30,7 @@ DONE, LEFT, TOO_MANY_EVENTS, DIVERGED, PAUSED, UNKNOWN_MODE = range(6)
 """Return codes of every flow; LEFT: the fast path does not fit here; the last two are the general
 kernel's: no steps left, a mode that has no tables yet."""
 FOUND, NONE, UNDECIDED = 0, 1, 2
-"""Answers of ``shoot`` and ``polish``; UNDECIDED: the flow was LEFT, or the period is too long."""
+"""Answers of ``shoot`` and ``polish``; UNDECIDED: the flow was LEFT."""
 MAX_PERIOD = 16
 """Longest period that is looked for, in drive periods."""
 STROBE_TOLERANCE = 1e-8
@@ -50,7 +50,7 @@ CURSOR = 4
 """Places in the cursor of a run: its mode, and three that are the flow's own."""
 
 
-@callee
+@leaf
 def distance(a: Float, b: Float, peak: Float) -> float:
     """Largest difference of two states (n,), each relative to the state's peak."""
     most = 0.0
@@ -159,21 +159,19 @@ def polisher(lap: Lap) -> Callable[..., int]:
 
     @inlined
     def polish(
-        system: Any, strobes: Float, mode: int, longest: int, peak: Float, x: Float,
-        monodromy: Float, counted: Int,
+        system: Any, strobes: Float, mode: int, peak: Float, x: Float, monodromy: Float,
+        counted: Int,
     ) -> int:  # fmt: skip
         """Try to turn the end of a run, ``strobes`` in the mode ``mode``, into a stable orbit.
 
         x, monodromy ← a strobe of it and its matrix; counted[0] ← its period, counted[SPENT] plus
-        the drive periods that this is charged. longest : a longer period is UNDECIDED.
+        the drive periods that this is charged.
         """
         k, columns = strobes.shape[0] - 1, len(counted) - UPPER
         end = strobes[k]
         for n in range(1, min(MAX_PERIOD, k) + 1):
             if not distance(end, strobes[k - n], peak) <= WORTH:
                 continue
-            if n > longest:
-                return UNDECIDED
             for i in range(len(x)):
                 x[i] = end[i]
             code = shoot(system, x, n, peak, monodromy, columns)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, compiled, inlined
+from designer.base.jit import compiled, embedded, leaf
 from designer.dynamics.kernel_crossing import (
     COEF,
     LAST,
@@ -100,7 +100,7 @@ class TabulatedFunction(NamedTuple):
     """(n,) zeros."""
 
 
-@inlined
+@embedded
 def _jump(data: Float, base: int, part: int, unit: Unit, work: Float) -> None:
     """WITHIN = z ``part`` parts after NOW."""
     n = len(unit)
@@ -121,7 +121,7 @@ def _jump(data: Float, base: int, part: int, unit: Unit, work: Float) -> None:
     data[WITHIN + n + 2] = 1.0
 
 
-@callee
+@leaf
 def _expand(data: Float, function: TabulatedFunction, t: float, work: Float) -> float:
     """Time of the part nearest to t; COEF = Taylor series of the function about it."""
     n, base = len(function.unit), function.base & MASK
@@ -140,7 +140,7 @@ def _expand(data: Float, function: TabulatedFunction, t: float, work: Float) -> 
     return float(part * data[base + PART])
 
 
-@callee
+@leaf
 def _carry(data: Float, base: int, part: int, unit: Unit, phi: Float, work: Float) -> None:
     """phi (n, k) ← ``part`` parts on."""
     n = len(unit)
@@ -158,7 +158,7 @@ def _carry(data: Float, base: int, part: int, unit: Unit, phi: Float, work: Floa
             phi[i, column] = work[POINT + i]
 
 
-@callee
+@leaf
 def _near(data: Float, base: int, s: float, unit: Unit, phi: Float, work: Float) -> None:
     """phi (n, k) ← a time s on, within a part."""
     n = len(unit)
@@ -179,7 +179,7 @@ def _near(data: Float, base: int, s: float, unit: Unit, phi: Float, work: Float)
             phi[i, column] = total
 
 
-@inlined
+@embedded
 def _move(data: Float, base: int, t: float, w: float, unit: Unit, phi: Float, work: Float) -> None:
     """NOW ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
     n, o = len(unit), (base & MASK) + NEAR
@@ -207,7 +207,7 @@ def _move(data: Float, base: int, t: float, w: float, unit: Unit, phi: Float, wo
         _near(data, base, s, unit, phi, work)
 
 
-@inlined
+@embedded
 def _scan(data: Float, place: int, unit: Unit, work: Float) -> float:
     """F, D = value and rate of the function at the nodes; a bound of its fourth derivative."""
     n, o = len(unit), (place & MASK) + SCAN
@@ -223,7 +223,7 @@ def _scan(data: Float, place: int, unit: Unit, work: Float) -> float:
     return bound
 
 
-@inlined
+@embedded
 def _keep(boxes: Float, m: int, n: int, x: Float, at: int, slack: float, reach: Float) -> None:
     """Widen the box (2 n,) of mode m by the state at ``at``, give or take a part of ``reach``."""
     for j in range(n):
@@ -232,7 +232,7 @@ def _keep(boxes: Float, m: int, n: int, x: Float, at: int, slack: float, reach: 
         boxes[m, n + j] = max(boxes[m, n + j], x[at + j] + more)
 
 
-@inlined
+@embedded
 def _watch(
     data: Float, base: int, boxes: Float, m: int, end: float, unit: Unit, work: Float, reach: Float
 ) -> None:
@@ -259,7 +259,7 @@ def _watch(
                 _keep(boxes, m, n, work, STACK + n * k, 1.0, reach)
 
 
-@callee
+@leaf
 def _all_far(driven: DrivenModes, boxes: Float) -> bool:
     """Whether no far boundary comes near over the boxes (K, 2 n), which are then emptied."""
     n, far, data = len(driven.unit), driven.far, driven.data
@@ -278,13 +278,13 @@ def _all_far(driven: DrivenModes, boxes: Float) -> bool:
     return True
 
 
-@callee
+@leaf
 def _empty(boxes: Float, m: int, n: int) -> None:
     for j in range(n):
         boxes[m, j], boxes[m, n + j] = np.inf, -np.inf
 
 
-@callee
+@leaf
 def _worst(driven: DrivenModes, m: int, x: Float) -> tuple[float, int]:
     """Greatest value of mode m's guards at state x (n,) at drive phase 0, and the guard."""
     modes, board, n = driven.modes, driven.board, len(driven.unit)
@@ -299,7 +299,7 @@ def _worst(driven: DrivenModes, m: int, x: Float) -> tuple[float, int]:
     return most, worst
 
 
-@callee
+@leaf
 def mode_at(driven: DrivenModes, x: Float, cursor: Int) -> int:
     """Looks for the mode that holds at state x (n,) at drive phase 0, and writes it into
     cursor[MODE]: DONE, LEFT where there is none, or UNKNOWN_MODE as ``advance``."""
@@ -321,7 +321,7 @@ def mode_at(driven: DrivenModes, x: Float, cursor: Int) -> int:
     return LEFT
 
 
-@callee
+@leaf
 def _widen(extremes: Float, i: int, low: float, high: float) -> None:
     extremes[i, 0], extremes[i, 1] = min(extremes[i, 0], low), max(extremes[i, 1], high)
 
@@ -329,7 +329,7 @@ def _widen(extremes: Float, i: int, low: float, high: float) -> None:
 _find_crossing, _turning_values = searches(_expand)
 
 
-@callee
+@leaf
 def _measure(
     driven: DrivenModes, m: int, end: float, work: Float, trail: RunTrail, values: Float,
     depth: Float,
@@ -368,7 +368,7 @@ def _measure(
         _misses(data, function, count, values, clearance, trail.graze)
 
 
-@callee
+@leaf
 def _misses(
     data: Float,
     function: TabulatedFunction,
@@ -386,7 +386,7 @@ def _misses(
             graze[clearance, 1] = min(graze[clearance, 1], miss)
 
 
-@inlined
+@embedded
 def _first_crossing(
     data: Float, base: int, first: int, watched: int, left: float, unit: Unit, undecided: Float,
     work: Float,
@@ -421,7 +421,7 @@ def _first_crossing(
     return found, through
 
 
-@callee
+@leaf
 def _log_impact(trail: RunTrail, time: float, clearance: int, side: int, data: Float) -> None:
     k = trail.met[0]
     trail.met[0] = k + 1
@@ -431,7 +431,7 @@ def _log_impact(trail: RunTrail, time: float, clearance: int, side: int, data: F
             trail.at[k, i] = data[NOW + i]
 
 
-@callee
+@leaf
 def _leap(
     data: Float, place: int, before: int, after: int, unit: Unit, phi: Float, work: Float
 ) -> None:
@@ -459,7 +459,7 @@ def _leap(
             phi[i, k] += work[POINT + i] * along / rate
 
 
-@inlined
+@embedded
 def _touch(
     side: Int, before: int, after: int, impacts: Int, done: int, graze: Float, depth: Float
 ) -> int:

@@ -183,7 +183,7 @@ def _periodic(
 ) -> bool:
     """Whether the end of a run leads to a periodic orbit, which is then written."""
     monodromy = np.zeros((4, 4))
-    code = _polish(model, strobes, -1, MAX_PERIOD, peak, orbit, monodromy, counted)
+    code = _polish(model, strobes, -1, peak, orbit, monodromy, counted)
     if code != FOUND or not _describe(model, orbit, counted[0], peak, facts, counted):
         return False
     facts[0] = spectral_radius(monodromy, 48)
