@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numba
 import numpy as np
@@ -373,71 +373,84 @@ def rk4(problem: Problem, start: Array, periods: int, steps: int) -> Array:
     return np.array(_rk4(x, v, y, u, rates, problem.b, problem.omega, steps, periods))
 
 
+class Stops(NamedTuple):
+    """Two even elastic stops of a clearance to ground."""
+
+    state: int
+    """Index of the displacement; its velocity comes next."""
+    stiffness: float
+    """Force over the mass, per displacement past a stop."""
+    gap: float
+    """Displacement at which either stop is touched."""
+
+
 class Heyoka:
     """heyoka's Taylor integrator with terminal events: PyPI package ``heyoka`` or conda-forge.
 
-    One integrator serves all modes: the stop's stiffness and its constant are run-time parameters
-    that the event's callback switches.
+    x' = A x + B sin(ω t), with stops. One integrator serves all modes: each stiffness and its
+    constant are run-time parameters that an event's callback switches.
 
     Raises
     ------
     ImportError : heyoka is not installed.
     """
 
-    def __init__(self, problem: Problem, tolerance: float) -> None:
+    def __init__(
+        self,
+        A: Sequence[Sequence[float]],
+        B: Sequence[float],
+        omega: float,
+        stops: Sequence[Stops],
+        tolerance: float,
+    ) -> None:
         hy: Any = importlib.import_module("heyoka")
 
-        self.problem = problem
-        x1, v1, x2, v2 = hy.make_vars("x1", "v1", "x2", "v2")
-        names = (x1, v1, x2, v2)
-        A, B, _ = problem.matrices(float, 0)
-        drive = hy.sin(problem.omega * hy.time)
+        self.omega, self.stops = omega, stops
+        states = hy.make_vars(*[f"x{i}" for i in range(len(B))])
+        drive = hy.sin(omega * hy.time)
 
-        def row(i: int) -> Any:
-            terms = [a * z for a, z in zip(A[i], names, strict=True) if a != 0.0]
-            if B[i] != 0.0:
-                terms.append(B[i] * drive)
+        def rate(i: int) -> Any:
+            terms = [z if a == 1.0 else a * z for a, z in zip(A[i], states, strict=True) if a]
+            terms += [B[i] * drive] if B[i] else []
+            for k, stop in enumerate(stops):
+                if stop.state + 1 == i:
+                    terms += [-hy.par[2 * k] * states[stop.state], hy.par[2 * k + 1]]
             return hy.sum(terms)
 
-        system = [
-            (x1, v1),
-            (v1, row(1) - hy.par[0] * x1 + hy.par[1]),
-            (x2, v2),
-            (v2, row(3)),
-        ]
-        mu, gap = problem.k0 / (1.0 - problem.k0), problem.b
+        def touch(k: int, side: int) -> Callable[[Any, int], bool]:
+            on = self._contact(k, side)
 
-        def touch(stop: int) -> Callable[[Any, int], bool]:
             def callback(_: Any, direction: int) -> bool:
-                if direction == stop:
-                    pars[0], pars[1] = mu, stop * mu * gap
-                else:
-                    pars[0], pars[1] = 0.0, 0.0
+                pars[2 * k], pars[2 * k + 1] = on if direction == side else (0.0, 0.0)
                 return True
 
             return callback
 
         self.integrator = hy.taylor_adaptive(
-            system,
-            [0.0] * 4,
-            pars=[0.0, 0.0],
+            [(z, rate(i)) for i, z in enumerate(states)],
+            [0.0] * len(B),
+            pars=[0.0] * (2 * len(stops)),
             tol=tolerance,
             t_events=[
-                hy.t_event(x1 - gap, callback=touch(1)),
-                hy.t_event(x1 + gap, callback=touch(-1)),
+                hy.t_event(states[stop.state] - side * stop.gap, callback=touch(k, side))
+                for k, stop in enumerate(stops)
+                for side in (1, -1)
             ],
         )
         pars = self.integrator.pars
+
+    def _contact(self, k: int, side: int) -> tuple[float, float]:
+        """Parameters with clearance k at its upper stop (1), its lower one (-1) or none (0)."""
+        stop = self.stops[k]
+        return stop.stiffness * abs(side), side * stop.stiffness * stop.gap
 
     def __call__(self, start: Array, periods: int) -> Array:
         ta = self.integrator
         ta.time = 0.0
         ta.state[:] = start
-        ta.pars[:] = 0.0
-        side = self.problem.side_of(float(start[0]))
-        if side:
-            mu = self.problem.k0 / (1.0 - self.problem.k0)
-            ta.pars[:] = mu, side * mu * self.problem.b
+        for k, stop in enumerate(self.stops):
+            x = float(start[stop.state])
+            ta.pars[2 * k : 2 * k + 2] = self._contact(k, (x > stop.gap) - (x < -stop.gap))
         ta.reset_cooldowns()
-        ta.propagate_until(periods * self.problem.period)
+        ta.propagate_until(periods * 2.0 * math.pi / self.omega)
         return np.array(ta.state)

@@ -87,8 +87,9 @@ class Ensemble:
 
         A board may be asked more than once; questions of one board under one drive that follow
         each other share its tables. starts : (len(which), states), at drive phase 0. Equal to
-        ``dynamics.attractors.settle`` of each, to rounding; a board without an answer gives a
-        failed orbit with the reason. progress : called once an answer.
+        ``dynamics.attractors.settle`` of each, to rounding, but for the periods spent where
+        Newton's method strayed into a mode in which an op-amp clips; a board without an answer
+        gives a failed orbit with the reason. progress : called once an answer.
         """
         return [r.orbit for r in self.respond(which, drives, starts, jobs=jobs, progress=progress)]
 

@@ -18,7 +18,6 @@ from designer.dynamics.kernel_orbit import (
     CURSOR,
     DONE,
     FOUND,
-    LEFT,
     NONE,
     SPENT,
     UNKNOWN_MODE,
@@ -109,7 +108,6 @@ def _run(
     )
     if code == UNKNOWN_MODE:
         board.missing[0], board.missing[1] = cursor[MODE], cursor[GUARD]
-        code = LEFT
     return code
 
 

@@ -30,7 +30,7 @@ DONE, LEFT, TOO_MANY_EVENTS, DIVERGED, PAUSED, UNKNOWN_MODE = range(6)
 """Return codes of every flow; LEFT: the fast path does not fit here; the last two are the general
 kernel's: no steps left, a mode that has no tables yet."""
 FOUND, NONE, UNDECIDED = 0, 1, 2
-"""Answers of ``shoot`` and ``polish``; UNDECIDED: the flow was LEFT."""
+"""Answers of ``shoot`` and ``polish``; UNDECIDED: the flow does not know its way."""
 MAX_PERIOD = 16
 """Longest period that is looked for, in drive periods."""
 STROBE_TOLERANCE = 1e-8
@@ -102,7 +102,8 @@ def polisher(lap: Lap) -> Callable[..., int]:
             cursor[0] = -1
             code = lap(system, x, cursor, monodromy, strobes, impacts)
             if code != DONE:
-                return UNDECIDED if code == LEFT else NONE
+                # A step that leads far away leads to no orbit near the start.
+                return UNDECIDED if code == UNKNOWN_MODE else NONE
             error = 0.0
             for i in range(size):
                 step[i, 0] = strobes[n, i] - x[i]
@@ -129,13 +130,13 @@ def polisher(lap: Lap) -> Callable[..., int]:
         system: Any, x: Float, n: int, peak: Float, columns: int
     ) -> int:  # fmt: skip
         """The smallest divisor of n after which the strobe repeats; 0 where the run ends early, -1
-        where the flow was LEFT."""
+        where the flow was LEFT or met an UNKNOWN_MODE."""
         strobes, impacts = np.zeros((n + 1, len(x))), np.zeros((n, columns), dtype=np.int64)
         cursor = np.zeros(CURSOR, dtype=np.int64)
         cursor[0] = -1
         code = lap(system, x, cursor, np.zeros((0, 0)), strobes, impacts)
         if code != DONE:
-            return -1 if code == LEFT else 0
+            return -1 if code in (LEFT, UNKNOWN_MODE) else 0
         for d in range(1, n):
             if n % d == 0 and distance(strobes[d], x, peak) <= STROBE_TOLERANCE:
                 return d
@@ -146,7 +147,7 @@ def polisher(lap: Lap) -> Callable[..., int]:
         system: Any, end: Float, mode: int, periods: int, x: Float, peak: Float, columns: int
     ) -> float:  # fmt: skip
         """Distance from x after these periods from ``end``; infinite where the run ends early, -1
-        where the flow was LEFT."""
+        where the flow was LEFT or met an UNKNOWN_MODE."""
         strobes = np.zeros((periods + 1, len(x)))
         impacts, cursor = (
             np.zeros((periods, columns), dtype=np.int64), np.zeros(CURSOR, dtype=np.int64),
@@ -154,7 +155,7 @@ def polisher(lap: Lap) -> Callable[..., int]:
         cursor[0] = mode
         code = lap(system, end, cursor, np.zeros((0, 0)), strobes, impacts)
         if code != DONE:
-            return -1.0 if code == LEFT else np.inf
+            return -1.0 if code in (LEFT, UNKNOWN_MODE) else np.inf
         return float(distance(strobes[periods], x, peak))
 
     @inlined

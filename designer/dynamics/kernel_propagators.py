@@ -64,6 +64,8 @@ TANGENCY = 1e-13
 crossing is not looked for."""
 MODE, STRETCHES, MEASURE, GUARD = range(4)
 """Places in a run's cursor."""
+STANDS = 0
+"""Place in the scratch array: the part of the block at which WITHIN stands, -1 for none."""
 MASK = 0xFFFFFFFF
 """With it the compiler knows that an index is not negative."""
 LONGEST_WALK = 64
@@ -121,12 +123,20 @@ def _jump(data: Float, base: int, part: int, unit: Unit, work: Float) -> None:
     data[WITHIN + n + 2] = 1.0
 
 
+@embedded
+def _go(data: Float, base: int, part: int, unit: Unit, work: Float) -> None:
+    """``_jump``, unless WITHIN stands there already."""
+    if work[STANDS] != part:
+        _jump(data, base, part, unit, work)
+        work[STANDS] = part
+
+
 @leaf
 def _expand(data: Float, function: TabulatedFunction, t: float, work: Float) -> float:
     """Time of the part nearest to t; COEF = Taylor series of the function about it."""
     n, base = len(function.unit), function.base & MASK
     part = int(t * data[base + PER] + 0.5)
-    _jump(data, base, part, function.unit, work)
+    _go(data, base, part, function.unit, work)
     local, _, _ = function_places(n)
     o = (function.place & MASK) + local
     a = b = c = d = e = f = g = h = 0.0
@@ -184,18 +194,18 @@ def _move(data: Float, base: int, t: float, w: float, unit: Unit, phi: Float, wo
     """NOW ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
     n, o = len(unit), (base & MASK) + NEAR
     part = int(t * data[(base & MASK) + PER] + 0.5)
-    _jump(data, base, part, unit, work)
+    _go(data, base, part, unit, work)
     s = t - part * data[(base & MASK) + PART]
-    for k in range(TERMS * n):
+    for k in range(n, TERMS * n):
         total = 0.0
         for j in range(n + 3):
             total += data[o + TERMS * n * j + k] * data[WITHIN + j]
         work[STACK + k] = total
     for i in range(n):
         total = work[STACK + n * (TERMS - 1) + i]
-        for k in range(TERMS - 2, -1, -1):
+        for k in range(TERMS - 2, 0, -1):
             total = total * s + work[STACK + n * k + i]
-        data[NOW + i] = total
+        data[NOW + i] = total * s + data[WITHIN + i]
     a = w * s
     y = a * a
     sine = a * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0)))
@@ -527,6 +537,7 @@ def advance(
         base = (TABLES + width * m) & MASK
         h, left = data[base + H], stretch - t
         block = STEPS * h
+        work[STANDS] = -1.0
         first, through = _first_crossing(
             data, base, base + watch, ints[m, WATCHED], left, unit, undecided, work
         )
