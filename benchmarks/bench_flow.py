@@ -333,7 +333,7 @@ def chain_section(chains: list[Race]) -> list[str]:
         "",
         "Equal masses in a row, a spring and a damper between neighbours and from the last to",
         "ground, the first one driven; stops at the first and the last mass, or two pairs at one",
-        "mass. Our fast path and heyoka take turns; the ratio is the median over the turns (goal: 8).",
+        "mass. Our fast path and heyoka take turns; the ratio is their median (goal: 8).",
         "The last column is the largest difference of a state after three drive periods.",
         "",
         *table([*header, "difference"], body),
