@@ -103,7 +103,8 @@ def _race(masses: int, clearances: int, omega: float) -> Race:
         clearances,
         omega,
         float(flow.run(start, PERIODS).counts.sum()) / PERIODS,
-        *map(float, np.median(turns, axis=0)),
+        float(np.median(turns[:, 0])),
+        float(np.median(turns[:, 1])),
         float(np.median(turns[:, 0] / turns[:, 1])),
         float(np.abs(near.strobes[-1] - theirs(start, COMPARED)).max()),
     )
