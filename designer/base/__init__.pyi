@@ -96,7 +96,9 @@ from .guarded_reading import (
 from .jit import (
     callee as callee,
     compiled as compiled,
+    embedded as embedded,
     inlined as inlined,
+    leaf as leaf,
 )
 from .jit_notice import (
     announced as announced,
