@@ -60,6 +60,8 @@ class TermRules(NamedTuple):
     """(2,) range of T."""
     like: Index
     """(k + s,) an earlier part that each resistor, then each capacitor, must equal; or -1."""
+    fixed: Index
+    """(k + s,) the only value that each resistor, then each capacitor, may have; or -1."""
     free_r: Mask
     """(n,) true for resistances that do not count as distinct."""
     free_c: Mask
@@ -69,12 +71,18 @@ class TermRules(NamedTuple):
 
 
 class _Stack(NamedTuple):
-    """Where a search stands: limits before each term, the candidates left, the parts chosen."""
+    """Where a search stands: limits before each term, the candidates left, the parts chosen.
+
+    Candidates are taken round from one that ``random`` draws; in their order where it is 0.
+    """
 
     apart: Array
     time: Array
     at: Index
     end: Index
+    many: Index
+    turn: Index
+    random: Index
     kinds: Index
     price: Array
     parts: Index
@@ -87,6 +95,9 @@ def _stack(k: int, s: int) -> _Stack:
         np.zeros((k + 1, 2)),
         np.zeros(k, dtype=np.int64),
         np.zeros(k, dtype=np.int64),
+        np.zeros(k, dtype=np.int64),
+        np.zeros(k, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
         np.zeros(k + 1, dtype=np.int64),
         np.zeros(k + 1),
         np.full(k + s, -1, dtype=np.int64),
@@ -113,11 +124,15 @@ def _window(rules: TermRules, at: _Stack, term: int, level: float) -> None:
     high = at.time[term, 1] + at.apart[term, b, a] - rules.wanted[term] + level + TINY
     if rules.first[term]:
         at.at[term], at.end[term] = below(rules.sums, low), below(rules.sums, high)
-        return
-    own = rules.c[at.parts[len(rules.target) + a]]
-    low = max(low - own, rules.allowed[term, 0] - TINY)
-    high = min(high - own, rules.allowed[term, 1] + TINY)
-    at.at[term], at.end[term] = below(rules.r, low), below(rules.r, high)
+    else:
+        own = rules.c[at.parts[len(rules.target) + a]]
+        low = max(low - own, rules.allowed[term, 0] - TINY)
+        high = min(high - own, rules.allowed[term, 1] + TINY)
+        at.at[term], at.end[term] = below(rules.r, low), below(rules.r, high)
+    at.many[term], at.turn[term] = max(at.end[term] - at.at[term], 0), 0
+    if at.random[0] > 0 and at.many[term] > 0:
+        at.random[0] = (at.random[0] * 1103515245 + 12345) % 2147483648
+        at.turn[term] = (at.random[0] // 1024) % at.many[term]
 
 
 @callee
@@ -141,8 +156,10 @@ def _counts(rules: TermRules, at: _Stack, term: int, most: int, least_price: flo
 
 @callee
 def _differs(rules: TermRules, at: _Stack, part: int, value: int) -> bool:
-    """Whether a part that this one must equal is chosen, and has another value."""
-    like = rules.like[part]
+    """Whether a part is to have another value, its own or that of one which it must equal."""
+    like, fixed = rules.like[part], rules.fixed[part]
+    if fixed >= 0 and fixed != value:
+        return True
     return bool(like >= 0 and at.parts[like] >= 0 and at.parts[like] != value)
 
 
@@ -152,7 +169,8 @@ def _place(
 ) -> bool:
     """Whether the next candidate of a term fits; then the limits after it are set."""
     k, a, b = len(rules.target), rules.target[term], rules.source[term]
-    i = at.at[term]
+    i = at.at[term] + at.turn[term]
+    i -= at.many[term] if i >= at.end[term] else 0
     at.at[term] += 1
     resistor, capacitor = i, at.parts[k + a]
     if rules.first[term]:
@@ -234,6 +252,45 @@ def _next_cell(rules: TermRules, t: float, level: float) -> float:
     return np.inf if i == len(rules.sums) else max(t, rules.sums[i] + rules.wanted[0] - level)
 
 
+@callee
+def _cell(
+    rules: TermRules, at: _Stack, other: _Stack, level: float, patience: int, most: int,
+    least_price: float, rows: Index, count: int,
+) -> tuple[bool, int, int]:  # fmt: skip
+    """The choices in the cell of T where ``at`` begins, written from row ``count`` on: whether the
+    cell came to its end, the rows written by now and the steps."""
+    term, steps = 0, 1
+    _window(rules, at, term, level)
+    while term >= 0:
+        if steps > patience:
+            return False, count, steps
+        if at.at[term] >= at.end[term]:
+            term -= 1
+            continue
+        steps += 1
+        if not _place(rules, at, term, level, most, least_price):
+            continue
+        if term + 1 == len(rules.target):
+            rows[count] = at.parts
+            count += 1
+            if count == len(rows):
+                return False, count, steps
+            continue
+        good, taken = _promising(rules, at, other, term + 1, level, patience - steps)
+        steps += taken
+        if good:
+            term += 1
+            _window(rules, at, term, level)
+    return True, count, steps
+
+
+@callee
+def _width(rules: TermRules, level: float) -> float:
+    """Width of a cell of T."""
+    wide = CELL * level
+    return wide if rules.target[0] == rules.source[0] else max(wide, UNDAMPED_CELL)
+
+
 @compiled
 def choices(
     rules: TermRules, level: float, start: float, patience: int, most: int, least_price: float,
@@ -248,37 +305,46 @@ def choices(
     end is begun again.
     """
     k, count, steps = len(rules.target), 0, 0
-    wide = CELL * level
-    if rules.target[0] != rules.source[0]:
-        wide = max(wide, UNDAMPED_CELL)
+    wide = _width(rules, level)
     at, other = _stack(k, len(rules.apart)), _stack(k, len(rules.apart))
     at.apart[0] = rules.apart
     t = _next_cell(rules, max(start, rules.seconds[0]), level)
     while t <= rules.seconds[1]:
         at.time[0, 0], at.time[0, 1] = t, min(t + wide, rules.seconds[1])
-        term, steps = 0, steps + 1
-        _window(rules, at, term, level)
-        while term >= 0:
-            if steps > patience:
-                return t, count, steps
-            if at.at[term] >= at.end[term]:
-                term -= 1
-                continue
-            steps += 1
-            if not _place(rules, at, term, level, most, least_price):
-                continue
-            if term + 1 == k:
-                rows[count] = at.parts
-                count += 1
-                if count == len(rows):
-                    return t, count, steps
-                continue
-            good, taken = _promising(rules, at, other, term + 1, level, patience - steps)
-            steps += taken
-            if good:
-                term += 1
-                _window(rules, at, term, level)
+        whole, count, taken = _cell(
+            rules, at, other, level, patience - steps, most, least_price, rows, count
+        )
+        steps += taken
+        if not whole:
+            return t, count, steps
         t = _next_cell(rules, t + wide, level)
         if count:
             return t, count, steps
     return np.inf, count, steps
+
+
+@compiled
+def dives(
+    rules: TermRules, level: float, cells: Array, patience: int, most: int, seed: int, row: Index
+) -> tuple[int, bool, int]:
+    """One choice with an error of about ``level``, of no cell of T the best.
+
+    Each of ``cells`` (j,), where a cell begins, is searched for so many steps in an order of
+    candidates drawn from ``seed``: what goes wrong early is left, not exhausted. most : distinct
+    values that a choice may have. row : (1, k + s), gets the choice. Returns how many cells were
+    begun, whether there is a choice, and the steps.
+    """
+    k, steps, wide = len(rules.target), 0, _width(rules, level)
+    at, other = _stack(k, len(rules.apart)), _stack(k, len(rules.apart))
+    at.apart[0] = rules.apart
+    for number in range(len(cells)):
+        t = _next_cell(rules, max(cells[number], rules.seconds[0]), level)
+        if t > rules.seconds[1]:
+            continue
+        at.random[0] = 1 + (seed + number) * 7919 % 2147483647
+        at.time[0, 0], at.time[0, 1] = t, min(t + wide, rules.seconds[1])
+        _, count, taken = _cell(rules, at, other, level, patience, most, np.inf, row, 0)
+        steps += taken
+        if count:
+            return number + 1, True, steps
+    return len(cells), False, steps

@@ -5,7 +5,8 @@ the first level where one can, the least error among them is the optimum. Two ma
 are searched by joins (``linear_network.pair_search``), every other pattern of terms by a tree of
 choices (``linear_network.term_search``). Among the choices that reach the optimum, cvxpy and HiGHS
 choose those with the fewest distinct values and the lowest price. Work is limited by count, never
-by time; where it runs out, the last empty level is what the certificate says.
+by time; where it runs out, the last empty level is what the certificate says, and the answer of a
+tree is the best that dives into it find (``linear_network.term_dives``).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from designer.linear_network.linear_terms import (
     Targets,
 )
 from designer.linear_network.pair_search import PairSearch
+from designer.linear_network.term_dives import TermDives
 from designer.linear_network.term_search import TermSearch
 from designer.model.circuit_table import CircuitSpec
 
@@ -39,8 +41,6 @@ MOST_STEPS = 600_000_000
 a tree of choices."""
 THINNED = (8, 4, 2)
 """Where the work runs out with nothing found: every 8th, 4th, 2nd resistor alone is searched."""
-WIDER = 8
-"""Higher levels that are tried where the work of a tree of choices ran out with nothing found."""
 ROUNDING = 1e-10
 """Of an error against its level."""
 
@@ -78,15 +78,13 @@ def best(
     capacitors, prices = capacitors[order], prices[order]
     question = LinearQuestion(targets, signal, capacitors, prices, bounds, spec)
     if level is None:
-        found = _levels(question, MOST_STEPS, 0.0 if question.by_joins else empty)
+        found = _answered(question, MOST_STEPS, empty)
     else:
         search = _search(question)
         found = search.level(max(level, search.first), MOST_STEPS)
         if found.nothing:
             return Shortfall("coefficients", found.whole)
-    if found.nothing and not found.whole and not question.by_joins:
-        found = _wider(found, question)
-    if found.nothing and not found.whole:
+    if found.nothing and not found.whole and question.by_joins:
         found = _thinned(found, question)
     if found.nothing:
         return Shortfall(_what_binds(found, question, resistors), found.whole)
@@ -139,19 +137,16 @@ def _levels(question: LinearQuestion, patience: int, empty: float = 0.0) -> Leve
         level *= 1e3 if level < 1e-6 else search.growth
 
 
-def _wider(found: Levels, question: LinearQuestion) -> Levels:
-    """Something to offer where the work ran out: an answer of a higher level, if not the best.
-
-    Its bound stays the level that is empty.
-    """
-    search, level = _search(question), found.empty
-    for _ in range(WIDER):
-        level = min(max(level, search.first) * search.growth**2, LAST_LEVEL)
-        at = search.level(level, MOST_STEPS // 8)
-        found = replace(at.after(found), empty=found.empty, whole=False)
-        if not found.nothing:
-            break
-    return found
+def _answered(question: LinearQuestion, patience: int, empty: float = 0.0) -> Levels:
+    """The levels; in a tree of choices with half of the work, and where it runs out with nothing
+    found, the best that dives find. Its bound stays the level that is empty."""
+    if question.by_joins:
+        return _levels(question, patience)
+    found = _levels(question, patience // 2, empty)
+    if not found.nothing or found.whole:
+        return found
+    near = TermDives(TermSearch(question)).best(max(found.empty, EXACT), patience)
+    return replace(near.after(found), empty=found.empty, whole=False)
 
 
 def _thinned(found: Levels, question: LinearQuestion) -> Levels:
@@ -176,7 +171,7 @@ def _what_binds(found: Levels, question: LinearQuestion, resistors: Array) -> st
     """What leaves no choice: the first preference or condition without which there is one."""
     for name, relaxed in _relaxations(question, resistors):
         with part(f"without {name}"):
-            again = _levels(relaxed, MOST_STEPS // 8)
+            again = _answered(relaxed, MOST_STEPS // 8)
         if not again.nothing:
             return name
     return "displacement integrators" if found.reached >= 0 else "coefficients"

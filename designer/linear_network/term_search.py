@@ -31,8 +31,9 @@ from designer.linear_network.term_conditions import TermConditions
 from designer.linear_network.term_order import TermOrder, order_of
 from designer.linear_network.term_program import TermProgram
 
-CANDIDATE = 20
-"""Steps of a search that one candidate of the compiled loops counts for."""
+CANDIDATE, OF_STATES = 20, 6
+"""Steps of a search that one candidate of the compiled loops counts for with so many states or
+fewer; its work grows with their square."""
 FRESH = 2000
 """Candidates that the linear program of one choice counts for."""
 ROOM = 64
@@ -54,27 +55,27 @@ class TermSearch:
 
     def level(self, level: float, patience: int) -> Levels:
         """The least error of about ``level``; what is found narrows the rest of the search."""
-        rules, (terms, states) = self._rules(level), self._size
+        rules, (terms, states) = self.rules(level), self._size
         best, parts = np.inf, np.full(terms + states, -1)
         known, t, steps, room = set[bytes](), -np.inf, 0, ROOM
         most = self.question.spec.most_values
         kinds = terms + states if most is None else most
-        while t < np.inf and best > EXACT and steps * CANDIDATE < patience:
+        while t < np.inf and best > EXACT and steps * self.candidate < patience:
             self._tell(level, rules, t)
             rows = np.zeros((room, terms + states), dtype=np.int64)
-            left = patience // CANDIDATE - steps
+            left = patience // self.candidate - steps
             t, count, taken = choices(rules, min(level, best), t, left, kinds, np.inf, rows)
             steps, room = steps + taken, room * 4 if count == room else ROOM
-            for row in rows[:count][:, self._by_name]:
+            for row in rows[:count][:, self.by_name]:
                 if row.tobytes() in known:
                     continue
                 known.add(row.tobytes())
                 steps += FRESH
                 error = self.error(row)
-                if error < best and self._conditions.hold(self._offsets(row)):
+                if error < best and self.allowed(row):
                     best, parts = error, row
         reached = 0 if known else -1
-        return Levels(best, parts, 0.0, t == np.inf, reached, len(known), steps * CANDIDATE)
+        return Levels(best, parts, 0.0, t == np.inf, reached, len(known), steps * self.candidate)
 
     def fewest(self, parts: Index, limit: float, patience: int) -> tuple[Index, str]:
         """The choice of fewest values, least price, of those up to the limit.
@@ -83,16 +84,16 @@ class TermSearch:
         that were met.
         """
         limit = max(limit, EXACT)
-        rules, (terms, states) = self._rules(limit), self._size
+        rules, (terms, states) = self.rules(limit), self._size
         best, met, t, steps, room = parts, [parts], -np.inf, 0, 8
         known = set[bytes]()
-        while t < np.inf and steps * CANDIDATE < patience:
+        while t < np.inf and steps * self.candidate < patience:
             self._tell(limit, rules, t)
             rows = np.zeros((room, terms + states), dtype=np.int64)
-            left = patience // CANDIDATE - steps
+            left = patience // self.candidate - steps
             t, count, taken = choices(rules, limit, t, left, *self.cost(best), rows)
             before = best
-            for row in rows[:count][:, self._by_name]:
+            for row in rows[:count][:, self.by_name]:
                 if row.tobytes() in known or self.cost(row) >= self.cost(best):
                     continue
                 known.add(row.tobytes())
@@ -111,7 +112,7 @@ class TermSearch:
 
     def error(self, parts: Index) -> float:
         """The least largest error of one choice, by linear programming from its values alone."""
-        return least_largest(self._offsets(parts), self._columns)
+        return least_largest(self.offsets(parts), self.columns)
 
     def cost(self, parts: Index) -> tuple[int, float]:
         """Distinct values of one choice, without the preferred, and the price of its
@@ -136,10 +137,21 @@ class TermSearch:
         return preferred_logs(r, preferred), preferred_logs(c, preferred)
 
     @cached_property
-    def _columns(self) -> Array:
+    def columns(self) -> Array:
+        """(terms, 2n) change of the errors with each scale, that of time first."""
         return scale_columns(self.question.targets)
 
-    def _offsets(self, parts: Index) -> Array:
+    @cached_property
+    def candidate(self) -> int:
+        """Steps that one candidate counts for."""
+        return CANDIDATE * max(self._size[1], OF_STATES) ** 2 // OF_STATES**2
+
+    def allowed(self, parts: Index) -> bool:
+        """Whether a choice keeps the side conditions."""
+        return self._conditions.hold(self.offsets(parts))
+
+    def offsets(self, parts: Index) -> Array:
+        """(terms,) errors of a choice with all scales 0."""
         terms, (r, c) = self._size[0], self._logs
         states = [a for a, _ in self.question.targets.entries]
         return -(r[parts[:terms]] + c[parts[terms:]][states] + self.question.targets.wanted)
@@ -161,7 +173,7 @@ class TermSearch:
 
     def _good(self, parts: Index, limit: float) -> bool:
         tied = all(parts[i] == parts[j] for i, j in self._equal)
-        allowed = tied and self._conditions.hold(self._offsets(parts))
+        allowed = tied and self.allowed(parts)
         return allowed and self.error(parts) <= limit + TINY
 
     def _program(self, met: Index) -> TermProgram:
@@ -172,22 +184,23 @@ class TermSearch:
         )  # fmt: skip
 
     @cached_property
-    def _order(self) -> TermOrder:
+    def order(self) -> TermOrder:
+        """The order in which the loops choose the terms."""
         many = len(self.question.resistors), len(self.question.capacitors)
         return order_of(self.question.targets.entries, self._size[1], *many)
 
     @cached_property
-    def _by_name(self) -> list[int]:
+    def by_name(self) -> list[int]:
         """Columns of the loops' rows in the order of ``Targets.parts``."""
         terms, states = self._size
         names = self.question.targets.entries
-        columns = [self._order.entries.index(entry) for entry in names]
+        columns = [self.order.entries.index(entry) for entry in names]
         return [*columns, *range(terms, terms + states)]
 
-    def _rules(self, level: float) -> TermRules:
+    def rules(self, level: float) -> TermRules:
         """The rules with the room that nominal scales need at a level."""
         r, c = self._logs
-        entries, targets = self._order.entries, self.question.targets
+        entries, targets = self.order.entries, self.question.targets
         target = np.array([a for a, _ in entries])
         every, sum_r, sum_c = sums(r, c)
         w = np.log([targets.coefficients[entry] for entry in entries])
@@ -198,7 +211,7 @@ class TermSearch:
             source=np.array([b for _, b in entries]),
             wanted=w,
             first=np.array([a not in target[:i] for i, a in enumerate(target)]),
-            probes=self._order.probes,
+            probes=self.order.probes,
             r=r,
             c=c,
             sums=every,
@@ -208,6 +221,7 @@ class TermSearch:
             apart=self._conditions.apart(level),
             seconds=np.clip(self._conditions.seconds(level), *reach),
             like=self._like(),
+            fixed=np.full(sum(self._size), -1),
             free_r=self._free[0],
             free_c=self._free[1],
             prices=self.question.prices.astype(float),
@@ -218,20 +232,20 @@ class TermSearch:
         bounds = self.question.bounds
         out = np.tile([-np.inf, np.inf], (self._size[0], 1))
         own = (2 * bounds.mass + 1, 2 * bounds.mass)
-        if own in self._order.entries:
+        if own in self.order.entries:
             limits = max(bounds.stop, 1e-300), bounds.stop_most
-            out[self._order.entries.index(own)] = np.log(limits)
+            out[self.order.entries.index(own)] = np.log(limits)
         return out
 
     def _like(self) -> Index:
         """(terms + states,) an earlier part that each must equal, in the order of the loops."""
         terms, states = self._size
-        rows = [a for a, _ in self._order.entries]
+        rows = [a for a, _ in self.order.entries]
         chosen = [rows.index(state) for state in range(states)]
         when = [*range(terms), *chosen]
         out = np.full(terms + states, -1)
         for i, j in self._equal:
-            here, there = self._by_name[i], self._by_name[j]
+            here, there = self.by_name[i], self.by_name[j]
             if when[there] < when[here] or (when[there] == when[here] and there < here):
                 out[here] = there
         return out
