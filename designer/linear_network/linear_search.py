@@ -139,13 +139,13 @@ def _levels(question: LinearQuestion, patience: int, empty: float = 0.0) -> Leve
 
 def _answered(question: LinearQuestion, patience: int, empty: float = 0.0) -> Levels:
     """The levels; in a tree of choices with half of the work, and where it runs out with nothing
-    found, the best that dives find. Its bound stays the level that is empty."""
+    found, the best that dives find with the other half. Its bound stays the level that is empty."""
     if question.by_joins:
         return _levels(question, patience)
     found = _levels(question, patience // 2, empty)
     if not found.nothing or found.whole:
         return found
-    near = TermDives(TermSearch(question)).best(max(found.empty, EXACT), patience)
+    near = TermDives(TermSearch(question)).best(max(found.empty, EXACT), patience // 2)
     return replace(near.after(found), empty=found.empty, whole=False)
 
 

@@ -222,7 +222,11 @@ class _Search:
         free = missed.free or FREES.get(missed.short.what, "a wider choice of parts")
         if guilty:
             free += "; or circuit.side_conditions without " + " or ".join(guilty)
-        raise Unreachable(None, "circuit", f"no choice of parts; what binds: {what}", free)
+        whole = self.by_joins or missed.short.whole
+        searched = "" if whole else " was found within the search's count of steps"
+        raise Unreachable(
+            None, "circuit", f"no choice of parts{searched}; what binds: {what}", free
+        )
 
     def _guilty(self, missed: _Missed) -> tuple[list[str], str]:
         """The side conditions that leave no choice, and their names in words: by joins those

@@ -18,7 +18,15 @@ from designer.circuit.terms import terms
 from designer.linear_network import linear_search
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_search import best
-from designer.linear_network.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
+from designer.linear_network.linear_terms import (
+    ANY,
+    Bounds,
+    LinearBlock,
+    LinearQuestion,
+    Shortfall,
+    Targets,
+)
+from designer.linear_network.term_dives import LOWER, TermDives
 from designer.linear_network.term_search import TermSearch
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.attempt import _in_ratio
@@ -201,6 +209,29 @@ def test_a_lower_bound_is_one_where_the_work_runs_out(
     assert answer.bound <= truth + CLOSE
     assert answer.error >= truth - CLOSE
     assert answer.proved is (answer.error <= answer.bound + EXACT)
+
+
+@pytest.mark.parametrize("name", ["one damper", "no coupling damper", "chain of three"])
+def test_dives_find_a_choice_near_the_best_there_is(name: str) -> None:
+    """Against every choice: one that keeps the conditions, and the same one each time."""
+    pattern, n, m = PATTERNS[name]
+    resistors, capacitors = catalogue(np.random.default_rng(5), n, m)
+    A = near_exact(pattern, resistors, capacitors, 5)
+    limits = Limits(level=20.0)
+    truth = everything(A, resistors, capacitors).keeping(limits)
+    question = LinearQuestion(
+        Targets.from_state_matrix(A), resistors, capacitors, np.ones(m),
+        bounds_of(limits, len(A)), ANY,
+    )  # fmt: skip
+    first, second = (TermDives(TermSearch(question)).best(EXACT, 4_000_000) for _ in range(2))
+    assert (first.error, first.parts.tolist()) == (second.error, second.parts.tolist())
+    assert truth.errors.min() - CLOSE <= first.error <= truth.errors.min() / LOWER + CLOSE
+    terms_here = len(question.targets.entries)
+    values = [*resistors[first.parts[:terms_here]], *capacitors[first.parts[terms_here:]]]
+    named = dict(zip(question.targets.parts, values, strict=True))
+    own = (truth.values == [named[part] for part in truth.names]).all(axis=1)
+    (row,) = np.flatnonzero(own)
+    assert truth.errors[row] == pytest.approx(first.error, abs=CLOSE)
 
 
 @pytest.mark.parametrize("pattern", [SINGLE, NO_COUPLING_DAMPER], ids=["one mass", "two masses"])
