@@ -95,8 +95,7 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
             spent += cost
             if found is not None:
                 return replace(found, periods=spent)
-    # Without an impact the motion is linear, and has one attractor, of the drive's own period.
-    still = bool(np.any(run.counts)) and is_stationary(run.strobes)
+    still = is_stationary(run.strobes) and not (_decays(flow, run.mode) and not np.any(run.counts))
     if not still:  # a growth too small to be seen at once
         growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
         spent += BLOCK * len(growth.rates)
@@ -109,6 +108,13 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         spent,
         f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: {why}",
     )
+
+
+def _decays(flow: Flow, mode: ModeKey) -> bool:
+    """Whether free motion in this mode dies out. Without an impact its one attractor then has the
+    drive's own period, however long it repeats as if it had settled."""
+    rates = np.linalg.eigvals(flow.system.mode(mode).A)
+    return bool(rates.real.max() < -1e-12 * np.abs(rates).max())
 
 
 def _unperiodic(

@@ -124,7 +124,7 @@ SAID: list[tuple[str, str, object]] = [
     ("ngspice.md", r"Of the first (\d+) boards of each response", cross_check.OWN_SAMPLES),
     ("ngspice.md", r"is defined: the first (\d+) boards", cross_check.NOMINAL_SAMPLES),
     ("ngspice.md", r"A way of more than (\d+) periods", ngspice_runs.MOST_PERIODS),
-    ("ngspice.md", r"as many steps as (\d+) periods", ngspice_runs.MOST_AGAIN),
+    ("ngspice.md", r"more steps than ([\d ]+) periods", ngspice_runs.MOST_AGAIN),
     ("ngspice.md", r"`discarded_periods`\), at most (\d+)", numerics_gate.MOST_DISCARDED),
     ("blame.md", r"the first (\d+) of a response, in order", blame_replay.LOST),
     ("blame.md", r"Up to (\d+) boards that were ok", blame_replay.KEPT),
