@@ -18,7 +18,7 @@ order in each, and by `FLOOR` beside it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,9 @@ FLOOR = 1e-3
 """What may differ beside the coefficient errors."""
 POINTS = 50
 """Points of an ``.ac`` analysis; a decade. Of each stretch of a ``.dc`` analysis likewise."""
+EASY_GAIN = 1e6
+"""Open-loop gain of the op-amps where ngspice finds no operating point with more; it errs by the
+noise gain over it, a tenth of `FLOOR` at a noise gain of 100."""
 
 
 @dataclass(frozen=True)
@@ -146,20 +149,20 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
     curve = rests if design.circuit.stops else ()
 
-    def jobs(*, nodeset: bool) -> list[SpiceJob[Waveforms]]:
-        ac = [_ac(design, rest, low, high, nodeset=nodeset) for rest in rests]
-        return ac + [_dc(design, rest, nodeset=nodeset) for rest in curve]
+    def jobs(*, easy: bool) -> list[SpiceJob[Waveforms]]:
+        ac = [_ac(design, rest, low, high, easy=easy) for rest in rests]
+        return ac + [_dc(design, rest, easy=easy) for rest in curve]
 
     answers = {}
-    first = jobs(nodeset=True)
+    first = jobs(easy=False)
     for number, answer in pool.map(first):
         answers[number] = answer
         doing(f"{len(answers)} of {len(first)} runs")
     # From the nodeset where a rectifier rests, its diodes' drop a constant, ngspice may end in vain
-    # where it finds the operating point by itself.
+    # where it finds the operating point by itself; op-amps of endless gain leave it nanovolts.
     again = [i for i, answer in answers.items() if _unconverged(answer)]
-    bare = jobs(nodeset=False)
-    answers |= {again[k]: answer for k, answer in pool.map(bare[i] for i in again)}
+    easier = jobs(easy=True)
+    answers |= {again[k]: answer for k, answer in pool.map(easier[i] for i in again)}
     findings = [_transfer(design, model, rest, answers[i]) for i, rest in enumerate(rests)]
     sweeps = [(rest, answers[len(rests) + i]) for i, rest in enumerate(curve)]
     return EquationCheck((*findings, *_curve(design, model, sweeps)), low, high)
@@ -238,19 +241,21 @@ def _deck(
     generator: float,
     sides: tuple[int, ...],
     *,
-    nodeset: bool,
+    easy: bool,
     turned: bool = False,
 ) -> str:
     """The deck that is simulated in time, with another generator line and analysis.
 
-    generator [V], sides : at the first operating point. nodeset : ngspice looks for that point
-    from where the reduction says it is. Neither from there nor from zero does it find every point.
+    generator [V], sides : at the first operating point. ngspice looks for it from where the
+    reduction says it is; easy : from zero, with op-amps of `EASY_GAIN`. Neither finds every point.
     turned : the generator's poles are exchanged, so that its voltage counts negative.
     """
     circuit = design.circuit
     board = nominal_board(circuit, ideal=True)
+    if easy:
+        board = replace(board, inverse_gain=1.0 / EASY_GAIN)
     try:
-        volts = rest(Reduction(circuit, board), generator, sides) if nodeset else []
+        volts = [] if easy else rest(Reduction(circuit, board), generator, sides)
     except ArithmeticError:  # a floating net: ngspice shall say it
         volts = []
     resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in volts)] if volts else []
@@ -295,15 +300,15 @@ def _volts(design: Design, force: float) -> float:
 
 
 def _ac(
-    design: Design, resting: StaticRest, low: float, high: float, *, nodeset: bool
+    design: Design, resting: StaticRest, low: float, high: float, *, easy: bool
 ) -> SpiceJob[Waveforms]:
     generator = _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {generator!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, generator, resting.sides, nodeset=nodeset)
+    text = _deck(design, source, card, generator, resting.sides, easy=easy)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
 
 
-def _dc(design: Design, resting: StaticRest, *, nodeset: bool) -> SpiceJob[Waveforms]:
+def _dc(design: Design, resting: StaticRest, *, easy: bool) -> SpiceJob[Waveforms]:
     """From the near end, where the stage carries least; upwards, as every sweep goes."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
@@ -313,7 +318,7 @@ def _dc(design: Design, resting: StaticRest, *, nodeset: bool) -> SpiceJob[Wavef
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
     pairs = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
     nets = tuple(dict.fromkeys(net for pair in pairs for net in pair))
-    text = _deck(design, "DC 0", card, near, resting.sides, nodeset=nodeset, turned=turned)
+    text = _deck(design, "DC 0", card, near, resting.sides, easy=easy, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
 
 

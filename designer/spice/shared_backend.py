@@ -144,11 +144,15 @@ def _start_session() -> Any:
     NgSpiceShared.LIBRARY_PATH = library
     with _nobodys_home():
         try:
-            return NgSpiceShared()
+            session = NgSpiceShared()
         except OSError as error:
             raise EnvironmentMissing(f"libngspice does not load: {error}; {HOW_TO_INSTALL}") from (
                 error
             )
+    # An operating point that no stepping finds is a failure at once. ngspice would look for it by
+    # a run in time, which never ends where op-amps of endless gain have no bandwidth.
+    session.exec_command("optran 0 1 1 0 0 0")
+    return session
 
 
 @contextlib.contextmanager
