@@ -28,6 +28,7 @@ ORDER = (
     "design_rules",
     "centering",
     "fidelity",
+    "workbench",
     "report",
     "jobs",
     "paper",

@@ -1,0 +1,8 @@
+"""A board on the bench: what an oscilloscope recorded of it, and what the record shows.
+
+``record`` is what was recorded, and what its channels are of the board.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

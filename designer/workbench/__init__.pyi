@@ -1,0 +1,4 @@
+from .record import (
+    Record as Record,
+    RecordedMotion as RecordedMotion,
+)
