@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from designer.base.errors import InputError
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.board_parts import (
@@ -17,6 +18,8 @@ from designer.board.board_parts import (
     trimmed_clearance,
 )
 from designer.board.component import Component
+from designer.board.kicad_placement import place
+from designer.board.summing_nodes import node_spans
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
@@ -44,6 +47,7 @@ def markdown(
         _connections(circuit, components),
         _supply(circuit, synthesis.catalog),
         _outputs(circuit, choice),
+        *_summing_nodes(circuit, components),
         *_protection(synthesis, circuit, choice),
         *_trim(synthesis, circuit, choice),
         *_spare(circuit),
@@ -109,6 +113,21 @@ def _outputs(circuit: Circuit, choice: BoardChoice) -> str:
         f"is right up to {_q(corner / 10.0, 'Hz')} or so, and the amplifier does not feel the "
         "cable. Keep probes off the summing nodes: a few picofarads there move the circuit."
     )
+
+
+def _summing_nodes(circuit: Circuit, components: Sequence[Component]) -> list[str]:
+    """How far the pads of each summing node lie apart; nothing of cases that are not drawn here."""
+    try:
+        placed = place(circuit, [c for c in components if View.BOARD in c.views])
+    except InputError:
+        return []
+    spans = node_spans(circuit, placed)
+    rows = [f"| `{net}` | {length:.1f} mm |" for net, length in spans.items()]
+    head = (
+        "Each picofarad at a summing node moves the circuit. The shortest tree over the pads of "
+        "each on the board of `designer export`:"
+    )
+    return ["## Summing nodes", head, "\n".join(["| node | length |", "|---|---|", *rows])]
 
 
 def _protection(synthesis: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.footprints import FootprintShape, PadShape
 from designer.board.kicad_names import BOARD_VERSION, HEAD, LIBRARY, identifier
-from designer.board.kicad_placement import TEXT, PlacedComponent
 from designer.board.pins import Pin
+from designer.board.placed_component import TEXT, PlacedComponent
 
 ROUND = 0.25
 """Radius of a pad's corners, of its shorter side."""
@@ -21,7 +21,7 @@ def module(shape: FootprintShape) -> Expression:
         "footprint",
         shape.name,
         *lists(version=BOARD_VERSION, **HEAD, layer="F.Cu"),
-        *_texts(shape, "REF**", shape.name, 0, ids),
+        *_texts(shape, "REF**", shape.name, ids),
         _attributes(shape),
         *_drawing(shape, ids),
         *(_pad(pad, 0, ids) for pad in shape.pads),
@@ -52,8 +52,11 @@ def on_board(
         "footprint",
         f"{LIBRARY}:{shape.name}",
         *lists(layer="F.Cu", uuid=identifier(*ids), at=_at(spot.x, spot.y, spot.angle)),
-        *_texts(shape, component.reference, component.value, spot.angle, ids),
-        *(_property(key, text, 0.0, spot.angle, "F.Fab", ids, hide=True) for key, text in fields),
+        *_texts(shape, component.reference, component.value, ids, spot.angle, spot.label_at),
+        *(
+            _property(key, text, (0.0, 0.0), spot.angle, "F.Fab", ids, hide=True)
+            for key, text in fields
+        ),
         *lists(path=f"/{path}", sheetname="/", sheetfile=sheet),
         _attributes(shape, bought=component.bought is not None, fitted=component.fitted),
         *_drawing(shape, ids),
@@ -66,25 +69,40 @@ def on_board(
 
 
 def _texts(
-    shape: FootprintShape, reference: str, value: str, angle: int, ids: tuple[str, ...]
+    shape: FootprintShape,
+    reference: str,
+    value: str,
+    ids: tuple[str, ...],
+    angle: int = 0,
+    at: tuple[float, float] | None = None,
 ) -> Iterator[Expression]:
-    """The reference above the courtyard as it is seen, the value on the drawing below it."""
+    """The reference, and the value on the drawing below the courtyard as it is seen.
+
+    at : middle of the reference, seen from the footprint's place on the board [mm]; above the
+    courtyard where None.
+    """
     _, top, _, bottom = shape.courtyard
-    above, below = top - 0.25 - TEXT / 2.0, bottom + 0.25 + TEXT / 2.0
-    if angle == 180:
-        above, below = bottom + 0.25 + TEXT / 2.0, top - 0.25 - TEXT / 2.0
-    yield _property("Reference", reference, above, angle, "F.SilkS", ids)
-    yield _property("Value", value, below, angle, "F.Fab", ids)
+    sign = -1.0 if angle == 180 else 1.0
+    below = sign * (-top if angle == 180 else bottom) + sign * (0.25 + TEXT / 2.0)
+    x, y = (0.0, top - 0.25 - TEXT / 2.0) if at is None else (sign * at[0], sign * at[1])
+    yield _property("Reference", reference, (x, y), angle, "F.SilkS", ids)
+    yield _property("Value", value, (0.0, below), angle, "F.Fab", ids)
 
 
 def _property(
-    key: str, text: str, y: float, angle: int, layer: str, ids: tuple[str, ...], hide: bool = False
+    key: str,
+    text: str,
+    at: tuple[float, float],
+    angle: int,
+    layer: str,
+    ids: tuple[str, ...],
+    hide: bool = False,
 ) -> Expression:
     return expression(
         "property",
         key,
         text,
-        at=_at(0.0, y, angle),
+        at=_at(round(at[0], 6) + 0.0, round(at[1], 6) + 0.0, angle),
         layer=layer,
         hide=True if hide else None,
         uuid=identifier(*ids, "field", key),

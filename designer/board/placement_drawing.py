@@ -8,7 +8,8 @@ from matplotlib.patches import Circle, Rectangle
 
 from designer.base.figure_style import CONTACT, INK, MUTED, new_figure, styled
 from designer.board.footprints import PadShape
-from designer.board.kicad_placement import PlacedComponent, Placement
+from designer.board.kicad_placement import Placement
+from designer.board.placed_component import PlacedComponent
 
 INCH = 1.0 / 12.0
 """Of one millimetre of the board."""
@@ -42,10 +43,9 @@ def _component(axes: Axes, spot: PlacedComponent) -> None:
     axes.add_patch(Rectangle(corner, wide, high, fc=PART, ec=MUTED, lw=0.6))
     for pad in spot.footprint.pads:
         _pad(axes, pad, spot.x + sign * pad.x, spot.y + sign * pad.y)
-    left, top, right, _ = spot.footprint.courtyard
-    above = spot.y + (top if sign > 0.0 else -spot.footprint.courtyard[3])
-    middle = spot.x + sign * 0.5 * (left + right)
-    axes.text(middle, above, spot.component.reference, ha="center", va="bottom", size=4.6)
+    x, y = spot.label_at
+    name = spot.component.reference
+    axes.text(spot.x + x, spot.y + y, name, ha="center", va="center_baseline", size=4.6)
 
 
 def _pad(axes: Axes, pad: PadShape, x: float, y: float) -> None:

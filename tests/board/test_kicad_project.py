@@ -11,8 +11,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial.distance import pdist, squareform
 
 from designer.base.sexpr import Expression, read, read_all
 from designer.base.views import View
@@ -26,8 +29,9 @@ from designer.board.kicad_names import (
     project_name,
     safe_text,
 )
-from designer.board.kicad_placement import PlacedComponent, Placement, place
+from designer.board.kicad_placement import Placement, place
 from designer.board.kicad_project import Project, files
+from designer.board.summing_nodes import node_spans, shortest_tree
 from designer.circuit.netlist import Resistor
 from tests.base.test_views import CIRCUITS
 from tests.shared.kicad_cases import CASES, case, case_files, project
@@ -155,15 +159,15 @@ def test_components_stand_apart_on_the_board(name: str) -> None:
     names = [s.component.reference for s in placement.spots]
     board = [c for c in case(name).components if View.BOARD in c.views]
     assert sorted(names) == sorted(c.reference for c in board)
-    yards = {s.component.reference: courtyard(s) for s in placement.spots}
+    yards = {s.component.reference: s.courtyard for s in placement.spots}
     for (a, one), (b, other) in itertools.combinations(yards.items(), 2):
-        across = max(one[0] - other[2], other[0] - one[2])
-        down = max(one[1] - other[3], other[1] - one[3])
+        across = max(one.left - other.right, other.left - one.right)
+        down = max(one.top - other.bottom, other.top - one.bottom)
         assert max(across, down) >= 0.25, (a, b)
     edge = placement.outline
-    for left, top, right, bottom in yards.values():
-        assert edge.left < left < right < edge.right
-        assert edge.top < top < bottom < edge.bottom
+    for yard in yards.values():
+        assert edge.left < yard.left < yard.right < edge.right
+        assert edge.top < yard.top < yard.bottom < edge.bottom
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -183,11 +187,19 @@ def placed(made: Project) -> Placement:
     return place(made.circuit, [c for c in made.components if View.BOARD in c.views])
 
 
-def courtyard(spot: PlacedComponent) -> tuple[float, float, float, float]:
-    left, top, right, bottom = spot.footprint.courtyard
-    if spot.angle == 180:
-        left, top, right, bottom = -right, -bottom, -left, -top
-    return spot.x + left, spot.y + top, spot.x + right, spot.y + bottom
+@pytest.mark.parametrize("name", CASES)
+def test_the_pads_of_a_summing_node_stand_together(name: str) -> None:
+    """25 mm where parts are on the surface, 45 mm where they stand in holes."""
+    made = case(name)
+    spans = node_spans(made.circuit, placed(made))
+    assert spans.keys() == {s.inverting for s in made.circuit.sections} - {"0"}
+    assert max(spans.values()) < (45.0 if name == "through-hole" else 25.0)
+
+
+@given(st.sets(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=2, max_size=6))
+def test_the_tree_of_a_node_is_the_shortest(points: set[tuple[int, int]]) -> None:
+    apart = squareform(pdist(np.array(sorted(points), dtype=float)))
+    assert shortest_tree(sorted(points)) == pytest.approx(minimum_spanning_tree(apart).sum())
 
 
 @pytest.mark.parametrize("name", CASES)
