@@ -1,6 +1,7 @@
 """A board on the bench: what an oscilloscope recorded of it, and what the record shows.
 
-``record`` is what was recorded, and what its channels are of the board.
+``record_formats`` reads the files that oscilloscopes write; ``record`` is what was recorded, and
+what its channels are of the board.
 """
 
 import lazy_loader

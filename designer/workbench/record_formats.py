@@ -1,0 +1,255 @@
+"""A record from a file: text of any oscilloscope, or arrays of NumPy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import MISSING, InputError
+from designer.base.guarded_reading import reading
+from designer.workbench.record import Record
+from designer.workbench.scope_text import EXPECTED, NUMBER, TextColumns, read_columns
+
+FEWEST_SAMPLES = 100
+"""Fewer show no motion."""
+TIME_NAMES = re.compile(r"(time|zeit|temps|tiempo|tempo|x-axis|x|t|s|seconds?)", re.IGNORECASE)
+COUNT_NAMES = re.compile(r"(x|sequence|sample|index|nr|no|n|#)", re.IGNORECASE)
+UNITS: Mapping[str, tuple[str, float]] = {
+    **dict.fromkeys(("s", "sec", "second", "seconds", "sekunden", "secondes"), ("s", 1.0)),
+    "ms": ("s", 1e-3),
+    **dict.fromkeys(("us", "µs", "μs"), ("s", 1e-06)),
+    "ns": ("s", 1e-9),
+    "ps": ("s", 1e-12),
+    **dict.fromkeys(("v", "volt", "volts", "value"), ("V", 1.0)),
+    "mv": ("V", 1e-3),
+    **dict.fromkeys(("uv", "µv", "μv"), ("V", 1e-06)),
+    "kv": ("V", 1e3),
+    "sequence": ("count", 1.0),
+}
+"""What is measured, and in how much of its SI unit, by the words of scopes in lower case."""
+KINDS = (
+    (r"increment|tinc\s*=|time\(s\)\|ch\d", "Rigol CSV"),
+    (r"x-axis", "Keysight CSV"),
+    (r"analog:|second\|val|second\|volt", "Siglent CSV"),
+    (r"yzero|time\|ch\d|vertical units", "Tektronix CSV"),
+    (r"(channel|kanal|canal|voie|canale) [a-h]\b", "PicoScope CSV"),
+)
+"""Formats by what their headers have, in lower case with "|" between cells: the first that fits."""
+UNEVEN = 0.75
+"""Of a step, or of the digits that the times are written with: how far a time may be off."""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column of a table. measure : "s", "V", "count" or "" where nothing says it."""
+
+    name: str
+    measure: str
+    values: Array
+
+
+def read_record(path: Path | str) -> Record:
+    """The record in a file: CSV of an oscilloscope, ``.npy``, ``.npz`` or plain columns.
+
+    An ``.npy`` is an array (k, c) whose first column is the time [s], or one with named fields; an
+    ``.npz`` has a named array (k,) for each channel and ``time`` (or ``t``), or ``Tstart`` and
+    ``Tinterval`` as PicoScope writes them.
+
+    Raises
+    ------
+    InputError : the file is none of these, its times are not at equal intervals, or it is shorter
+        than `FEWEST_SAMPLES`; names file, line or array, found and expected.
+    """
+    path = Path(path)
+    if path.suffix in (".npy", ".npz"):
+        return _of_arrays(path)
+    columns = read_columns(path)
+    named = _named(columns, path)
+    start, interval = _increments(columns.header)
+    return _record(path, named, start, interval, _kind(columns.header), columns.line)
+
+
+def _record(
+    path: Path,
+    columns: Sequence[_Column],
+    start: float | None,
+    interval: float | None,
+    kind: str,
+    line: int | None = None,
+) -> Record:
+    """The record of these columns. start, interval : of the times [s], where the header says them;
+    line : of the file where the numbers begin."""
+    times = [c for c in columns if c.measure == "s"]
+    voltages = [c for c in columns if c.measure in ("V", "")]
+    if not times and interval is None:
+        raise InputError(path, "its times", MISSING, "a column of times, or their step in a header")
+    if not voltages:
+        raise InputError(path, "its channels", MISSING, "a column of volts beside the times")
+    count = len(columns[0].values)
+    if count < FEWEST_SAMPLES:
+        raise InputError(path, "its samples", count, f"at least {FEWEST_SAMPLES}")
+    steps = np.arange(count, dtype=np.float64)
+    time = (start or 0.0) + (interval or 0.0) * steps
+    if times:
+        time = _even(times[0].values, path, line)
+    return Record(time, {c.name: c.values for c in voltages}, path.name, kind)
+
+
+def _even(times: Array, path: Path, line: int | None) -> Array:
+    """(k,) equal steps through these times.
+
+    Scopes write times with few digits: a step may be smaller than the last of them.
+    """
+    k = np.arange(len(times))
+    step, begin = np.polyfit(k, times, 1)
+    gaps = np.abs(np.diff(times))
+    digit = float(gaps[gaps > 0.0].min()) if (gaps > 0.0).any() else 0.0
+    allowed = UNEVEN * max(abs(float(step)), digit)
+    off = np.abs(times - begin - step * k)
+    if not step > 0.0 or float(off.max()) > allowed:
+        worst = int(np.argmax(off)) if step > 0.0 else 0
+        place = f"sample {worst}" if line is None else f"line {line + worst}"
+        expected = "times at equal steps: one record without gaps, not segments one after the other"
+        raise InputError(path, place, f"{times[worst]:.9g} s", expected)
+    return np.asarray(begin + step * k)
+
+
+# -- text -------------------------------------------------------------------------------------
+
+
+def _named(columns: TextColumns, path: Path) -> list[_Column]:
+    """The columns with their names, in volts and seconds, by the words of the header."""
+    names, units = _words(columns)
+    found, taken = [], set()
+    for k, place in enumerate(columns.places):
+        name, unit = names[k], units[k] or _unit_in(names[k])
+        measure, factor = _measure(unit, path)
+        plain = re.sub(r"\s*[(\[].*[)\]]\s*", "", name).strip()
+        if not measure and COUNT_NAMES.fullmatch(plain) and _counts(columns.values[:, k]):
+            measure = "count"
+        elif not measure and TIME_NAMES.fullmatch(plain):
+            measure = "s"
+        label = plain or f"column {place + 1}"
+        label = label if label not in taken else f"{label} in column {place + 1}"
+        taken.add(label)
+        found.append(_Column(label, measure, columns.values[:, k] * factor))
+    first = found[0]
+    has_time = any(c.measure in ("s", "count") for c in found)
+    if not has_time and len(found) > 1 and bool((np.diff(first.values) > 0.0).all()):
+        found[0] = _Column(first.name, "s", first.values)
+    return found
+
+
+def _counts(values: Array) -> bool:
+    """Whether a column numbers its rows."""
+    return bool((np.diff(values) == 1.0).all())
+
+
+def _words(columns: TextColumns) -> tuple[list[str], list[str]]:
+    """Name and unit of each column, "" where the header has none."""
+    width = len(columns.places)
+    names, units = [""] * width, [""] * width
+    for cells in columns.header:
+        row = [cells[k] if k < len(cells) else "" for k in columns.places]
+        if not all(row) or any(NUMBER.fullmatch(cell) for cell in row[:1]):
+            continue
+        if _bare(row[0]) in UNITS:
+            units = row
+        else:
+            names = row
+    source = next((c[1:] for c in columns.header if c[:1] and c[0].lower() == "source"), ())
+    if source and (not any(names) or names[0].lower() == "source"):
+        channels = [cell for cell in source if cell and not NUMBER.fullmatch(cell)]
+        names = ["", *channels, *([""] * width)][:width]
+    return names, units
+
+
+def _bare(word: str) -> str:
+    return word.strip().strip("()[]").strip().lower()
+
+
+def _unit_in(name: str) -> str:
+    """The unit that stands in brackets in a name."""
+    found = re.search(r"[(\[]([^)\]]*)[)\]]", name)
+    return found[1] if found else ""
+
+
+def _measure(unit: str, path: Path) -> tuple[str, float]:
+    """What is measured and the factor to its SI unit; "" without a unit."""
+    if not unit:
+        return "", 1.0
+    if _bare(unit) not in UNITS:
+        raise InputError(path, "the unit of a column", unit, "volts (V, mV, …) or seconds")
+    return UNITS[_bare(unit)]
+
+
+def _increments(header: Iterable[Sequence[str]]) -> tuple[float | None, float | None]:
+    """First time and step [s] where the header says them beside the columns."""
+    rows = [list(cells) for cells in header]
+    text = "|".join(cell for cells in rows for cell in cells)
+    start = re.search(r"\bt0\s*=\s*([-+.\de]+)", text, re.IGNORECASE)
+    step = re.search(r"\btinc\s*=\s*([-+.\de]+)", text, re.IGNORECASE)
+    for above, below in pairwise(rows):
+        if "Increment" in above and "Start" in above:
+            values = dict(zip(above, below, strict=False))
+            return _number(values.get("Start", "")), _number(values.get("Increment", ""))
+    return _number(start[1] if start else ""), _number(step[1] if step else "")
+
+
+def _number(cell: str) -> float | None:
+    return float(cell) if NUMBER.fullmatch(cell) else None
+
+
+def _kind(header: Iterable[Sequence[str]]) -> str:
+    text = "|".join(cell.lower() for cells in header for cell in cells)
+    return next((kind for pattern, kind in KINDS if re.search(pattern, text)), "columns")
+
+
+# -- arrays -----------------------------------------------------------------------------------
+
+
+def _of_arrays(path: Path) -> Record:
+    with reading(path, "arrays of numbers, as NumPy writes them"):
+        stored = np.load(path, allow_pickle=False)
+        if path.suffix == ".npz":
+            with stored:
+                arrays = {name: np.atleast_1d(stored[name]) for name in stored.files}
+        elif stored.dtype.names:
+            arrays = {name: stored[name] for name in stored.dtype.names}
+        else:
+            table = np.atleast_2d(stored)
+            table = table if table.shape[0] >= table.shape[1] else table.T
+            arrays = {"time" if k == 0 else f"column {k + 1}": c for k, c in enumerate(table.T)}
+        arrays = {name: np.asarray(values, dtype=np.float64) for name, values in arrays.items()}
+    start, interval = (_single(arrays, name) for name in ("Tstart", "Tinterval"))
+    _single(arrays, "Length")
+    return _record(path, _checked(arrays, path), start, interval, "NumPy")
+
+
+def _single(arrays: dict[str, Any], name: str) -> float | None:
+    """A named number, taken out of the arrays."""
+    return float(arrays.pop(name).ravel()[0]) if name in arrays else None
+
+
+def _checked(arrays: Mapping[str, Array], path: Path) -> list[_Column]:
+    """Named arrays as columns of one length and finite numbers."""
+    if not arrays:
+        raise InputError(path, "its arrays", MISSING, EXPECTED)
+    count = max(values.size for values in arrays.values())
+    for name, values in arrays.items():
+        if values.shape != (count,):
+            raise InputError(path, name, f"shape {values.shape}", f"({count},), as the longest")
+        if not np.isfinite(values).all():
+            bad = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise InputError(path, f"{name}[{bad}]", float(values[bad]), "a finite number")
+    return [
+        _Column(name, "s" if name.lower() in ("t", "time") else "V", values)
+        for name, values in arrays.items()
+    ]
