@@ -11,11 +11,13 @@ from .board_parts import (
     trimmed_clearance as trimmed_clearance,
 )
 from .bom import (
+    Line as Line,
     bill as bill,
     bill_csv as bill_csv,
     bill_of_materials as bill_of_materials,
 )
 from .bom_layouts import (
+    Layout as Layout,
     file_of as file_of,
     layouts as layouts,
 )
@@ -37,6 +39,7 @@ from .kicad_names import (
     circuit_net as circuit_net,
     footprint_name as footprint_name,
     identifier as identifier,
+    project_name as project_name,
 )
 from .kicad_placement import (
     place as place,

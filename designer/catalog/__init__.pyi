@@ -53,6 +53,7 @@ from .output_stage import (
     saturation_resistance as saturation_resistance,
 )
 from .read import (
+    FABS as FABS,
     LAYOUTS as LAYOUTS,
 )
 from .vendor_model import (

@@ -58,7 +58,8 @@ class Catalog:
     references: tuple[ReferenceEntry, ...]
     """Shunt voltage references that can be bought."""
     hash: str
-    """Hash of the content of all files, wherever they lie, layouts of bills among them."""
+    """Hash of the content of all files, wherever they lie, layouts of bills and fabs
+    among them."""
     folders: tuple[Path, ...]
     """The folders that were read, in order."""
     trimmers: tuple[TrimmerEntry, ...] = ()

@@ -54,6 +54,8 @@ ENVIRONMENT = "DESIGNER_CATALOGS"
 """Environment variable: folders to search first, separated as in PATH."""
 LAYOUTS = "bom-layouts"
 """Folder of layouts beside the catalogue's files (``board.bom_layouts``)."""
+FABS = "fabs"
+"""Folder of makers of boards beside the catalogue's files (``fabrication.fab``)."""
 _MAX_BYTES = 4_000_000
 
 
@@ -117,8 +119,9 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
                 twice.append(InputError(path, "name", entry.name, expected))
             by_key[key] = entry
         _raise(twice)
-    for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
-        _digest(digest, f"{LAYOUTS}/{path.name}", read_bytes(path, "a layout that can be read"))
+    for inner in (LAYOUTS, FABS):
+        for path in sorted((folder / inner).glob("*.toml"), key=lambda each: each.name):
+            _digest(digest, f"{inner}/{path.name}", read_bytes(path, "a file that can be read"))
     return by_key
 
 

@@ -349,6 +349,14 @@ def files(folder: Path, reused: bool) -> None:
     say(f"{folder}: {how}")
 
 
+def exported(folder: Path, reused: bool, refused: Sequence[str]) -> None:
+    """Where the files are, or why an order is refused."""
+    if refused:
+        say("\n".join(["No order is written, since the board is not finished:", *refused]))
+    else:
+        files(folder, reused)
+
+
 def untrusted(trust: Mapping[str, Any]) -> list[str]:
     """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
     results = {quantity: result for quantity, result in trust.items() if result is not None}

@@ -88,7 +88,7 @@ def _designer(
 
 def _surroundings() -> Iterator[tuple[str, str]]:
     """The programs that verbs call and the cores that they use, as they are on this machine."""
-    from designer.design_rules.kicad_drc import kicad_version
+    from designer.design_rules.kicad_program import kicad_version
     from designer.spice.batch_backend import program_version
 
     yield "Python", platform.python_version()
@@ -417,16 +417,40 @@ def export(
             "Instead: a deck for another simulator, with every response. May come twice.",
         ),
     ] = None,
+    fab: Annotated[
+        list[str] | None,
+        option(
+            "--fab",
+            "NAME",
+            "Instead: what a maker of boards is sent, such as jlcpcb or generic: Gerbers, holes, "
+            "positions, bill. Needs KiCad 9 and a routed board. May come twice.",
+        ),
+    ] = None,
+    board: Annotated[
+        Path | None,
+        option("--board", "FILE", "The board for --fab, a .kicad_pcb [the folder's own]."),
+    ] = None,
     **shared: Any,
 ) -> Output:
-    """Write the KiCad project (schematic, placed board, netlist), or decks for simulators."""
+    """Write the KiCad project (schematic, placed board, netlist), decks, or orders of boards."""
     from designer.cli import tables
     from designer.jobs import export_job
 
     result = export_job.export(
-        model, out, deck=[name.value for name in deck or ()], progress=session.progress, **shared
+        model,
+        out,
+        deck=[name.value for name in deck or ()],
+        fab=fab or (),
+        board=board,
+        progress=session.progress,
+        **shared,
     )
-    return Output(result.answer, lambda: tables.files(result.folder, result.reused))
+    refused = result.answer.get("refused", [])
+    return Output(
+        result.answer,
+        lambda: tables.exported(result.folder, result.reused, refused),
+        result.passed,
+    )
 
 
 @verb("Make", "designer rules out/model --board out/model/kicad/model.kicad_pcb")

@@ -10,10 +10,7 @@ says of them counts.
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -28,13 +25,8 @@ from designer.board.kicad_names import circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CANARY, CustomRule, canary, rules_text
 from designer.design_rules.drc_specimen import canary_track, specimen
+from designer.design_rules.kicad_program import KicadFailed, call, last_words, needed_version
 
-PROGRAM = "kicad-cli"
-MISSING = "kicad-cli is not installed (KiCad 9)"
-NEEDED = 9
-"""KiCad's major version: older ones write another report."""
-PATIENCE = 600.0
-"""Seconds that a check may take; past it the rules are not run."""
 ASIDE = (-100.0, -100.0)
 """Where the canary's track lies [mm], from the board's uppermost, leftmost pad."""
 
@@ -77,35 +69,14 @@ class DesignRuleCheck:
     """Places where copper of two nets touches, in KiCad's words."""
 
 
-class CheckFailed(Exception):
-    """KiCad gave no answer that counts; says why."""
-
-
-def kicad_version() -> str | None:
-    """The version of the installed ``kicad-cli``; None where there is none."""
-    if shutil.which(PROGRAM) is None:
-        return None
-    try:
-        process = subprocess.run(
-            [PROGRAM, "--version"], capture_output=True, text=True, timeout=60, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return process.stdout.strip() or None
-
-
 def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
     """Check a board against the rules.
 
     Raises
     ------
-    CheckFailed : no KiCad, one that is too old, no report, or rules that KiCad has dropped.
+    KicadFailed : no KiCad, one that is too old, no report, or rules that KiCad has dropped.
     """
-    version = kicad_version()
-    if version is None:
-        raise CheckFailed(MISSING)
-    if not version.split(".")[0].isdigit() or int(version.split(".")[0]) < NEEDED:
-        raise CheckFailed(f"kicad-cli {version} is older than KiCad {NEEDED}")
+    version = needed_version()
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
         place = Path(scratch)
         text = rules_text([*rules, canary()])
@@ -115,7 +86,7 @@ def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
         reported |= {SHORT} if _shorts(broken) else set()
         answer = report(_with_canary(board), text, place / "board")
     if not any(_is_canary(v) for v in answer["violations"]):
-        raise CheckFailed("KiCad has dropped the custom rules: a planted violation went unreported")
+        raise KicadFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
         version,
         violations(answer, rules),
@@ -130,37 +101,23 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
 
     Raises
     ------
-    CheckFailed : there is none.
+    KicadFailed : there is none.
     """
     place.mkdir()
     (place / "board.kicad_pcb").write_text(board, encoding="utf-8")
     (place / "board.kicad_dru").write_text(rules, encoding="utf-8")
     out = place / "report.json"
     options = ["--format", "json", "--units", "mm", "--severity-all", "--output", str(out)]
-    environment = {"HOME": str(place), "KICAD_CONFIG_HOME": str(place / "config"), "LC_ALL": "C"}
+    process = call("pcb", "drc", *options, str(place / "board.kicad_pcb"), place=place)
+    if not out.is_file():
+        raise KicadFailed(f"kicad-cli wrote no report: {last_words(process)}")
     try:
-        process = subprocess.run(
-            [PROGRAM, "pcb", "drc", *options, str(place / "board.kicad_pcb")],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            env={**os.environ, **environment},
-            timeout=PATIENCE,
-            check=False,
-        )
         answer = parse_json(out.read_bytes(), out)
-    except subprocess.TimeoutExpired:
-        raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
-    except OSError:
-        lines = (process.stderr or process.stdout).strip().splitlines()
-        raise CheckFailed(
-            f"kicad-cli wrote no report: {lines[-1] if lines else 'no reason'}"
-        ) from None
     except InputError:
-        raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
+        raise KicadFailed("kicad-cli wrote a report that is no JSON") from None
     lists = ("violations", "unconnected_items")
     if not isinstance(answer, dict) or not all(isinstance(answer.get(n), list) for n in lists):
-        raise CheckFailed("kicad-cli wrote a report of another kind")
+        raise KicadFailed("kicad-cli wrote a report of another kind")
     return answer
 
 

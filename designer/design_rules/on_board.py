@@ -35,11 +35,11 @@ from designer.design_rules import on_parts
 from designer.design_rules.kicad_drc import (
     OPEN,
     SHORT,
-    CheckFailed,
     DesignRuleCheck,
     Violation,
     check,
 )
+from designer.design_rules.kicad_program import KicadFailed
 
 NO_BOARD = "no board was given (--board FILE)"
 NOT_UNDERSTOOD = "KiCad does not report a board that breaks this rule"
@@ -68,7 +68,7 @@ def checked(
     """Every rule on a board, with KiCad where that is installed and answers."""
     try:
         answer: DesignRuleCheck | str = check(board, rules)
-    except CheckFailed as why:
+    except KicadFailed as why:
         answer = str(why)
     return on_board(board, components, rules, overrides, answer)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from designer.base.progress import doing
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit
-from designer.board.bom import bill, bill_csv
+from designer.board.bom import Line, bill, bill_csv
 from designer.board.bom_layouts import file_of, layouts
 from designer.board.component import Component, components, pin_numbers, to_buy
 from designer.check.synthesis_result import Synthesis
@@ -48,12 +48,18 @@ def bills(synthesis: Synthesis) -> dict[str, str]:
     return _bills(synthesis, components(circuit, synthesis.catalog, choice), choice)
 
 
+def bought(synthesis: Synthesis) -> tuple[Line, ...]:
+    """The lines of the bill; raises as ``texts`` does."""
+    circuit, choice = board_circuit(synthesis)
+    return bill(to_buy(components(circuit, synthesis.catalog, choice), choice))
+
+
 def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
-    bought = bill(to_buy(parts, choice))
+    lines = bill(to_buy(parts, choice))
     others = layouts(synthesis.modelfile.board.bom, synthesis.catalog.folders)
     return {
-        BILL: bill_csv(bought),
-        **{layout.file: layout.csv(bought) for layout in others},
+        BILL: bill_csv(lines),
+        **{layout.file: layout.csv(lines) for layout in others},
     }
 
 

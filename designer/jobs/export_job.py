@@ -1,26 +1,38 @@
-"""The verb ``export``: the KiCad project of a design, or decks for other simulators.
+"""The verb ``export``: the KiCad project of a design, decks, or what a fab is sent.
 
-Both are stages of the design folder: a stage for each deck, so that one may come later.
+All are stages of the design folder: a stage for each deck, so that one may come later, and one for
+the orders to all fabs, which grows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN
+from designer.base.design_folder import DESIGN, Folder
+from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.frames import table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
+from designer.base.seal import sha256
 from designer.base.version import __version__
+from designer.board.bom_layouts import layouts
+from designer.board.kicad_names import project_name
+from designer.board.kicad_reader import BoardFile, read_board
+from designer.catalog.catalog import load_catalog
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import kicad_files
+from designer.design_rules.kicad_program import KicadFailed, needed_version
+from designer.fabrication.fab import Fab, fabs
+from designer.fabrication.order import BoardOrder, order_files
+from designer.fabrication.order_refusal import not_checked, refusals
+from designer.jobs import board_files, kicad_files
 from designer.jobs.design_files import design_provenance
 from designer.jobs.design_source import design_inputs_of, source
 from designer.jobs.options import Options
+from designer.jobs.rules_job import checked
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
 from designer.spice import simulator_decks
@@ -30,6 +42,9 @@ DECK_STAGES: Mapping[Dialect, StageName] = {
     "ltspice": "deck-ltspice",
     "portable": "deck-portable",
 }
+ORDER_STAGE: StageName = "fabrication"
+ORDERS = "fabrication"
+"""Folder of what fabs are sent, one folder in it for each."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,11 @@ class ExportResult:
     """The design folder."""
     reused: bool
     """Whether every file was there already."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything was written; False where an order is refused."""
+        return not self.answer.get("refused")
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -57,23 +77,34 @@ def export(
     out: Path | str | None = None,
     *,
     deck: Sequence[Dialect] = (),
+    fab: Sequence[str] = (),
+    board: Path | str | None = None,
     overwrite: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> ExportResult:
-    """The verb ``export``: the KiCad project of a design, or decks for other simulators.
+    """The verb ``export``: the KiCad project of a design, decks for other simulators, or orders.
 
-    model : a design folder, or a model file with ``out``. deck : "ltspice", "portable" or both;
-    the KiCad project if empty.
+    model : a design folder, or a model file with ``out``. deck : "ltspice", "portable" or both.
+    fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
+    project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
 
     Raises
     ------
-    InputError : a footprint that is not known here, files that somebody has changed, or decks of
-        another design or version.
+    InputError : a footprint that is not known here, files that somebody has changed, decks of
+        another design or version, an unknown fab, or a board of another design.
+    EnvironmentMissing : with ``fab``, no KiCad 9.
     """
     options = Options(overwrite=overwrite, resume=resume)
     progress = Progress() if progress is None else progress
+    if deck and fab:
+        raise InputError(None, "--fab", ", ".join(fab), "no --deck beside it: one after the other")
+    if board is not None and not fab:
+        raise InputError(None, "--board", str(board), "a fab that it is for: --fab NAME")
     modelfile, folder = source(model, out)
+    if fab:
+        file = None if board is None else Path(board)
+        return export_orders(modelfile, folder, fab, file, options, progress)
     if deck:
         return export_decks(modelfile, folder, deck, options, progress)
     return export_into(modelfile, folder, options, progress)
@@ -121,6 +152,96 @@ def export_decks(
                 _, name = names[stage]
                 folder.write(name, texts[name])
     return _result(runner, [name for _, name in names.values()], reused and not todo)
+
+
+def export_orders(
+    modelfile: ModelFile,
+    out: Path,
+    names: Sequence[str],
+    file: Path | None,
+    options: Options,
+    progress: Progress,
+) -> ExportResult:
+    """Write what fabs are sent into a design folder, which is made where there is none.
+
+    file : the board; None for the folder's own. An order that the rules forbid is refused: nothing
+    is written, and the answer says why.
+    """
+    try:
+        version = needed_version()
+    except KicadFailed as why:
+        raise EnvironmentMissing(f"{why}: --fab needs it") from None
+    fabs(names, load_catalog().folders)
+    runner, synthesis, _ = _design(modelfile, out, options, progress)
+    folder, board = runner.folder, _board(runner, file, progress)
+    inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
+    inputs["fabs"] = _fabs_with_earlier(folder, inputs, names)
+    # What stands in the way is known before any work.
+    if not folder.decide({ORDER_STAGE: (inputs, [])}, **_ways(options)):
+        return _ordered(runner, names, True)
+    progress.stage("design rules")
+    outcomes = checked(synthesis, board).outcomes
+    if reasons := refusals(outcomes):
+        answer = _result(runner, [], False).answer
+        refused = {**answer, "fabs": list(names), "refused": list(reasons)}
+        return ExportResult(refused, folder.path, False)
+    progress.stage("Gerbers, holes, positions")
+    name = project_name(modelfile.title)
+    bought = board_files.bought(synthesis)
+    order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes))
+    files = _order_texts(order, fabs(inputs["fabs"], runner.catalog.folders), runner)
+    stages: Stages = {ORDER_STAGE: (inputs, list(files))}
+    folder.decide(stages, **_ways(options))
+    with folder.working(stages, design_provenance(synthesis)):
+        for path, content in files.items():
+            folder.write(path, content)
+    return _ordered(runner, names, False)
+
+
+def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardFile:
+    """The board that is named, else the folder's own, whoever has routed it."""
+    name = project_name(runner.modelfile.title)
+    own = runner.folder / f"{kicad_files.FOLDER}/{name}.kicad_pcb"
+    if file is None and not own.is_file():
+        export_into(runner.modelfile, runner.folder.path, replace(runner.options), progress)
+    return read_board(own if file is None else file)
+
+
+def _ways(options: Options) -> dict[str, bool]:
+    return {"overwrite": options.overwrite, "resume": options.resume}
+
+
+def _fabs_with_earlier(
+    folder: Folder, inputs: Mapping[str, Any], names: Sequence[str]
+) -> list[str]:
+    """These fabs, with those that the same board stands there for already."""
+    stages = {} if folder.manifest is None else folder.manifest.stages
+    there = dict(stages[ORDER_STAGE].inputs) if ORDER_STAGE in stages else {}
+    earlier = there.pop("fabs", [])
+    return sorted({*names, *(earlier if there == inputs else [])})
+
+
+def _order_texts(order: BoardOrder, wanted: Sequence[Fab], runner: StageRunner) -> dict[str, bytes]:
+    """Every file of the orders, by its name inside the design folder."""
+    files: dict[str, bytes] = {}
+    for fab in wanted:
+        (layout,) = layouts([fab.table.bom], runner.catalog.folders)
+        try:
+            content = order_files(order, fab, layout)
+        except KicadFailed as why:
+            raise EnvironmentMissing(str(why)) from None
+        files |= {f"{ORDERS}/{fab.name}/{name}": text for name, text in content.items()}
+    return files
+
+
+def _ordered(runner: StageRunner, names: Sequence[str], reused: bool) -> ExportResult:
+    """The answer with the files of these fabs."""
+    assert runner.folder.manifest is not None
+    folders = tuple(f"{ORDERS}/{name}/" for name in names)
+    files = [name for name in runner.folder.manifest.files if name.startswith(folders)]
+    result = _result(runner, files, reused)
+    answer = {**result.answer, "fabs": list(names), "refused": []}
+    return replace(result, answer=answer)
 
 
 def deck_text(synthesis: Synthesis, dialect: Dialect) -> str:

@@ -25,7 +25,7 @@ from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board as rule_board, rule_reports, run_rules
-from designer.design_rules.kicad_drc import kicad_version
+from designer.design_rules.kicad_program import kicad_version
 from designer.design_rules.subject import RuleSubject
 from designer.jobs.design_source import read_design
 from designer.jobs.origin import provenance

@@ -25,7 +25,8 @@ from designer.board.kicad_rules import CustomRule, rules_text, spacing
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
 from designer.design_rules import drc_specimen, kicad_drc, on_board
-from designer.design_rules.kicad_drc import CheckFailed, DesignRuleCheck
+from designer.design_rules.kicad_drc import DesignRuleCheck
+from designer.design_rules.kicad_program import KicadFailed
 from designer.jobs import kicad_files, rules_job
 from tests.circuit.test_reduction import EXACT
 from tests.shared.rule_cases import base
@@ -572,7 +573,7 @@ def test_a_kicad_that_gives_no_answer_passes_nothing(
 ) -> None:
     program(tmp_path, script)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    with pytest.raises(CheckFailed, match=said):
+    with pytest.raises(KicadFailed, match=said):
         kicad_drc.check(board_of(drawn(), tmp_path), custom())
     found = looked(drawn(), tmp_path)
     assert {found[id_].status for id_ in (*BY_KICAD, *BY_REPORT)} == {NOT_RUN}
@@ -741,7 +742,7 @@ def test_one_syntax_error_drops_every_rule_and_is_noticed(
     clean = kicad_drc.report(text, damaged(custom()), tmp_path / "damaged")
     assert kicad_drc.violations(clean, custom()) == ()
     monkeypatch.setattr(kicad_drc, "rules_text", damaged)
-    with pytest.raises(CheckFailed, match="dropped the custom rules"):
+    with pytest.raises(KicadFailed, match="dropped the custom rules"):
         kicad_drc.check(board_of(drawn(), tmp_path), custom())
     found = looked(drawn(), tmp_path)
     assert {found[id_].status for id_ in BY_KICAD} == {NOT_RUN}

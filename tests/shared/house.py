@@ -26,6 +26,7 @@ ORDER = (
     "board",
     "yields",
     "design_rules",
+    "fabrication",
     "centering",
     "fidelity",
     "workbench",

@@ -1,0 +1,98 @@
+"""The files of one order, by name: what is uploaded, what a person reads, and their hashes."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from designer.base.csv_tables import csv_text
+from designer.base.seal import sha256
+from designer.board.bom import Line
+from designer.board.bom_layouts import Layout
+from designer.board.kicad_reader import BoardFile
+from designer.fabrication.board_facts import board_facts
+from designer.fabrication.fab import Fab, PositionField
+from designer.fabrication.kicad_plot import PartPosition, plot
+from designer.fabrication.order_notes import notes
+
+GERBERS = "gerbers"
+"""Folder of the plotted files."""
+NOTES, HASHES = "README.md", "SHA256SUMS"
+FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+"""Date of the files in the archive: the earliest that its format knows."""
+
+
+@dataclass(frozen=True)
+class BoardOrder:
+    """A board that is to be ordered."""
+
+    name: str
+    """Of the files: the project's."""
+    title: str
+    """Title of the model file, as it is."""
+    board: BoardFile
+    """The board."""
+    bought: Sequence[Line]
+    """Its bill."""
+    not_checked: Sequence[str]
+    """Rules that were not run, with the reason of each."""
+
+
+def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]:
+    """Every file of the order, by its name inside the fab's folder.
+
+    layout : of the fab's bill.
+
+    Raises
+    ------
+    KicadFailed : kicad-cli gives no files.
+    """
+    plots = plot(order.board, order.name, fab.table.protel_names)
+    placed = {part.reference for part in plots.positions}
+    files = {
+        **{f"{GERBERS}/{name}": content for name, content in plots.gerbers.items()},
+        f"{order.name}-gerbers.zip": packed(plots.gerbers),
+        f"{order.name}-positions.csv": positions_csv(plots.positions, fab).encode("utf-8"),
+        f"{order.name}-bom.csv": layout.csv(order.bought).encode("utf-8"),
+    }
+    wired = [d for one in order.bought for d in one.designators if d not in placed]
+    text = notes(order.title, order.name, fab, board_facts(order.board), wired, order.not_checked)
+    files[NOTES] = text.encode("utf-8")
+    files[HASHES] = "".join(
+        f"{sha256(content)}  {name}\n" for name, content in sorted(files.items())
+    ).encode("ascii")
+    return files
+
+
+def packed(files: Mapping[str, bytes]) -> bytes:
+    """A zip archive of files, the same bytes for the same files."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, FIRST_DAY)
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
+    return out.getvalue()
+
+
+def positions_csv(parts: Sequence[PartPosition], fab: Fab) -> str:
+    """The position file in the fab's columns; places in mm, angles in degrees."""
+    columns = fab.table.column
+    rows = [{column.title: _cell(column.field, part, fab) for column in columns} for part in parts]
+    return csv_text([column.title for column in columns], rows)
+
+
+def _cell(field: PositionField, part: PartPosition, fab: Fab) -> str:
+    turned = fab.rotation(part.package, part.degrees, part.bottom)
+    cells: dict[PositionField, str] = {
+        "reference": part.reference,
+        "value": part.value,
+        "package": part.package,
+        "x": f"{part.at[0]:.4f}",
+        "y": f"{part.at[1]:.4f}",
+        "rotation": f"{turned:g}",
+        "side": fab.side(part.bottom),
+    }
+    return cells[field]

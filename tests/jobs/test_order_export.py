@@ -1,0 +1,125 @@
+"""``export --fab``: refused until the board is finished, then written once and stated in full."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from designer.catalog.design_rule import NOT_RUN, PASS, RuleOutcome
+from designer.catalog.design_rules import RULES
+from designer.jobs import export_job
+from designer.jobs.rules_job import RulesAnswer
+from tests.jobs.test_kicad_export import MODEL, Done, designer, snapshot
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A design folder with a board that nobody has routed."""
+    place = tmp_path_factory.mktemp("order")
+    (place / "pair.toml").write_text(MODEL, encoding="utf-8")
+    done = designer("export", place / "pair.toml", "--out", place / "design")
+    assert done.returncode == 0, done.stderr
+    return place / "design"
+
+
+def finished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every rule pass, as on a routed board, but for one that nobody can check here."""
+    outcomes = tuple(
+        RuleOutcome(rule, NOT_RUN if rule.id == "slew" else PASS, "told so") for rule in RULES
+    )
+    monkeypatch.setattr(export_job, "checked", lambda *_: RulesAnswer(outcomes, "9"))
+
+
+def ordered(folder: Path, *options: str | Path) -> Done:
+    return designer("export", folder, *options, "--json")
+
+
+@pytest.mark.kicad
+def test_an_unrouted_board_is_not_ordered(made: Path) -> None:
+    before = snapshot(made)
+    done = ordered(made, "--fab", "jlcpcb")
+    assert done.returncode == 1, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["files"], answer["fabs"]) == ([], ["jlcpcb"])
+    (reason,) = (r for r in answer["refused"] if r.startswith("unconnected"))
+    assert "nothing is routed yet" in reason
+    assert snapshot(made) == before
+
+
+@pytest.mark.kicad
+def test_orders_are_written_once_and_grow_by_a_fab(
+    made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finished(monkeypatch)
+    done = ordered(made, "--fab", "jlcpcb")
+    assert done.returncode == 0, done.stderr
+    first = json.loads(done.stdout)["files"]
+    names = {name.removeprefix("fabrication/jlcpcb/") for name in first}
+    assert names >= {"README.md", "SHA256SUMS", "linear-pair-gerbers.zip", "linear-pair-bom.csv",
+                     "linear-pair-positions.csv", "gerbers/linear-pair-F_Cu.gtl"}  # fmt: skip
+    before = snapshot(made)
+    monkeypatch.setattr(export_job, "checked", None)  # nothing is checked or plotted again
+    assert json.loads(ordered(made, "--fab", "jlcpcb").stdout)["files"] == first
+    assert snapshot(made) == before
+    finished(monkeypatch)
+    done = ordered(made, "--fab", "generic")
+    assert done.returncode == 0, done.stderr
+    assert all(n.startswith("fabrication/generic/") for n in json.loads(done.stdout)["files"])
+    manifest = json.loads((made / "manifest.json").read_text())
+    assert manifest["stages"]["fabrication"]["inputs"]["fabs"] == ["generic", "jlcpcb"]
+    listed = {n for n, f in manifest["files"].items() if f["stage"] == "fabrication"}
+    assert listed == {
+        str(p.relative_to(made)) for p in (made / "fabrication").rglob("*") if p.is_file()
+    }
+    assert {n: c for n, c in snapshot(made).items() if "jlcpcb/" in n} == {
+        n: c for n, c in before.items() if "jlcpcb/" in n
+    }
+
+
+@pytest.mark.kicad
+def test_another_board_is_ordered_with_overwrite_alone(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finished(monkeypatch)
+    assert ordered(made, "--fab", "jlcpcb", "--fab", "generic").returncode == 0
+    own = made / "kicad" / "linear-pair.kicad_pcb"
+    moved = tmp_path / "mine.kicad_pcb"
+    moved.write_bytes(own.read_bytes() + b"\n")
+    done = ordered(made, "--fab", "generic", "--board", moved)
+    assert done.returncode == 2
+    assert "--overwrite" in done.stderr
+    done = ordered(made, "--fab", "generic", "--board", moved, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert not (made / "fabrication" / "jlcpcb").exists(), "an order of another board"
+    assert (made / "fabrication" / "generic" / "README.md").is_file()
+
+
+def test_without_kicad_nothing_begins(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = snapshot(made)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    done = ordered(made, "--fab", "jlcpcb")
+    assert done.returncode == 3
+    assert "kicad-cli is not installed" in done.stderr
+    assert snapshot(made) == before
+
+
+@pytest.mark.kicad
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--fab", "jlpcb"], 'did you mean "jlcpcb"?'),
+        (["--fab", "jlcpcb", "--deck", "ltspice"], "--deck"),
+        (["--board", "some.kicad_pcb"], "--fab NAME"),
+        (["--fab", "generic", "--board", "some.kicad_pcb"], "some.kicad_pcb"),
+    ],
+)
+def test_wrong_options_are_named(made: Path, options: list[str], told: str) -> None:
+    before = snapshot(made)
+    done = ordered(made, *options)
+    assert done.returncode == 2, done.stderr
+    assert told in done.stderr
+    assert snapshot(made) == before
