@@ -12,6 +12,7 @@ from designer.base.natural_sort import natural_key
 from designer.base.views import View
 from designer.board.board_parts import Designed, board_circuit
 from designer.board.component import Component, components, to_buy
+from designer.catalog.stock_list import StockRow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,15 +70,18 @@ class Line:
     """Tolerance, as text."""
     substitute: str = ""
     """Another maker's part number, with the maker in front, or ""."""
+    stock: tuple[StockRow, ...] = ()
+    """As what distributors sell it, by their lists, in the order of these."""
 
     def cells(self) -> dict[str, str]:
         row = {name: str(getattr(self, name)) for name in COLUMNS}
         return {**row, "designators": " ".join(self.designators)}
 
 
-def bill(listed: Iterable[Component]) -> tuple[Line, ...]:
+def bill(listed: Iterable[Component], stock: Sequence[StockRow] = ()) -> tuple[Line, ...]:
     """What is bought of these components, like parts together: by kind, then by value.
 
+    stock : lists of distributors, the nearest first.
     The generator is an instrument and stands on no bill; nor does what is not fitted.
     """
     groups: dict[tuple[object, ...], list[Component]] = {}
@@ -87,7 +91,7 @@ def bill(listed: Iterable[Component]) -> tuple[Line, ...]:
             key = (component.kind, bought.manufacturer, bought.part_number)
             groups.setdefault(key, []).append(component)
     alike = sorted(groups.values(), key=lambda group: _place(group[0]))
-    return tuple(_line(group) for group in alike)
+    return tuple(_line(group, stock) for group in alike)
 
 
 def _place(component: Component) -> tuple[object, ...]:
@@ -95,10 +99,11 @@ def _place(component: Component) -> tuple[object, ...]:
     return KINDS.index(component.kind), component.quantity or 0.0, number
 
 
-def _line(alike: Sequence[Component]) -> Line:
+def _line(alike: Sequence[Component], stock: Sequence[StockRow]) -> Line:
     first = alike[0]
     bought = first.bought
     assert bought is not None
+    part = bought.part_number, first.kind, first.quantity, first.footprint, bought.grade
     words = [] if first.kind in ("resistor", "capacitor") else [c.description for c in alike]
     if first.kind != "op-amp":
         words += [c.role for c in alike]
@@ -115,6 +120,7 @@ def _line(alike: Sequence[Component]) -> Line:
         price_class=bought.price_class,
         grade="" if bought.grade is None else f"{bought.grade:.3g}",
         substitute=bought.substitute,
+        stock=tuple(row for row in stock if row.fits(*part)),
     )
 
 

@@ -26,9 +26,12 @@ from designer.base.schema import (
 )
 from designer.board.bom import COLUMNS, Line
 from designer.catalog.read import LAYOUTS
+from designer.catalog.stock_list import order_number
 
-FIELDS = (*COLUMNS, "package", "comment")
-"""What a column may show: a field of the bill; the footprint's name; value, grade and number."""
+ORDER_NUMBER = "order_number"
+FIELDS = (*COLUMNS, "package", "comment", ORDER_NUMBER)
+"""What a column may show: a field of the bill; the footprint's name; value, grade and number; a
+distributor's number."""
 _MAX_BYTES = 100_000
 _TEXT = such(
     "text of one line, possibly empty",
@@ -46,6 +49,8 @@ class LayoutColumn(FileTable):
     """One of ``FIELDS``; None for a column of one text."""
     text: Annotated[str | None, _TEXT] = None
     """Text of every cell, where ``field`` is None."""
+    distributor: Annotated[str | None, line("a distributor's name")] = None
+    """Whose number it shows, where ``field`` is "order_number"."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,8 @@ class Layout:
     def _cell(self, column: LayoutColumn, one: Line) -> str:
         if column.field is None:
             return column.text or ""
+        if column.field == ORDER_NUMBER:
+            return order_number(one.stock, column.distributor or "")
         if column.field == "designators":
             return self.separator.join(one.designators)
         if column.field == "package":
@@ -116,6 +123,10 @@ def _read(name: str, path: Path) -> Layout:
         if (column.field is None) == (column.text is None):
             value = "neither" if column.field is None else "both"
             raise InputError(path, f"columns[{number}]", value, "field or text")
+        if (column.distributor is not None) is not (column.field == ORDER_NUMBER):
+            stated = MISSING if column.distributor is None else column.distributor
+            expected = f'a distributor with field = "{ORDER_NUMBER}", and only there'
+            raise InputError(path, f"columns[{number}].distributor", stated, expected)
     titles = [column.title for column in table.columns]
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:

@@ -56,6 +56,11 @@ from .read import (
     FABS as FABS,
     LAYOUTS as LAYOUTS,
 )
+from .stock_list import (
+    StockRow as StockRow,
+    order_number as order_number,
+    stock_rows as stock_rows,
+)
 from .vendor_model import (
     VendorModel as VendorModel,
 )

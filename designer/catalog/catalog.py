@@ -36,8 +36,9 @@ from designer.catalog.entries import (
     Use,
     mounting_of,
 )
-from designer.catalog.read import Entry, read_folders
+from designer.catalog.read import STOCK, Entry, read_folders
 from designer.catalog.shortage import Offer, no_part, no_values, other_case
+from designer.catalog.stock_list import StockRow, read_stock
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same
 _NamedT = TypeVar("_NamedT", OpAmp, DiodeEntry, ReferenceEntry, PartFamily)
@@ -58,8 +59,8 @@ class Catalog:
     references: tuple[ReferenceEntry, ...]
     """Shunt voltage references that can be bought."""
     hash: str
-    """Hash of the content of all files, wherever they lie, layouts of bills and fabs
-    among them."""
+    """Hash of the content of all files, wherever they lie; layouts of bills, fabs and lists of
+    distributors are among them."""
     folders: tuple[Path, ...]
     """The folders that were read, in order."""
     trimmers: tuple[TrimmerEntry, ...] = ()
@@ -68,6 +69,8 @@ class Catalog:
     """Pin headers that can be bought."""
     prices: tuple[Price, ...] = ()
     """What a part of each price class counts with."""
+    stock: tuple[StockRow, ...] = ()
+    """What distributors sell, by their lists; rows of nearer folders first."""
     mounting: Mounting = "mixed"
     """The cases that a board takes; what is sold in no such case is no choice."""
     refused: frozenset[str] = frozenset()
@@ -327,6 +330,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         trimmers=of(TrimmerEntry),
         headers=of(Header),
         prices=of(Price),
+        stock=read_stock(folders, STOCK),
     )
 
 

@@ -56,6 +56,8 @@ LAYOUTS = "bom-layouts"
 """Folder of layouts beside the catalogue's files (``board.bom_layouts``)."""
 FABS = "fabs"
 """Folder of makers of boards beside the catalogue's files (``fabrication.fab``)."""
+STOCK = "stock"
+"""Folder of distributors' lists beside the catalogue's files (``catalog.stock_list``)."""
 _MAX_BYTES = 4_000_000
 
 
@@ -119,8 +121,8 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
                 twice.append(InputError(path, "name", entry.name, expected))
             by_key[key] = entry
         _raise(twice)
-    for inner in (LAYOUTS, FABS):
-        for path in sorted((folder / inner).glob("*.toml"), key=lambda each: each.name):
+    for inner, ending in ((LAYOUTS, "toml"), (FABS, "toml"), (STOCK, "csv")):
+        for path in sorted((folder / inner).glob(f"*.{ending}"), key=lambda each: each.name):
             _digest(digest, f"{inner}/{path.name}", read_bytes(path, "a file that can be read"))
     return by_key
 

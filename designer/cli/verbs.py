@@ -430,6 +430,10 @@ def export(
         Path | None,
         option("--board", "FILE", "The board for --fab, a .kicad_pcb [the folder's own]."),
     ] = None,
+    parts: Annotated[
+        Path | None,
+        option("--parts", "FILE", "For --fab: your list of order numbers and prices, CSV."),
+    ] = None,
     **shared: Any,
 ) -> Output:
     """Write the KiCad project (schematic, placed board, netlist), decks, or orders of boards."""
@@ -442,6 +446,7 @@ def export(
         deck=[name.value for name in deck or ()],
         fab=fab or (),
         board=board,
+        parts=parts,
         progress=session.progress,
         **shared,
     )

@@ -77,6 +77,8 @@ class FabTable(FileTable):
     """Whether angles on the lower side are as seen from below."""
     protel_names: Annotated[bool, flag()] = False
     """Whether each layer has a name ending of its own (.gtl, .gbl, …) instead of .gbr."""
+    distributor: Annotated[str | None, line("a distributor's name")] = None
+    """Whose order numbers its assembly asks for; None where it asks for none."""
     rotation: tuple[RotationOffset, ...] = ()
     """Angles by footprint; the first pattern that fits counts."""
     steps: Annotated[tuple[str, ...], lines("a list of what to do")] = ()

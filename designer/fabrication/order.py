@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from designer.base.csv_tables import csv_text
@@ -12,6 +12,7 @@ from designer.base.seal import sha256
 from designer.board.bom import Line
 from designer.board.bom_layouts import Layout
 from designer.board.kicad_reader import BoardFile
+from designer.catalog.stock_list import order_number
 from designer.fabrication.board_facts import board_facts
 from designer.fabrication.fab import Fab, PositionField
 from designer.fabrication.kicad_plot import PartPosition, plot
@@ -58,12 +59,26 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]
         f"{order.name}-bom.csv": layout.csv(order.bought).encode("utf-8"),
     }
     wired = [d for one in order.bought for d in one.designators if d not in placed]
-    text = notes(order.title, order.name, fab, board_facts(order.board), wired, order.not_checked)
+    by_hand = ["On the bill without a place on the board, fitted by hand: " + ", ".join(wired)]
+    remarks = [
+        *by_hand[: bool(wired)],
+        *_unnumbered(order.bought, fab.table.distributor),
+        *(f"Not checked: {rule}" for rule in order.not_checked),
+        *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
+    ]
+    text = notes(order.title, order.name, fab, board_facts(order.board), remarks)
     files[NOTES] = text.encode("utf-8")
     files[HASHES] = "".join(
         f"{sha256(content)}  {name}\n" for name, content in sorted(files.items())
     ).encode("ascii")
     return files
+
+
+def _unnumbered(bought: Sequence[Line], distributor: str | None) -> Iterator[str]:
+    """A line on the parts that no list has a number of."""
+    bare = [one.part_number for one in bought if not order_number(one.stock, distributor or "")]
+    if distributor is not None and bare:
+        yield f"Without an order number of {distributor}: {', '.join(bare)}"
 
 
 def packed(files: Mapping[str, bytes]) -> bytes:

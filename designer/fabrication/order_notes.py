@@ -17,13 +17,11 @@ def notes(
     name: str,
     fab: Fab,
     facts: BoardFacts,
-    wired: Sequence[str],
-    not_checked: Sequence[str],
+    remarks: Sequence[str],
 ) -> str:
     """The page as Markdown.
 
-    title : of the model file. name : of the files. wired : designators of the bill that have no
-    position. not_checked : a line for each rule that was not run.
+    title : of the model file. name : of the files. remarks : what is to be looked at, a line each.
     """
     parts = [
         "# Order",
@@ -34,7 +32,8 @@ def notes(
         "\n".join(_options(facts)),
         "## Steps",
         "\n".join(f"{i}. {step}" for i, step in enumerate(fab.table.steps, start=1)),
-        *_remarks(wired, not_checked, fab),
+        "## To be looked at" if remarks else "",
+        "\n".join(f"- {remark}" for remark in remarks),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -68,13 +67,3 @@ def _options(facts: BoardFacts) -> Iterator[str]:
 
 def _millimetres(value: float | None) -> str:
     return "none" if value is None else f"{value:g} mm"
-
-
-def _remarks(wired: Sequence[str], not_checked: Sequence[str], fab: Fab) -> Iterator[str]:
-    names = ", ".join(wired)
-    lines = [f"- On the bill without a place on the board, fitted by hand: {names}."] * bool(wired)
-    lines += [f"- Not checked: {line}" for line in not_checked]
-    lines += [f"- Assumed: {line}." for line in fab.table.assumed]
-    if lines:
-        yield "## To be looked at"
-        yield "\n".join(lines)

@@ -10,6 +10,7 @@ from designer.board.board_parts import board_circuit
 from designer.board.bom import Line, bill, bill_csv
 from designer.board.bom_layouts import file_of, layouts
 from designer.board.component import Component, components, pin_numbers, to_buy
+from designer.catalog.stock_list import StockRow
 from designer.check.synthesis_result import Synthesis
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
@@ -48,14 +49,15 @@ def bills(synthesis: Synthesis) -> dict[str, str]:
     return _bills(synthesis, components(circuit, synthesis.catalog, choice), choice)
 
 
-def bought(synthesis: Synthesis) -> tuple[Line, ...]:
-    """The lines of the bill; raises as ``texts`` does."""
+def bought(synthesis: Synthesis, stock: Sequence[StockRow] = ()) -> tuple[Line, ...]:
+    """The lines of the bill; raises as ``texts`` does. stock : a list before the catalogue's."""
     circuit, choice = board_circuit(synthesis)
-    return bill(to_buy(components(circuit, synthesis.catalog, choice), choice))
+    parts = to_buy(components(circuit, synthesis.catalog, choice), choice)
+    return bill(parts, (*stock, *synthesis.catalog.stock))
 
 
 def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
-    lines = bill(to_buy(parts, choice))
+    lines = bill(to_buy(parts, choice), synthesis.catalog.stock)
     others = layouts(synthesis.modelfile.board.bom, synthesis.catalog.folders)
     return {
         BILL: bill_csv(lines),

@@ -22,6 +22,7 @@ from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import BoardFile, read_board
 from designer.catalog.catalog import load_catalog
+from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules.kicad_program import KicadFailed, needed_version
@@ -79,6 +80,7 @@ def export(
     deck: Sequence[Dialect] = (),
     fab: Sequence[str] = (),
     board: Path | str | None = None,
+    parts: Path | str | None = None,
     overwrite: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
@@ -88,23 +90,25 @@ def export(
     model : a design folder, or a model file with ``out``. deck : "ltspice", "portable" or both.
     fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
     project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
+    parts : with ``fab``, a list of order numbers and prices, before the catalogue's.
 
     Raises
     ------
     InputError : a footprint that is not known here, files that somebody has changed, decks of
-        another design or version, an unknown fab, or a board of another design.
+        another design or version, an unknown fab, a wrong list, or a board of another design.
     EnvironmentMissing : with ``fab``, no KiCad 9.
     """
     options = Options(overwrite=overwrite, resume=resume)
     progress = Progress() if progress is None else progress
     if deck and fab:
         raise InputError(None, "--fab", ", ".join(fab), "no --deck beside it: one after the other")
-    if board is not None and not fab:
-        raise InputError(None, "--board", str(board), "a fab that it is for: --fab NAME")
+    for option, value in (("--board", board), ("--parts", parts)):
+        if value is not None and not fab:
+            raise InputError(None, option, str(value), "a fab that it is for: --fab NAME")
     modelfile, folder = source(model, out)
     if fab:
-        file = None if board is None else Path(board)
-        return export_orders(modelfile, folder, fab, file, options, progress)
+        named = (None if file is None else Path(file) for file in (board, parts))
+        return export_orders(modelfile, folder, fab, *named, options=options, progress=progress)
     if deck:
         return export_decks(modelfile, folder, deck, options, progress)
     return export_into(modelfile, folder, options, progress)
@@ -159,22 +163,27 @@ def export_orders(
     out: Path,
     names: Sequence[str],
     file: Path | None,
+    parts: Path | None,
+    *,
     options: Options,
     progress: Progress,
 ) -> ExportResult:
     """Write what fabs are sent into a design folder, which is made where there is none.
 
-    file : the board; None for the folder's own. An order that the rules forbid is refused: nothing
-    is written, and the answer says why.
+    An order that the rules forbid is refused: nothing is written, and the answer says why.
+
+    file : the board; None for the folder's own. parts : a list of order numbers, or None.
     """
     try:
         version = needed_version()
     except KicadFailed as why:
         raise EnvironmentMissing(f"{why}: --fab needs it") from None
     fabs(names, load_catalog().folders)
+    stock = () if parts is None else stock_rows(parts, "--parts")
     runner, synthesis, _ = _design(modelfile, out, options, progress)
     folder, board = runner.folder, _board(runner, file, progress)
     inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
+    inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
     inputs["fabs"] = _fabs_with_earlier(folder, inputs, names)
     # What stands in the way is known before any work.
     if not folder.decide({ORDER_STAGE: (inputs, [])}, **_ways(options)):
@@ -187,7 +196,7 @@ def export_orders(
         return ExportResult(refused, folder.path, False)
     progress.stage("Gerbers, holes, positions")
     name = project_name(modelfile.title)
-    bought = board_files.bought(synthesis)
+    bought = board_files.bought(synthesis, stock)
     order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes))
     files = _order_texts(order, fabs(inputs["fabs"], runner.catalog.folders), runner)
     stages: Stages = {ORDER_STAGE: (inputs, list(files))}

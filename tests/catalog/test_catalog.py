@@ -539,14 +539,16 @@ def test_wrong_csv_is_named(tmp_path: Path, old: str, new: str, field: str, expe
 def test_the_examples_of_the_documentation(tmp_path: Path) -> None:
     text = (SHIPPED.parent / "docs" / "catalogue.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(toml|csv)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    assert [language for language, _ in blocks] == ["toml", "toml", "csv"]
-    for number, (language, block) in enumerate(blocks):
+    assert [language for language, _ in blocks] == ["toml", "toml", "csv", "csv"]
+    for number, (language, block) in enumerate(blocks[:3]):
         folder(tmp_path / "mine", block, f"{number}.{language}")
+    folder(tmp_path / "mine" / "stock", blocks[3][1], "list.csv")
     mine = load_catalog(tmp_path / "mine")
     assert mine.part("capacitor", 22e-9, 0.01).part_number == "drawer-22n"
     named = {family.name: family for family in mine.families}
     assert {"Bench drawer 1 %", "Yageo RC0805FR-07"} <= set(named)
     assert mine.euro(3) == 0.11
+    assert [row.distributor for row in mine.stock] == ["LCSC", "Our shelf"]
     chips = named["Yageo RC0805FR-07"]
     assert chips.part_number.of(4.99e3) == "RC0805FR-074K99L"
 
