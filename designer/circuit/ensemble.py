@@ -17,6 +17,7 @@ from designer.base.arrays import Array, Index
 from designer.base.threads import heed, parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
+from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics import attractors, kernel_boards as kernel, working_modes
 from designer.dynamics.counts import MAX_PERIOD
@@ -49,7 +50,8 @@ class Ensemble:
     """N boards, reduced once each and asked as often as is wanted.
 
     fast : take the compiled way where it fits; False: ``attractors.settle`` of each board.
-    jobs : threads that reduce. bandwidth : as of ``reduction.Reduction``.
+    jobs : threads that reduce. bandwidth : as of ``reduction.Reduction``; where op-amps drive
+    diodes each board is then settled by itself.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Ensemble:
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
         fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
+        fits = fits and not (bandwidth and swinging_sections(boards.circuit))  # jumps
         self._modes = _reduced(boards, jobs, bandwidth) if fast and fits else None
 
     def __len__(self) -> int:
@@ -86,10 +89,10 @@ class Ensemble:
         """The attractor of board ``which[k]`` under ``drives[k]`` from ``starts[k]``, for each k.
 
         A board may be asked more than once; questions of one board under one drive that follow
-        each other share its tables. starts : (len(which), states), at drive phase 0. Equal to
-        ``dynamics.attractors.settle`` of each, to rounding, but for the periods spent where
-        Newton's method strayed into a mode in which an op-amp clips; a board without an answer
-        gives a failed orbit with the reason. progress : called once an answer.
+        each other share its tables. starts : (len(which), states), or capacitor voltages, at drive
+        phase 0. Equal to ``dynamics.attractors.settle`` of each, to rounding, but for the periods
+        spent where Newton's method strayed into a mode in which an op-amp clips; a board without an
+        answer gives a failed orbit with the reason. progress : called once an answer.
         """
         return [r.orbit for r in self.respond(which, drives, starts, jobs=jobs, progress=progress)]
 
@@ -177,7 +180,8 @@ class Ensemble:
     def _alone(self, board: int, drive: Drive, start: Array) -> SettledBoard:
         """One question, in Python."""
         try:
-            system = self.reduction(board).system()
+            reduction = self.reduction(board)
+            system, start = reduction.system(), reduction.state(start)
             flow = Flow(system, drive, fast=self._fast)
             orbit = attractors.settle(flow, start)
             if self._fast and _faint(orbit, drive):

@@ -25,7 +25,7 @@ from designer.dynamics.piecewise_linear import ModeKey
 
 @dataclass(frozen=True)
 class Solution:
-    """Linear functions of (states, generator, 1), each a row of length n + 2."""
+    """Linear functions of (states, generator, 1), each a row of length n + 2 for n states."""
 
     voltage: dict[str, Array]
     """Row of each net's voltage [V]."""
@@ -52,11 +52,15 @@ class Exit:
 
 
 class NodalEquations:
-    """G y = right for each mode: y are the nets' voltages and the branches' currents."""
+    """G y = right for each mode: y are the nets' voltages and the branches' currents.
 
-    def __init__(self, circuit: Circuit, board: Board) -> None:
+    further : names of states beside the capacitors' voltages, which stand first.
+    """
+
+    def __init__(self, circuit: Circuit, board: Board, further: tuple[str, ...] = ()) -> None:
         self.circuit = circuit
         self.board = board
+        self.states = (*circuit.states, *further)
         self.lead = np.shape(board.inverse_gain)
         self._sections, self._diodes = circuit.sections, circuit.diodes
         self._moving = [circuit.states.index(stop.state) for stop in circuit.stops]
@@ -68,22 +72,22 @@ class NodalEquations:
 
     def of(self, key: ModeKey) -> tuple[Array, Array]:
         """(..., size, size) and (..., size, n + 2): G and right of a mode."""
-        c, board = self.circuit, self.board
+        board = self.board
         G, right = self._matrix.copy(), self._right.copy()
-        n, first = len(c.states), self._first
+        first = self._first
         amplifiers = len(self._sections)
         for row, (s, position) in enumerate(
             zip(self._sections, key[:amplifiers], strict=True), first["sections"]
         ):
             if position:
                 G[..., row, self._nets[s.output]] = 1.0
-                right[..., row, n + 1] = board.rails[s.name][1 if position > 0 else 0]
+                right[..., row, -1] = board.rails[s.name][1 if position > 0 else 0]
                 continue
             for net, sign in ((s.noninverting, 1.0), (s.inverting, -1.0)):
                 if net != GROUND:
                     G[..., row, self._nets[net]] += sign
             G[..., row, self._nets[s.output]] -= board.inverse_gain
-            right[..., row, n + 1] = -np.asarray(board.offset.get(s.name, 0.0))
+            right[..., row, -1] = -np.asarray(board.offset.get(s.name, 0.0))
         for row, (d, position) in enumerate(
             zip(self._diodes, key[amplifiers:], strict=True), first["diodes"]
         ):
@@ -94,7 +98,7 @@ class NodalEquations:
                 if net != GROUND:
                     G[..., row, self._nets[net]] += sign
             G[..., row, row] = -d.model.resistance
-            right[..., row, n + 1] = board.drop[d.name]
+            right[..., row, -1] = board.drop[d.name]
         return G, right
 
     def solved(self, key: ModeKey, solver: Solver) -> Solution:
@@ -105,23 +109,28 @@ class NodalEquations:
         """y (..., size, n + 2) by names."""
         c, first = self.circuit, self._first
         voltage = {net: y[..., i, :] for net, i in self._nets.items()}
-        voltage[GROUND] = np.zeros((*self.lead, len(c.states) + 2))
+        voltage[GROUND] = np.zeros((*self.lead, len(self.states) + 2))
         # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
         amps = {cap.name: y[..., i, :] for i, cap in enumerate(c.capacitors, first["capacitors"])}
         amps |= {d.name: y[..., i, :] for i, d in enumerate(self._diodes, first["diodes"])}
         out = {s.name: -y[..., i, :] for i, s in enumerate(self._sections, first["sections"])}
         return Solution(voltage, amps, out)
 
-    def rates(self, solved: Solution) -> Array:
-        """(..., n, n + 2): how fast each state changes."""
+    def rates(self, key: ModeKey, solved: Solution) -> Array:
+        """(..., n, n + 2): how fast each state changes in a mode."""
         values = self.board.values
         names = self.circuit.states
         rows = [solved.current[name] / np.asarray(values[name])[..., None] for name in names]
         return np.stack(rows, axis=-2)
 
+    @property
+    def mirror(self) -> Array:
+        """(n, n) what x → -x, u → -u does to the states, where both stops are alike."""
+        return -np.eye(len(self.states))
+
     def exits(self, key: ModeKey, solved: Solution) -> list[Exit]:
         """Every way out of a mode, those of contacts scaled to displacement."""
-        n = len(self.circuit.states)
+        n = len(self.states)
         sides = self.sides(key)
         ways: list[Exit] = []
         switches: tuple[Section | Diode, ...] = (*self._sections, *self._diodes)
@@ -198,7 +207,7 @@ class NodalEquations:
     def _assemble(self) -> tuple[Array, Array]:
         """What is the same in every mode."""
         c, board = self.circuit, self.board
-        n, nodes = len(c.states), len(self._nets)
+        n, nodes = len(self.states), len(self._nets)
         # Each branch has its current as an unknown and a row of its own, in this order.
         first = self._first
         size = first["generator"] + 1

@@ -73,15 +73,26 @@ class Reduction:
         c = self.circuit
         displacement, velocity = self._motion()
         return PiecewiseLinearSystem(
-            states=c.states,
+            states=self._equations.states,
             build=self._mode,
             start=c.open,
             clearances=tuple(s.clearance for s in c.stops),
             displacement=displacement,
             velocity=velocity,
-            mirror=-np.eye(len(c.states)) if self._even() else None,
+            mirror=self._equations.mirror if self._even() else None,
+            reflection=self._equations.mirror,
+            continuous=self._equations.states == c.states,
             working=working_keys(c),
         )
+
+    def state(self, capacitors: Array) -> Array:
+        """(..., n) a state of ``system`` with these capacitor voltages (..., c).
+
+        What else is a state of a circuit with bandwidth (``nodal_bandwidth``) follows them within a
+        small part of a period, and is zero here.
+        """
+        more = len(self._equations.states) - capacitors.shape[-1]
+        return np.pad(capacitors, [(0, 0)] * (capacitors.ndim - 1) + [(0, more)])
 
     def solution(self, key: ModeKey) -> Solution:
         """Every net's voltage and every capacitor's current in this mode."""
@@ -99,7 +110,7 @@ class Reduction:
         """Rows of the displacement in each clearance and of its velocity: of one mass the states,
         of two the output of their difference amplifier."""
         c = self.circuit
-        size, moving = len(c.states), [c.states.index(s.state) for s in c.stops]
+        size, moving = len(self._equations.states), [c.states.index(s.state) for s in c.stops]
         displacement, velocity = map(list, motion_of_states(size, moving))
         for k, (stop, i) in enumerate(zip(c.stops, moving, strict=True)):
             if stop.difference is not None:
@@ -110,8 +121,8 @@ class Reduction:
         return tuple(displacement), tuple(velocity)
 
     def _mode(self, key: ModeKey) -> Mode:
-        solved, n = self.solution(key), len(self.circuit.states)
-        rows = self._equations.rates(solved)
+        solved, n = self.solution(key), len(self._equations.states)
+        rows = self._equations.rates(key, solved)
         exits = self._equations.exits(key, solved)
         guards = tuple(
             Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance)
@@ -149,10 +160,11 @@ class Reduction:
         rest = self._mode(c.open)
         above, below = (self._mode(c.carrying(contact)) for contact in (stop.upper, stop.lower))
         ends = sorted(-g.e for g in rest.guards if g.clearance == c.stops.index(stop))
+        M, largest = self._equations.mirror, float(np.abs(above.d).max())
         return (
-            _close(above.A, below.A, 0.0)
-            and _close(above.d, -below.d, float(np.abs(above.d).max()))
-            and _close(rest.d, -rest.d, float(np.abs(above.d).max()))
+            _close(M @ above.A @ M.T, below.A, 0.0)
+            and _close(M @ above.d, below.d, largest)
+            and _close(M @ rest.d, rest.d, largest)
             and len(ends) == 2
             and ends[1] - ends[0] <= EVEN * abs(ends[1])
         )

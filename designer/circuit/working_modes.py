@@ -84,7 +84,7 @@ class _SolvedMode:
 
 def _solved(equations: NodalEquations, key: ModeKey) -> _SolvedMode:
     solution = equations.solved(key, _all_solved)
-    rates, exits = equations.rates(solution), equations.exits(key, solution)
+    rates, exits = equations.rates(key, solution), equations.exits(key, solution)
     good = np.asarray(np.isfinite(rates).all(axis=(1, 2)))
     for way in exits:
         good &= np.isfinite(way.row).all(axis=1)

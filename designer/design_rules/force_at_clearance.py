@@ -91,7 +91,7 @@ class Statics:
         y = np.asarray(np.linalg.solve(G, inputs), dtype=np.float64)
         solved = self._equations.solution(y)
         solved.voltage[GROUND] = np.zeros(y.shape[1])
-        rates = self._equations.rates(solved)
+        rates = self._equations.rates(key, solved)
         # Where each source holds the states, all else at zero.
         states = np.asarray(-np.linalg.solve(rates[:, :n], rates[:, n:-1]), dtype=np.float64)
         exits = self._equations.exits(key, solved)

@@ -287,14 +287,16 @@ def describe(
 
 
 def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> float:
-    """max over t of |x(t + nT/2) - mirror x(t)| relative to each state's peak, with the mirror -1
-    where the system has none; nan for even n, and where the flow does not come to an end."""
+    """max over t of |x(t + nT/2) - image of x(t)| relative to each state's peak, with the image in
+    the system's mirror or, where it has none, its ``reflection``; nan for even n, and where the
+    flow does not come to an end."""
     run = flow.run(x, n, points=points) if n % 2 else None
     if run is None or run.status is not FlowStatus.DONE:
         return float("nan")
     trace = run.strobes[:-1]
     half = n * points // 2
-    mirror = flow.system.mirror
+    system = flow.system
+    mirror = system.reflection if system.mirror is None else system.mirror
     image = -trace if mirror is None else trace @ mirror.T
     return float((np.abs(np.roll(trace, -half, axis=0) - image).max(axis=0) / peak).max())
 

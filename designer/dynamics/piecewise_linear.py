@@ -115,6 +115,8 @@ class PiecewiseLinearSystem:
     """For each clearance the velocity in it: a row (n + 1,) over (states, the drive's rate)."""
     mirror: Array | None = None
     """(n, n) M with x → M x, u → -u a symmetry of the system, or None."""
+    reflection: Array | None = None
+    """(n, n) what a state looks like in a mirror, be it a symmetry or not; None: -1."""
     continuous: bool = True
     """Whether the vector field is the same on both sides of every boundary."""
     working: tuple[ModeKey, ...] = ()

@@ -308,17 +308,22 @@ def _lagging_start(subject: GateSubject) -> Array | None:
     if subject.circuit.figures is None:
         return None
     orbit = _lagging_orbit(subject)
-    return orbit.start if orbit.status is subject.orbit.status else None
+    capacitors = orbit.start[: len(subject.circuit.states)]
+    return capacitors if orbit.status is subject.orbit.status else None
 
 
 def _lagging_flow(subject: GateSubject) -> Flow:
-    system = Reduction(subject.circuit, subject.board, bandwidth=True).system()
-    return Flow(system, subject.excitation.drive)
+    return Flow(_lagging(subject).system(), subject.excitation.drive)
+
+
+def _lagging(subject: GateSubject) -> Reduction:
+    return Reduction(subject.circuit, subject.board, bandwidth=True)
 
 
 def _lagging_orbit(subject: GateSubject) -> Orbit:
     start = subject.orbit.start
-    return settle(_lagging_flow(subject), start if len(start) else np.zeros(subject.system.size))
+    begin = start if len(start) else np.zeros(subject.system.size)
+    return settle(_lagging_flow(subject), _lagging(subject).state(begin))
 
 
 def _own(subject: GateSubject, ladder: tuple[int, float]) -> SolverSettings:

@@ -2,10 +2,10 @@
 
 Boards of the model file's spread, started on the nominal orbit, each by both engines. Where they
 differ by D = +1 or -1 a board, the mean of D is the error of the exact circuit's yield. Its 95 %
-interval joins the Wilson limits of both shares with their correlation (Zou and Donner, Statistics
-in Medicine 27, 2008, 1693): boards without any difference still leave room for one. Boards that an
-engine has no answer to are asked all the same, and may differ either way: D = +1 on each for the
-upper end, -1 for the lower one.
+interval joins the mid-p limits of both shares with their correlation (Zou and Donner, Statistics
+in Medicine 27, 2008, 1693), as the combined yield of a study does: boards without any difference
+still leave room for one. Boards that an engine has no answer to are asked all the same, and may
+differ either way: D = +1 on each for the upper end, -1 for the lower one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 
-from designer.base.proportion import wilson
+from designer.base.proportion import mid_p
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
@@ -216,7 +216,7 @@ def _interval(lost: int, gained: int, n: int) -> tuple[float, float]:
     if n == 0:
         return -1.0, 1.0
     up, down = lost / n, gained / n
-    (up_low, up_high), (down_low, down_high) = wilson(lost, n), wilson(gained, n)
+    (up_low, up_high), (down_low, down_high) = mid_p(lost, n), mid_p(gained, n)
     # A board counts for one share at most: they go against each other.
     rest = (1.0 - up) * (1.0 - down)
     against = math.sqrt(up * down / rest) if rest > 0.0 else 1.0
