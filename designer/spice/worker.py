@@ -7,11 +7,13 @@ imports little.
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import pickle
 import signal
 import sys
 import tempfile
+import threading
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -54,6 +56,7 @@ def work(connection: Connection, backend: Backend, folder: str) -> None:
     """The whole life of a worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.setsid()  # what it starts ends with it
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
     os.dup2(2, 1)  # standard output is the parent's: no library prints into its JSON
     _move_to(folder)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone
@@ -67,6 +70,15 @@ def work(connection: Connection, backend: Backend, folder: str) -> None:
             value = _outcome(simulator, connection.recv_bytes())
             connection.send_bytes(pickle.dumps(Reply(value=value, last=not simulator.usable)))
     os._exit(0)  # libngspice tidies up a heap that may be corrupt; there is nothing to tidy
+
+
+def _end_with_the_parent() -> None:
+    """End this process and what it started when its parent is gone, even amid a job: a parent that
+    was killed ends nobody."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os.killpg(0, signal.SIGKILL)
 
 
 def _move_to(folder: str) -> None:

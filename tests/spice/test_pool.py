@@ -321,7 +321,8 @@ if __name__ == "__main__":
 """
 
 
-def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
+def start_interrupted(tmp_path: Path) -> tuple[subprocess.Popen[str], list[int], Path]:
+    """A script with two workers amid a job, the workers' numbers, and its temporary folder."""
     script, pids, temporary = tmp_path / "script.py", tmp_path / "pids", tmp_path / "tmp"
     script.write_text(_INTERRUPTED)
     pids.mkdir()
@@ -338,17 +339,29 @@ def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     )
-    limit = time.monotonic() + 20.0
+    limit = time.monotonic() + 60.0
     while len(list(pids.iterdir())) < 2:
         assert time.monotonic() < limit
         assert process.poll() is None
         time.sleep(0.02)
+    return process, [int(file.name) for file in pids.iterdir()], temporary
+
+
+def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
+    process, pids, temporary = start_interrupted(tmp_path)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, stderr = process.communicate(timeout=5.0)
     assert process.returncode == -signal.SIGINT
     assert stderr.count("Traceback") == 1
-    assert all(ends(int(file.name)) for file in pids.iterdir())
+    assert all(ends(pid) for pid in pids)
     assert list(temporary.iterdir()) == []
+
+
+def test_workers_of_a_killed_parent_end_amid_their_jobs(tmp_path: Path) -> None:
+    process, pids, _ = start_interrupted(tmp_path)
+    process.kill()
+    process.communicate()
+    assert all(ends(pid) for pid in pids)
 
 
 _LEFT = """
