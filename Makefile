@@ -12,7 +12,7 @@ LOCK := requirements/constraints.txt
 PARALLEL := --numprocesses auto --dist loadfile --no-loadscope-reorder
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
-.PHONY: help env ngspice demo test check-all lint format bench reports picture lock clean
+.PHONY: help env ngspice demo test check-all lint format bench reports picture site lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -72,6 +72,9 @@ reports: env ngspice ## make the reports that this commit lacks
 picture: env ngspice ## draw the README's pictures
 	@$(VENV)/bin/python scripts/make-model-picture
 	@$(VENV)/bin/python scripts/make-picture
+
+site: env ## build the documentation into out/site
+	@$(VENV)/bin/python -m sphinx -q -W --keep-going -d out/site/.doctrees docs out/site
 
 lock: ## resolve pyproject.toml anew into requirements/constraints.txt
 	@PYTHON=$(PYTHON) scripts/lock

@@ -102,8 +102,8 @@ def bifurcation(
 ) -> BifurcationResult:
     """The verb ``bifurcation``: a diagram, a map of two parameters, or basins of attraction.
 
-    model : a model file or a design folder. from_, to : the ends of the sweep, as numbers or as
-    texts with a unit. map_ : (name, from, to, steps) of the other axis. out : a folder to write
+    model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
+    texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. out : a folder to write
     into; without one nothing is written. The other words are those of the command line
     (docs/bifurcations.md).
 

@@ -94,8 +94,8 @@ def cure(
 ) -> CureResult:
     """The verb ``search --yield``: the cheapest cure of a design folder, which is written there.
 
-    yield_ : of every wanted response, as built (trimmed where the cure says so): the lower end of
-    its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by the
+    ``yield_`` : of every wanted response, as built (trimmed where the cure says so): the lower end
+    of its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by the
     catalogue's price classes. without : kinds of upgrades that are not wanted; a hyphen may stand
     for a space. out : folder for the cured design. What is not given is that of the folder's own
     cure, if there is one; with ``overwrite`` its budget and its kinds are not taken over.

@@ -107,9 +107,9 @@ def tolerance(
     model : as of ``run``, or a design, which is studied in its folder or, without one, in memory.
     samples : at least. until : width of the 95 % intervals at which the study stops growing. rung :
     "exact" asks no ngspice, "auto" about some boards, "ngspice" about every board. tuned, reached :
-    also with the generator free within its bands, and from power-up. map_ : settings over which the
-    yield is wanted too. measured : a list of built boards, which are studied instead, in a design
-    folder. cluster : address of a Dask scheduler. The others are as of ``run``.
+    also with the generator free within its bands, and from power-up. ``map_`` : settings over which
+    the yield is wanted too. measured : a list of built boards, which are studied instead, in a
+    design folder. cluster : address of a Dask scheduler. The others are as of ``run``.
 
     Raises
     ------

@@ -199,7 +199,7 @@ def new(
     Beside a commented file stands ``SCHEMA``: with it an editor that knows JSON Schema completes
     the keys and marks mistakes. A file of that name that is something else is left alone.
 
-    from_ : a model file to begin with: one of format 1 is rewritten in format 2
+    ``from_`` : a model file to begin with: one of format 1 is rewritten in format 2
     (``second_format``), one of format 2 copied. format : of the commented file, 1 unless given.
 
     Raises

@@ -38,6 +38,8 @@ SMALLER = {
     "--omega 1.505": "--omega 1.505 --steps 4 --map x2 -1 1 4",
     """--steps 300 --map 'x2'"'"'' -1 1 300""": """--steps 4 --map 'x2'"'"'' -1 1 4""",
     "--steps 241": "--steps 5",
+    "--steps 111": "--steps 5",
+    "--samples 100 --out out/rig": "--samples 4 --out out/rig",
 }
 FILLED = {
     # what a page leaves open, by the command: what a reader would write
@@ -68,7 +70,13 @@ NOT_RUN = {
     "export out/paper --fab": "KiCad and a routed board: tests/jobs/test_order_export.py",
     "rules out/paper --board": "KiCad and a board: tests/design_rules/test_rules_board.py",
 }
-LONG = ("README.md", "docs/bifurcations.md", "docs/compare.md", "docs/tolerance.md")
+LONG = (
+    "README.md",
+    "docs/bifurcations.md",
+    "docs/compare.md",
+    "docs/tolerance.md",
+    "docs/tutorial.md",
+)
 
 
 def smaller(command: Command) -> str:
