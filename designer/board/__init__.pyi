@@ -7,6 +7,7 @@ from .board_check import (
     check_board as check_board,
 )
 from .board_parts import (
+    Designed as Designed,
     board_circuit as board_circuit,
     trimmed_clearance as trimmed_clearance,
 )
@@ -27,6 +28,9 @@ from .component import (
     components as components,
     pin_numbers as pin_numbers,
     to_buy as to_buy,
+)
+from .footprints import (
+    footprint as footprint,
 )
 from .kicad_board import (
     layers as layers,

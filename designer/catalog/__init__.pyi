@@ -1,6 +1,9 @@
 from . import (
     diode_curve as diode_curve,
 )
+from .build_cost import (
+    BuildCost as BuildCost,
+)
 from .catalog import (
     Catalog as Catalog,
     load_catalog as load_catalog,

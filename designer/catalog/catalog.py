@@ -20,6 +20,7 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import SERIES, series_values
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
+from designer.catalog.build_cost import BuildCost
 from designer.catalog.entries import (
     FORBIDDEN,
     UNITS,
@@ -69,6 +70,8 @@ class Catalog:
     """Pin headers that can be bought."""
     prices: tuple[Price, ...] = ()
     """What a part of each price class counts with."""
+    build_costs: tuple[BuildCost, ...] = ()
+    """What orders of boards are charged with beside the parts."""
     stock: tuple[StockRow, ...] = ()
     """What distributors sell, by their lists; rows of nearer folders first."""
     mounting: Mounting = "mixed"
@@ -330,6 +333,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         trimmers=of(TrimmerEntry),
         headers=of(Header),
         prices=of(Price),
+        build_costs=of(BuildCost),
         stock=read_stock(folders, STOCK),
     )
 

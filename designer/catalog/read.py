@@ -35,6 +35,7 @@ from designer.base.schema import (
     whole_number,
 )
 from designer.base.units import format_quantity, parse_quantity
+from designer.catalog.build_cost import BuildCost
 from designer.catalog.entries import (
     UNITS,
     DiodeEntry,
@@ -48,7 +49,7 @@ from designer.catalog.entries import (
 )
 from designer.catalog.fields import CODE_TEXT, quantities, quantity
 
-Entry = PartFamily | OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | Header | Price
+Entry = PartFamily | OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | Header | Price | BuildCost
 
 ENVIRONMENT = "DESIGNER_CATALOGS"
 """Environment variable: folders to search first, separated as in PATH."""
@@ -250,11 +251,15 @@ class _File(FileTable):
     trimmer: tuple[TrimmerEntry, ...] = ()
     header: tuple[Header, ...] = ()
     price: tuple[Price, ...] = ()
+    build_cost: tuple[BuildCost, ...] = ()
 
     @property
     def entries(self) -> tuple[Entry, ...]:
         families = (table.family for table in self.family)
-        others = (self.opamp, self.diode, self.reference, self.trimmer, self.header, self.price)
+        others: tuple[tuple[Entry, ...], ...] = (
+            self.opamp, self.diode, self.reference, self.trimmer, self.header, self.price,
+            self.build_cost,
+        )  # fmt: skip
         return (*families, *(entry for entries in others for entry in entries))
 
 

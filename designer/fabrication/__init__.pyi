@@ -1,3 +1,10 @@
+from .board_cost import (
+    CostEstimate as CostEstimate,
+    cost_estimate as cost_estimate,
+    cost_markdown as cost_markdown,
+    cost_or_none as cost_or_none,
+    cost_words as cost_words,
+)
 from .fab import (
     Fab as Fab,
     fabs as fabs,

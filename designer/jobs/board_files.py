@@ -12,6 +12,7 @@ from designer.board.bom_layouts import file_of, layouts
 from designer.board.component import Component, components, pin_numbers, to_buy
 from designer.catalog.stock_list import StockRow
 from designer.check.synthesis_result import Synthesis
+from designer.fabrication.board_cost import cost_markdown, cost_or_none
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
 
@@ -36,8 +37,10 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     doing("bill of materials, drawing")
     circuit, choice = board_circuit(synthesis)
     parts = components(circuit, synthesis.catalog, choice)
+    cost = cost_or_none(synthesis)
+    notes = board_notes.markdown(synthesis, circuit, choice, parts)
     return {
-        NOTES: board_notes.markdown(synthesis, circuit, choice, parts),
+        NOTES: notes if cost is None else f"{notes}\n{cost_markdown(cost)}",
         DRAWING: schematic_drawing.svg(circuit, synthesis.modelfile.title, pin_numbers(parts)),
         **_bills(synthesis, parts, choice),
     }

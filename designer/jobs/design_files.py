@@ -24,6 +24,7 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
+from designer.fabrication.board_cost import cost_or_none
 from designer.jobs import board_files
 from designer.jobs.bench_tables import scales_csv, setup_csv, start_recipes
 from designer.jobs.json_answers import synthesis_json
@@ -79,7 +80,8 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
 
 def answer(synthesis: Synthesis) -> dict[str, Any]:
     """The JSON object of ``design.json``."""
-    return synthesis_json(
+    cost = cost_or_none(synthesis)
+    found = synthesis_json(
         synthesis.modelfile,
         synthesis.design,
         synthesis.model_responses,
@@ -87,6 +89,7 @@ def answer(synthesis: Synthesis) -> dict[str, Any]:
         synthesis.seconds,
         better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
     )
+    return {**found, "board_cost": None if cost is None else cost.as_dict()}
 
 
 def design_provenance(synthesis: Synthesis) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
+from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
 from designer.spread.part_grades import BetterGrade, better_grades
@@ -76,6 +77,11 @@ class ReportData:
         circuit, choice = board_circuit(self.result)
         parts = to_buy(components(circuit, self.result.catalog, choice), choice)
         return [line.cells() for line in bill(parts)]
+
+    @cached_property
+    def board_cost(self) -> CostEstimate | None:
+        """What the boards cost, estimated; None where there can be no board."""
+        return cost_or_none(self.result)
 
     @cached_property
     def board(self) -> tuple[Circuit, Numbers]:

@@ -22,6 +22,7 @@ from designer.base.page import (
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
+from designer.fabrication.board_cost import CostEstimate, cost_words
 from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
@@ -279,6 +280,7 @@ def _parts(data: ReportData, schematic: Picture | Gallery | None) -> PageSection
     blocks: list[Block] = [
         _parts_note(data),
         PageSection("To buy", [design_tables.bom_table(data.bom)]),
+        *_cost(data.board_cost),
         _one("Schematic", schematic),
         Columns(
             (
@@ -288,6 +290,14 @@ def _parts(data: ReportData, schematic: Picture | Gallery | None) -> PageSection
         ),
     ]
     return PageSection("Parts", blocks, "parts")
+
+
+def _cost(estimate: CostEstimate | None) -> list[PageSection]:
+    """What the boards cost; nothing where that is not known."""
+    if estimate is None:
+        return []
+    blocks: list[Block] = [SmallPrint(cost_words(estimate)), design_tables.cost_table(estimate)]
+    return [PageSection("Cost, estimated", blocks)]
 
 
 def _into(circuit: Circuit) -> str:

@@ -12,6 +12,7 @@ from designer.base.page import Table, table
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
+from designer.fabrication.board_cost import CostEstimate
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
@@ -92,6 +93,16 @@ def bom_table(bom: Sequence[Mapping[str, str]]) -> Table | None:
     rows = [[_bom_cell(k, row.get(k, "")) for k in keys] for row in bom]
     numeric = [keys.index(k) for k in ("quantity", "value") if k in keys]
     return table([_BOM[k] for k in keys], rows, numeric)
+
+
+def cost_table(estimate: CostEstimate) -> Table | None:
+    """Euro for one board, by the size of the order."""
+    rows = [
+        (str(c.boards), *(f"{euro:.2f} €" for euro in (c.parts, c.bare_board, c.assembly, c.total)))
+        for c in estimate.costs
+    ]
+    columns = ("boards", "parts", "bare board", "assembly", "one board")
+    return table(columns, rows, range(len(columns)))
 
 
 def part_table(circuit: Circuit) -> Table | None:
