@@ -121,5 +121,6 @@ from .terms import (
     entry_resistor as entry_resistor,
 )
 from .working_modes import (
+    BoardModes as BoardModes,
     at_rest as at_rest,
 )

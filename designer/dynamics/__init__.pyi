@@ -16,6 +16,7 @@ from .attractors import (
     peaks_near as peaks_near,
     same as same,
     settle as settle,
+    shoot as shoot,
     starts as starts,
     twin as twin,
 )

@@ -1,7 +1,8 @@
 """A board on the bench: what an oscilloscope recorded of it, and what the record shows.
 
 ``record_formats`` reads the files that oscilloscopes write; ``record`` is what was recorded, and
-what its channels are of the board.
+what its channels are of the board. ``board_fit`` finds the board of the spread that it is of, and
+``fitted_quantities`` says which figures of it the record tells.
 """
 
 import lazy_loader

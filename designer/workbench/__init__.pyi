@@ -1,3 +1,21 @@
+from .board_fit import (
+    BoardFit as BoardFit,
+    NoSuchBoard as NoSuchBoard,
+    fit_board as fit_board,
+)
+from .board_prior import (
+    Prior as Prior,
+)
+from .fitted_quantities import (
+    BoardFigure as BoardFigure,
+    figures as figures,
+    told_figures as told_figures,
+)
+from .observation import (
+    Observation as Observation,
+    ScopeErrors as ScopeErrors,
+    observe as observe,
+)
 from .record import (
     Record as Record,
     RecordedMotion as RecordedMotion,
