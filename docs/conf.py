@@ -27,6 +27,7 @@ release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build"]
 myst_heading_anchors = 4
+suppress_warnings = ["misc.highlighting_failure"]  # a language without colours is plain text
 html_theme = "furo"
 html_title = f"designer {release}"
 html_copy_source = False
