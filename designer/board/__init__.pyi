@@ -43,6 +43,7 @@ from .kicad_names import (
     circuit_net as circuit_net,
     footprint_name as footprint_name,
     identifier as identifier,
+    kicad_net as kicad_net,
     project_name as project_name,
 )
 from .kicad_placement import (
@@ -57,7 +58,9 @@ from .kicad_reader import (
     BoardFile as BoardFile,
     PlacedFootprint as PlacedFootprint,
     check_belongs as check_belongs,
+    pad_corners as pad_corners,
     read_board as read_board,
+    turned as turned,
 )
 from .kicad_rules import (
     CANARY as CANARY,
@@ -67,8 +70,17 @@ from .kicad_rules import (
     canary as canary,
     rules_text as rules_text,
 )
+from .net_classes import (
+    CLASSES as CLASSES,
+    DEFAULT as DEFAULT,
+    SUMMING as SUMMING,
+    SUPPLY as SUPPLY,
+    VIA as VIA,
+)
 from .outline import (
     LAYER as LAYER,
+    pen_path as pen_path,
+    read_outline as read_outline,
 )
 from .pins import (
     Pin as Pin,

@@ -349,12 +349,19 @@ def files(folder: Path, reused: bool) -> None:
     say(f"{folder}: {how}")
 
 
-def exported(folder: Path, reused: bool, refused: Sequence[str]) -> None:
-    """Where the files are, or why an order is refused."""
+def exported(folder: Path, reused: bool, refused: Sequence[str], answer: Mapping[str, Any]) -> None:
+    """Where the files are and how a board was routed, or why an order is refused."""
     if refused:
         say("\n".join(["No order is written, since the board is not finished:", *refused]))
     else:
         files(folder, reused)
+    if (routing := answer.get("routing")) is not None:
+        say(
+            f"{routing['board']}: {routing['length_mm']:.0f} mm of track, {routing['vias']} vias "
+            "in this run"
+        )
+        for net, count in routing["open"].items():
+            say(f"no way was found on {net}: {count} connections stay open")
 
 
 def untrusted(trust: Mapping[str, Any]) -> list[str]:

@@ -409,6 +409,16 @@ def export(
     session: Session,
     model: Source,
     out: Out = None,
+    routed: Annotated[
+        bool,
+        option(
+            "--routed", None, "With tracks and ground pours; exit status 1 where one stays open."
+        ),
+    ] = False,
+    keep: Annotated[
+        bool,
+        option("--keep", None, "With --routed: on the board as you changed it, only what is open."),
+    ] = False,
     deck: Annotated[
         list[DeckName] | None,
         option(
@@ -443,6 +453,8 @@ def export(
     result = export_job.export(
         model,
         out,
+        routed=routed,
+        keep=keep,
         deck=[name.value for name in deck or ()],
         fab=fab or (),
         board=board,
@@ -453,7 +465,7 @@ def export(
     refused = result.answer.get("refused", [])
     return Output(
         result.answer,
-        lambda: tables.exported(result.folder, result.reused, refused),
+        lambda: tables.exported(result.folder, result.reused, refused, result.answer),
         result.passed,
     )
 

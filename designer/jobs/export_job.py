@@ -30,6 +30,7 @@ from designer.fabrication.fab import Fab, fabs
 from designer.fabrication.order import BoardOrder, order_files
 from designer.fabrication.order_refusal import not_checked, refusals
 from designer.jobs import board_files, kicad_files
+from designer.jobs.board_routing import route_in_folder
 from designer.jobs.design_files import design_provenance
 from designer.jobs.design_source import design_inputs_of, source
 from designer.jobs.options import Options
@@ -61,8 +62,8 @@ class ExportResult:
 
     @property
     def passed(self) -> bool:
-        """Whether everything was written; False where an order is refused."""
-        return not self.answer.get("refused")
+        """Whether everything was written; False where an order is refused or a net stays open."""
+        return not self.answer.get("refused") and not self.answer.get("routing", {}).get("open")
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -77,6 +78,8 @@ def export(
     model: Path | str | ModelFile,
     out: Path | str | None = None,
     *,
+    routed: bool = False,
+    keep: bool = False,
     deck: Sequence[Dialect] = (),
     fab: Sequence[str] = (),
     board: Path | str | None = None,
@@ -87,7 +90,9 @@ def export(
 ) -> ExportResult:
     """The verb ``export``: the KiCad project of a design, decks for other simulators, or orders.
 
-    model : a design folder, or a model file with ``out``. deck : "ltspice", "portable" or both.
+    model : a design folder, or a model file with ``out``. routed : with tracks and ground pours on
+    the board of the KiCad project. keep : with ``routed``, on the board as somebody has changed it:
+    its tracks stay, and what is open is routed. deck : "ltspice", "portable" or both.
     fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
     project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
     parts : with ``fab``, a list of order numbers and prices, before the catalogue's.
@@ -105,7 +110,14 @@ def export(
     for option, value in (("--board", board), ("--parts", parts)):
         if value is not None and not fab:
             raise InputError(None, option, str(value), "a fab that it is for: --fab NAME")
+    if routed and (deck or fab):
+        other = "--fab" if fab else "--deck"
+        raise InputError(None, other, "with --routed", "one after the other: --routed first")
+    if keep and not routed:
+        raise InputError(None, "--keep", "given alone", "--routed beside it")
     modelfile, folder = source(model, out)
+    if routed:
+        return export_routed(modelfile, folder, keep, options, progress)
     if fab:
         named = (None if file is None else Path(file) for file in (board, parts))
         return export_orders(modelfile, folder, fab, *named, options=options, progress=progress)
@@ -133,6 +145,30 @@ def export_into(
         progress.stage("KiCad project")
         kicad_files.write(folder, synthesis, inputs, files)
     return _result(runner, list(files), reused and not todo)
+
+
+def export_routed(
+    modelfile: ModelFile, out: Path, keep: bool, options: Options, progress: Progress
+) -> ExportResult:
+    """Write the project where there is none, and route what is open on its board.
+
+    Raises
+    ------
+    InputError : a board that somebody has changed, but with ``keep``.
+    """
+    if keep:
+        runner, synthesis, reused = _design(modelfile, out, options, progress)
+        folder = runner.folder
+        new = folder.state(kicad_files.STAGE, _inputs(runner)) == "new"
+    if not keep or new:
+        export_into(modelfile, out, options, progress)
+        runner, synthesis, reused = _design(modelfile, out, options, progress)
+        folder = runner.folder
+    routing = route_in_folder(folder, synthesis, progress)
+    listed = {} if folder.manifest is None else folder.manifest.files
+    files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
+    made = _result(runner, files, reused)
+    return replace(made, answer={**made.answer, "routing": routing})
 
 
 def export_decks(

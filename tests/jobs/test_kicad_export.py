@@ -243,3 +243,34 @@ def test_the_sheet_takes_the_gate_s_settings_unless_somebody_changed_it(
     sheet.write_text("by hand")
     kicad_files.settle(folder, made, None)  # type: ignore[arg-type]
     assert sheet.read_text() == "by hand"
+
+
+def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "design"
+    shutil.copytree(made, folder)
+    board = folder / "kicad" / "linear-pair.kicad_pcb"
+    assert designer("export", folder, "--keep").returncode == 2
+    assert designer("export", folder, "--routed", "--deck", "ltspice").returncode == 2
+    done = designer("export", folder, "--routed", "--json")
+    assert done.returncode == 0, done.stderr
+    routing = json.loads(done.stdout)["routing"]
+    assert routing["open"] == {}
+    assert routing["vias"] > 0
+    routed = board.read_text("utf-8")
+    assert routed.count("(segment") > 20
+    # The manifest knows it: no verb takes it for a changed one, and nothing is left to route.
+    assert designer("export", folder, "-q").returncode == 0
+    again = designer("export", folder, "--routed", "--json")
+    assert json.loads(again.stdout)["routing"]["length_mm"] == 0.0
+    assert board.read_text("utf-8") == routed
+    # A track is taken away by hand, another one stays.
+    first = routed.index("\t(segment")
+    second = routed.index("\t(segment", first + 1)
+    board.write_text(routed[:first] + routed[second:], encoding="utf-8")
+    refused = designer("export", folder, "--routed")
+    assert refused.returncode == 2
+    assert "linear-pair.kicad_pcb" in refused.stderr
+    kept = designer("export", folder, "--routed", "--keep", "--json")
+    assert kept.returncode == 0, kept.stderr
+    assert json.loads(kept.stdout)["routing"]["length_mm"] > 0.0
+    assert designer("export", folder, "--routed").returncode == 2, "it is still somebody's board"

@@ -24,6 +24,7 @@ ORDER = (
     "check",
     "verdicts",
     "board",
+    "routing",
     "yields",
     "design_rules",
     "fabrication",

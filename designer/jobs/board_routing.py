@@ -1,0 +1,69 @@
+"""Tracks and pours on the board of a design folder, for the verb ``export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from designer.base.atomic_write import appearing
+from designer.base.design_folder import Folder
+from designer.base.manifest import file_hash
+from designer.base.progress import Progress
+from designer.board.board_parts import board_circuit
+from designer.board.component import components
+from designer.board.kicad_names import project_name
+from designer.board.kicad_reader import check_belongs, read_board
+from designer.board.kicad_rules import board_rules
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import kicad_files
+from designer.routing.routed_board import RoutedBoard, route_board
+
+
+def board_file(synthesis: Synthesis) -> str:
+    """The board's name inside the design folder."""
+    return f"{kicad_files.FOLDER}/{project_name(synthesis.modelfile.title)}.kicad_pcb"
+
+
+def route_in_folder(folder: Folder, synthesis: Synthesis, progress: Progress) -> dict[str, Any]:
+    """Route what is open on the folder's board; what the answer says of it.
+
+    A board that somebody has changed stays one: the manifest keeps the hash of what was written
+    before, so that no verb replaces it.
+
+    Raises
+    ------
+    InputError : the board cannot be read, or is of another design.
+    """
+    name = board_file(synthesis)
+    circuit, choice = board_circuit(synthesis)
+    there = read_board(folder / name)
+    check_belongs(there, components(circuit, synthesis.catalog, choice))
+    progress.stage("routing")
+    routed = route_board(there.text, circuit, board_rules(circuit, synthesis.modelfile.rules))
+    before = (folder / name).read_bytes()
+    if _as_written(folder, name, before):
+        folder.rewrite(name, routed.text)
+    else:
+        _replace(folder / name, routed.text)
+    return _answer(name, routed)
+
+
+def _as_written(folder: Folder, name: str, content: bytes) -> bool:
+    """Whether the file is what the manifest says."""
+    assert folder.manifest is not None
+    _, digest = folder.manifest.files.get(name, ("", None))
+    return digest is not None and digest == file_hash(name, content)
+
+
+def _replace(path: Path, text: str) -> None:
+    with appearing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def _answer(name: str, routed: RoutedBoard) -> dict[str, Any]:
+    return {
+        "board": name,
+        "open": dict(routed.open),
+        "length_mm": round(sum(routed.lengths.values()), 3),
+        "vias": routed.vias,
+    }

@@ -1,0 +1,131 @@
+"""The copper of a board file as shapes, and the board's edge. Millimetres, y downwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import shapely
+from shapely import Geometry
+
+from designer.base.sexpr import Atom, Expression
+from designer.board.kicad_reader import pad_corners, turned
+from designer.board.outline import pen_path, read_outline
+
+FRONT, BACK = "F.Cu", "B.Cu"
+CHORDS = 8
+"""Of a quarter of a circle."""
+NO_NET = 0
+"""KiCad's number of what is on no net."""
+
+
+@dataclass(frozen=True)
+class Copper:
+    """A piece of copper, or a hole, that is there before anything is routed."""
+
+    shape: Geometry
+    """Its area [mm]."""
+    net: int
+    """KiCad's number of its net."""
+    layers: tuple[bool, bool]
+    """Whether it is on the front, on the back."""
+    pad: bool = True
+    """Whether no via may be in it: a pad, a hole or a via."""
+    relief: bool = False
+    """Whether a pour leaves a thermal relief round it: a pad that is soldered."""
+
+
+@dataclass(frozen=True)
+class BoardCopper:
+    """What a router has to know of a board file."""
+
+    pieces: tuple[Copper, ...]
+    """Pads, tracks, vias, holes."""
+    nets: Mapping[int, str]
+    """KiCad's names of the nets by their number."""
+    edge: Geometry
+    """The board's edge as lines."""
+    area: Geometry
+    """What the outermost edge encloses, less the cut-outs."""
+
+
+def grown(shape: Geometry, by: float) -> Geometry:
+    """A shape with a border [mm] round it, or without one where ``by`` is below 0."""
+    wider: Geometry = shapely.buffer(shape, by, quad_segs=CHORDS)
+    return wider
+
+
+def read_copper(board: Expression) -> BoardCopper:
+    """Everything on the copper layers of a ``kicad_pcb``, but for zones.
+
+    Raises
+    ------
+    InputError : the board has no closed edge, or something is not as KiCad 9 writes it.
+    """
+    outline = read_outline(board)
+    if not len(outline.sides) or outline.open_at is not None:
+        raise board.error("no closed edge", "a closed line on Edge.Cuts")
+    edge = shapely.multilinestrings([shapely.linestrings(outline.sides)])[0]
+    pieces = [piece for each in board.all("footprint") for piece in _pads(each)]
+    pieces += [_track(each) for kind in ("segment", "arc") for each in board.all(kind)]
+    pieces += [_via(each) for each in board.all("via")]
+    return BoardCopper(
+        tuple(pieces),
+        {int(net.number(0)): net.text(1) for net in board.all("net")},
+        edge,
+        _enclosed(edge),
+    )
+
+
+def _enclosed(edge: Geometry) -> Geometry:
+    """The faces of a drawing of lines, alternately board and cut-out from the outside."""
+    faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(edge)]))
+    rings = sorted((shapely.polygons(f.exterior) for f in faces), key=lambda f: -float(f.area))
+    area: Geometry = shapely.Polygon()
+    for ring in rings:
+        area = shapely.symmetric_difference(area, ring)
+    return area
+
+
+def _pads(footprint: Expression) -> Iterator[Copper]:
+    at = footprint.get("at")
+    turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
+    for pad in footprint.all("pad"):
+        own = pad.get("at")
+        place = turned((own.number(0), own.number(1)), (at.number(0), at.number(1)), turn)
+        angle = math.radians(own.number(2) if len(own.atoms) > 2 else 0.0)
+        net = pad.find("net")
+        number = NO_NET if net is None else int(net.number(0))
+        layers = _layers(pad.get("layers").atoms)
+        yield Copper(_pad_shape(pad, place, angle), number, layers, relief=True)
+
+
+def _pad_shape(pad: Expression, place: tuple[float, float], angle: float) -> Geometry:
+    if pad.text(2) == "circle":
+        return grown(shapely.Point(place), pad.get("size").number() / 2.0)
+    corners = pad_corners(pad, place, angle)
+    if not corners:
+        raise pad.error("a shape that is not read", "a circle, a rectangle, an oval or a polygon")
+    return shapely.Polygon(corners)
+
+
+def _layers(names: Iterable[str]) -> tuple[bool, bool]:
+    there = set(names)
+    both = "*.Cu" in there or "F&B.Cu" in there
+    return both or FRONT in there, both or BACK in there
+
+
+def _track(item: Expression) -> Copper:
+    if item.name == "segment":
+        points = [(item.get(end).number(0), item.get(end).number(1)) for end in ("start", "end")]
+    else:
+        points = pen_path(Expression((Atom("gr_arc"), *item.items[1:]), item.source))
+    shape = grown(shapely.LineString(points), item.get("width").number() / 2.0)
+    return Copper(shape, int(item.get("net").number()), _layers(item.get("layer").atoms), pad=False)
+
+
+def _via(item: Expression) -> Copper:
+    at = item.get("at")
+    shape = grown(shapely.Point(at.number(0), at.number(1)), item.get("size").number() / 2.0)
+    return Copper(shape, int(item.get("net").number()), (True, True))

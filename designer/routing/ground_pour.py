@@ -1,0 +1,141 @@
+"""The ground pour of a layer: its area, filled round everything else, as KiCad keeps it.
+
+The file holds the filled shape, so that a board is whole before KiCad fills it anew. Pads get
+thermal relief: a gap all round, and bridges that a solder joint does not lose its heat through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import Geometry
+
+from designer.base.arrays import Array
+from designer.routing.board_copper import BoardCopper, grown
+from designer.routing.routing_grid import EDGE
+
+THINNEST = 0.25
+"""Least width of the pour [mm]."""
+RELIEF = 0.3
+"""Gap round a pad of ground [mm]."""
+BRIDGE = 0.4
+"""Width of a thermal bridge [mm]."""
+BRIDGES = 2
+"""Least number of bridges of a pad; with fewer its track alone joins it."""
+OVERLAP = 0.2
+"""How far a bridge reaches into the pour [mm]."""
+SLACK = 0.01
+"""More than each gap [mm]: corners of circles lie on them, chords inside."""
+
+
+@dataclass(frozen=True)
+class Pour:
+    """A pour of one layer."""
+
+    layer: int
+    """0 on the front, 1 on the back."""
+    border: Array
+    """(n, 2) corners of its border [mm]."""
+    fills: tuple[Array, ...]
+    """Each piece of it as corners (n, 2) [mm]: holes are joined to the outside by a cut."""
+
+
+def ground_pour(
+    copper: BoardCopper, ground: int, layer: int, clearances: Mapping[int, float], least: float
+) -> Pour:
+    """Fill a layer of a routed board.
+
+    ground : number of its net. clearances : of each net [mm]. least : of what is on no net, and of
+    the pour itself [mm].
+    """
+    border = shapely.buffer(copper.area, -EDGE - SLACK, join_style="mitre")
+    there = [piece for piece in copper.pieces if piece.layers[layer]]
+    own = [piece for piece in there if piece.net == ground]
+    foreign = shapely.union_all(
+        [
+            grown(p.shape, max(least, clearances.get(p.net, least)) + SLACK)
+            for p in there
+            if p.net != ground
+        ]
+    )
+    pads = [piece for piece in own if piece.relief]
+    reliefs = shapely.union_all([grown(p.shape, RELIEF + SLACK) for p in pads])
+    free = shapely.difference(border, foreign)
+    half = 0.5 * THINNEST + SLACK
+    open_ = grown(shapely.difference(free, reliefs), -half)
+    filled = grown(open_, half)
+    bridges = [b for pad in pads for b in _bridges(pad.shape, filled, free)]
+    filled = shapely.union_all([filled, *bridges])
+    anchors = shapely.union_all([p.shape for p in own])
+    parts = [p for p in shapely.get_parts(filled) if shapely.intersects(p, anchors)]
+    outline = max(shapely.get_parts(border), key=lambda part: float(part.area))
+    parts.sort(key=lambda part: shapely.bounds(part).tolist())
+    return Pour(
+        layer,
+        shapely.get_coordinates(outline.exterior)[:-1],
+        tuple(cut_open(part) for part in parts),
+    )
+
+
+def _bridges(pad: Geometry, filled: Geometry, free: Geometry) -> list[Geometry]:
+    """The thermal bridges of a pad that reach the pour; none where they are too few."""
+    left, top, right, bottom = shapely.bounds(pad)
+    x, y, half = 0.5 * (left + right), 0.5 * (top + bottom), 0.5 * BRIDGE
+    reach = RELIEF + OVERLAP
+    arms = (
+        (left - reach, y - half, x, y + half, left - reach, y),
+        (x, y - half, right + reach, y + half, right + reach, y),
+        (x - half, top - reach, x + half, y, x, top - reach),
+        (x - half, y, x + half, bottom + reach, x, bottom + reach),
+    )
+    out = []
+    for *box, end_x, end_y in arms:
+        arm = shapely.box(*box)
+        end = grown(shapely.Point(end_x, end_y), half)
+        if shapely.covers(free, arm) and shapely.covers(filled, end):
+            out.append(arm)
+    return out if len(out) >= BRIDGES else []
+
+
+def cut_open(polygon: Geometry) -> Array:
+    """A polygon with holes as one closed line, shape (n, 2), without a repeated end.
+
+    Each hole is joined, from its leftmost corner to the left, to what is there; the cut has no
+    width.
+    """
+    line: Array = shapely.get_coordinates(polygon.exterior)[:-1]
+    holes = [shapely.get_coordinates(ring)[:-1] for ring in polygon.interiors]
+    for hole in sorted(holes, key=lambda ring: tuple(ring[np.lexsort(ring.T[::-1])[0]])):
+        start = int(np.lexsort(hole.T[::-1])[0])
+        ring = np.roll(hole, -start, axis=0)
+        line = _joined(line, np.vstack([ring, ring[:1]]))
+    return line
+
+
+def _joined(line: Array, ring: Array) -> Array:
+    """A closed line with a ring inside it spliced in, by a cut to the left of the ring's start."""
+    x, y = ring[0]
+    ends = np.roll(line, -1, axis=0)
+    low, high = np.minimum(line[:, 1], ends[:, 1]), np.maximum(line[:, 1], ends[:, 1])
+    crossing = np.flatnonzero((low <= y) & (y <= high) & (np.minimum(line[:, 0], ends[:, 0]) <= x))
+    rise = ends[crossing, 1] - line[crossing, 1]
+    flat = rise == 0.0
+    share = np.where(flat, 0.0, (y - line[crossing, 1]) / np.where(flat, 1.0, rise))
+    at = line[crossing, 0] + share * (ends[crossing, 0] - line[crossing, 0])
+    at = np.where(flat, np.maximum(line[crossing, 0], ends[crossing, 0]), at)
+    at = np.where(at <= x, at, -np.inf)
+    side = int(crossing[np.argmax(at)])
+    corner = np.array([[at.max(), y]])
+    return np.vstack([line[: side + 1], corner, ring, corner, line[side + 1 :]])
+
+
+def pour_corners(points: Sequence[tuple[float, float]] | Array) -> Iterator[tuple[float, float]]:
+    """Corners as they are written: in steps of 0.1 µm, without repetition."""
+    last: tuple[float, float] | None = None
+    for x, y in np.round(points, 4).tolist():
+        if (x, y) != last:
+            yield x, y
+        last = x, y

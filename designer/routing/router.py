@@ -1,0 +1,162 @@
+"""Joining the terminals of every net: all at once at first, then those again that meet.
+
+Each net takes its cheapest way, at first over others too. Where two meet, the place becomes dearer
+from round to round, until every place has one net: negotiated congestion (McMurchie, Ebeling 1995).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from designer.base.progress import doing
+from designer.routing.board_copper import NO_NET, BoardCopper, Copper
+from designer.routing.kernel_router import BREAK, HISTORY, UNIT, Tariff, conflicts, count, route
+from designer.routing.net_kinds import NetKind
+from designer.routing.routing_grid import Nodes, RoutingGrid, routing_grid
+
+ROUNDS = 100
+"""Most rounds of negotiation."""
+PRESSURE, GROWTH, MOST_PRESSURE = 8, 1.4, 4000
+"""Of the first round, from round to round, at most; in units of UNIT."""
+
+
+@dataclass(frozen=True)
+class Terminals:
+    """What is to be joined on one net."""
+
+    net: int
+    """KiCad's number of the net."""
+    kind: int
+    """Index of its kind."""
+    starts: NDArray[np.int64]
+    """(T + 1,) where each terminal's nodes begin in ``nodes``."""
+    nodes: Nodes
+    """The nodes of all terminals."""
+
+
+@dataclass(frozen=True)
+class Routes:
+    """The paths of every net."""
+
+    grid: RoutingGrid
+    """The grid that nodes are of."""
+    paths: Mapping[int, tuple[Nodes, ...]]
+    """By net: runs of neighbouring nodes."""
+    open: Mapping[int, int]
+    """Nets with connections that no way was found for, and how many."""
+    rounds: int
+    """Rounds of negotiation."""
+
+
+def find_routes(copper: BoardCopper, kinds: Sequence[NetKind], of: Mapping[int, str]) -> Routes:
+    """Routes for everything on a board that is not joined yet. of : name of the kind of each net.
+
+    The same board has the same routes on every machine.
+    """
+    names = [kind.name for kind in kinds]
+    index = {net: names.index(name) for net, name in of.items()}
+    grid = routing_grid(copper, kinds, index)
+    nets = list(_nets(copper, grid, kinds, index))
+    return _Negotiation(grid, kinds, nets).routes()
+
+
+def _nets(
+    copper: BoardCopper, grid: RoutingGrid, kinds: Sequence[NetKind], of: Mapping[int, int]
+) -> list[Terminals]:
+    """Nets with two terminals or more, by kind, the shorter ones first."""
+    out = []
+    for net in copper.nets:
+        pieces = [p for p in copper.pieces if p.net == net and net != NO_NET]
+        groups = _joined(pieces)
+        if len(groups) < 2:
+            continue
+        box = shapely.bounds(shapely.union_all([p.shape for p in pieces]))
+        kind = of[net]
+        lists = [
+            [n for piece in group for n in grid.nodes_in(piece, kinds[kind].half)]
+            for group in groups
+        ]
+        ends = np.cumsum([0, *map(len, lists)])
+        flat = np.array([n for each in lists for n in each], dtype=np.int32)
+        size = round(float(box[2] - box[0] + box[3] - box[1]), 3)
+        out.append(((kind, size, copper.nets[net]), Terminals(net, kind, ends, flat)))
+    return [terminals for _, terminals in sorted(out, key=lambda each: each[0])]
+
+
+def _joined(pieces: Sequence[Copper]) -> list[list[Copper]]:
+    """The pieces of a net in groups that touch one another."""
+    groups: list[list[Copper]] = []
+    for piece in pieces:
+        touching = [g for g in groups if any(_touch(piece, other) for other in g)]
+        groups = [g for g in groups if g not in touching]
+        groups.append([*(each for g in touching for each in g), piece])
+    return groups
+
+
+def _touch(a: Copper, b: Copper) -> bool:
+    shared = any(one and other for one, other in zip(a.layers, b.layers, strict=True))
+    return shared and bool(shapely.intersects(a.shape, b.shape))
+
+
+class _Negotiation:
+    """The rounds on one board."""
+
+    def __init__(
+        self, grid: RoutingGrid, kinds: Sequence[NetKind], nets: Sequence[Terminals]
+    ) -> None:
+        self.grid, self.kinds, self.nets = grid, kinds, nets
+        arrays = grid.arrays
+        self.marks = np.zeros(arrays.taken.shape, dtype=np.int32)
+        self.via_marks = np.zeros(arrays.via_taken.shape, dtype=np.int32)
+        self.mark = 0
+        self.out = np.zeros(4 * arrays.places, dtype=np.int32)
+        self.paths: dict[int, Nodes] = {}
+        self.open: dict[int, int] = {}
+
+    def routes(self) -> Routes:
+        pressure, todo, rounds = float(PRESSURE), list(self.nets), 0
+        while todo and rounds < ROUNDS:
+            rounds += 1
+            doing(f"routing, round {rounds}, {len(todo)} nets")
+            for net in todo:
+                self._route(net, round(pressure))
+            pressure = min(GROWTH * pressure, MOST_PRESSURE)
+            todo = [net for net in self.nets if self._conflicts(net, HISTORY // 2)]
+        for net in reversed(todo):  # what could not be settled stays open: no two nets touch
+            if self._conflicts(net, 0):
+                self._count(net, -1)
+                self.open[net.net] = len(net.starts) - 2
+                self.paths[net.net] = np.zeros(0, dtype=np.int32)
+        paths = {net: _runs(nodes) for net, nodes in self.paths.items()}
+        return Routes(self.grid, paths, {n: k for n, k in self.open.items() if k}, rounds)
+
+    def _route(self, net: Terminals, pressure: int) -> None:
+        """Take a net's paths out, and find its cheapest ones among the others."""
+        if net.net in self.paths:
+            self._count(net, -1)
+        kind, arrays = self.kinds[net.kind], self.grid.arrays
+        tariff = Tariff(
+            net.net, net.kind, kind.front, kind.back, kind.via, pressure * kind.yields // UNIT
+        )
+        size, left = route(arrays, tariff, self.grid.work, net.starts, net.nodes, self.out)
+        self.paths[net.net], self.open[net.net] = self.out[:size].copy(), left
+        self._count(net, 1)
+
+    def _count(self, net: Terminals, sign: int) -> None:
+        self.mark += 1
+        grid, reaches = self.grid.arrays, self.grid.reaches[net.kind]
+        count(grid, self.paths[net.net], reaches, self.marks, self.via_marks, self.mark, sign)
+
+    def _conflicts(self, net: Terminals, history: int) -> int:
+        return conflicts(self.grid.arrays, net.kind, self.paths[net.net], history)
+
+
+def _runs(nodes: Nodes) -> tuple[Nodes, ...]:
+    """The paths of a kernel's answer."""
+    runs = (run[run != BREAK] for run in np.split(nodes, np.flatnonzero(nodes == BREAK)))
+    return tuple(run for run in runs if len(run))

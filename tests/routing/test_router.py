@@ -1,0 +1,167 @@
+"""Routed boards without KiCad: what touches what, by shapes that the router did not make."""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, strategies as st
+
+from designer.base.errors import InputError
+from designer.base.sexpr import Expression, expression_text, read
+from designer.board.kicad_names import circuit_net
+from designer.board.kicad_rules import board_rules
+from designer.routing.board_copper import BoardCopper, read_copper
+from designer.routing.ground_pour import cut_open
+from designer.routing.net_kinds import kinds_of_nets, net_kinds
+from designer.routing.routed_board import RoutedBoard, route_board
+from tests.shared.kicad_cases import case, case_files
+
+NAME = "one mass"
+
+
+def placed() -> str:
+    return next(text for name, text in case_files(NAME).items() if name.endswith(".kicad_pcb"))
+
+
+@cache
+def routed() -> RoutedBoard:
+    circuit = case(NAME).circuit
+    return route_board(placed(), circuit, board_rules(circuit))
+
+
+@cache
+def copper() -> BoardCopper:
+    return read_copper(read(routed().text))
+
+
+def test_every_net_is_one_piece() -> None:
+    """Pads, tracks and vias of a net, joined where they touch on a side, are all joined."""
+    assert routed().open == {}
+    for net in set(copper().nets) - {0}:
+        pieces = [p for p in copper().pieces if p.net == net]
+        sides = [
+            shapely.union_all([p.shape for p in pieces if p.layers[layer]]) for layer in (0, 1)
+        ]
+        parts = [part for side in sides for part in shapely.get_parts(side)]
+        through = [p.shape for p in pieces if p.layers == (True, True)]
+        group, rest = parts[:1], parts[1:]
+        while near := [
+            part
+            for part in rest
+            if any(
+                shapely.intersects(part, hole) and any(shapely.intersects(g, hole) for g in group)
+                for hole in through
+            )
+        ]:
+            group += near
+            rest = [part for part in rest if not any(part is n for n in near)]
+        assert rest == [], copper().nets[net]
+
+
+def test_nets_stay_apart_as_their_classes_say() -> None:
+    kinds = {kind.name: kind for kind in net_kinds(board_rules(case(NAME).circuit))}
+    of = kinds_of_nets(case(NAME).circuit, copper().nets)
+    for layer in (0, 1):
+        nets = {
+            net: shapely.union_all(
+                [p.shape for p in copper().pieces if p.net == net and p.layers[layer]]
+            )
+            for net in copper().nets
+        }
+        tracks = {p.net for p in copper().pieces if not p.pad and p.layers[layer]}
+        for one, other in itertools.combinations(sorted(nets), 2):
+            if one in tracks or other in tracks:
+                wanted = max(kinds[of[one]].clearance, kinds[of[other]].clearance)
+                gap = shapely.distance(nets[one], nets[other])
+                assert np.isnan(gap) or gap > wanted - 1e-3
+
+
+def test_summing_nodes_are_short_and_stay_on_the_front() -> None:
+    circuit = case(NAME).circuit
+    nodes = {s.inverting for s in circuit.sections} - {"0"}
+    assert max(routed().lengths.get(node, 0.0) for node in nodes) < 25.0
+    vias = read(routed().text).all("via")
+    names = copper().nets
+    assert vias
+    assert not nodes & {circuit_net(names[int(v.get("net").number())]) for v in vias}
+
+
+def test_the_same_board_twice_and_nothing_more_on_a_routed_one() -> None:
+    circuit = case(NAME).circuit
+    rules = board_rules(circuit)
+    assert route_board(placed(), circuit, rules) == routed()
+    again = route_board(routed().text, circuit, rules)
+    assert again.text == routed().text
+    assert (again.vias, sum(again.lengths.values())) == (0, 0.0)
+
+
+def test_what_is_routed_stays_and_what_is_open_is_routed() -> None:
+    """Without the tracks of one net, and with a part that somebody has moved."""
+    circuit = case(NAME).circuit
+    board = read(routed().text)
+    nets = {net.text(1): net.text(0) for net in board.all("net")}
+    left = tuple(
+        item
+        for item in board.items
+        if not (
+            isinstance(item, Expression)
+            and item.name in ("segment", "via")
+            and item.get("net").text() == nets["/v1"]
+        )
+    )
+    again = route_board(expression_text(Expression(left)), circuit, board_rules(circuit))
+    assert again.open == {}
+    assert {net for net, length in again.lengths.items() if length} == {"v1"}
+    kept = {item.get("uuid").text(0) for item in Expression(left).all("segment")}
+    assert kept <= {item.get("uuid").text(0) for item in read(again.text).all("segment")}
+
+
+def test_a_net_that_nothing_leads_to_stays_open_and_touches_nothing() -> None:
+    """A pad walled in by a ring of foreign copper on both sides."""
+    wall = "".join(
+        f'(segment (start {x0} {y0}) (end {x1} {y1}) (width 0.3) (layer "{layer}") (net 2))'
+        for layer in ("F.Cu", "B.Cu")
+        for x0, y0, x1, y1 in ((3, 3, 7, 3), (7, 3, 7, 7), (7, 7, 3, 7), (3, 7, 3, 3))
+    )
+    circuit = case(NAME).circuit
+    answer = route_board(small(wall), circuit, board_rules(circuit))
+    assert answer.open == {"v1": 1}
+    assert answer.lengths.get("v1", 0.0) == 0.0
+    free = route_board(small(""), circuit, board_rules(circuit))
+    assert free.open == {}
+    # 10 mm between the pads; a track may end at any place inside one.
+    assert free.lengths["v1"] == pytest.approx(10.0, abs=1.0)
+
+
+def test_a_board_without_an_edge_is_refused() -> None:
+    circuit = case(NAME).circuit
+    with pytest.raises(InputError, match=r"Edge\.Cuts"):
+        route_board(small("").replace("Edge.Cuts", "Dwgs.User"), circuit, board_rules(circuit))
+
+
+def small(more: str) -> str:
+    """Two pads of one net, 10 mm apart."""
+    pads = "".join(
+        f'(footprint "p" (layer "F.Cu") (at {x} 5) (pad "1" smd rect (at 0 0) (size 1 1) '
+        '(layers "F.Cu" "F.Mask") (net 1 "/v1")))'
+        for x in (5, 15)
+    )
+    return (
+        '(kicad_pcb (version 20241229) (net 0 "") (net 1 "/v1") (net 2 "/v2")'
+        f'(gr_rect (start 0 0) (end 20 10) (layer "Edge.Cuts")){pads}{more})'
+    )
+
+
+@given(st.lists(st.tuples(st.integers(1, 18), st.integers(1, 18)), max_size=6, unique=True))
+def test_a_pour_with_holes_is_one_line_of_the_same_area(corners: list[tuple[int, int]]) -> None:
+    holes = shapely.union_all([shapely.box(x, y, x + 0.7, y + 0.6) for x, y in corners])
+    whole = shapely.difference(shapely.box(0, 0, 20, 20), holes)
+    line = cut_open(whole)
+    x, y = line.T
+    area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    assert area == pytest.approx(float(whole.area))
+    assert shapely.Polygon(line).buffer(0.0).symmetric_difference(whole).area < 1e-9
