@@ -84,20 +84,27 @@ class Contribution:
     without: tuple[float, float] | None
     """Rank of the final design with this lever moved back; None where there is no such design."""
     by: str = "exact"
-    """Who moved it: the ``exact`` circuit's boards, or ``ngspice``, whose reason no exact distance
-    shows."""
+    """Who moved it: the ``exact`` circuit's boards, or op-amps that take time, ``bandwidth`` or
+    ``ngspice``, whose reason no exact distance shows."""
 
 
 @dataclass(frozen=True)
-class NgspiceOutcome:
-    """How ngspice agrees with the exact circuit about a design."""
+class RungOutcome:
+    """How op-amps that take time agree with the exact circuit about a design."""
 
+    rung: str
+    """Who was asked: the exact circuit with ``bandwidth``, or ngspice's ``dynamic``."""
     frequency: float
     """Frequency at ω = 1 [Hz]."""
     agreements: tuple[Agreement, ...]
-    """By response, how many boards both engines agree on."""
-    adopted: bool
+    """By response, how many boards show it on both."""
+    adopted: bool = False
     """Whether this design was chosen."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether no response is shown to be lost."""
+        return not any(a.borne_out is False for a in self.agreements)
 
 
 @dataclass(frozen=True)
@@ -114,8 +121,9 @@ class SearchResult:
     """The levers that were tried, in order."""
     contributions: tuple[Contribution, ...]
     """What each lever that moved is worth."""
-    checks: tuple[NgspiceOutcome, ...]
-    """ngspice's outcome for the final design and slower ones; empty where ngspice was not run."""
+    checks: tuple[RungOutcome, ...]
+    """What op-amps that take time make of the design and slower ones, in the order in which they
+    were asked; empty where ngspice was not to be asked."""
     windows: tuple[tuple[Stretch, ...], ...]
     """By response, the stretches where it is shown."""
     candidates: int

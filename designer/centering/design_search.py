@@ -5,16 +5,16 @@ Over all wanted responses, in this order: the smallest of their distances from b
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
 responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
-where it is unless something is gained. At the end ngspice is asked whether it bears the design out;
-where it does not, slower ones are made, and the one is taken of whose worst response ngspice keeps
-the most boards.
+where it is unless something is gained. At the end the exact circuit with bandwidth is asked whether
+it bears the design out, then ngspice; where one does not, slower ones are made, and of those that
+ngspice was asked about the one is taken of whose worst response it keeps the most boards.
 
 Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from scipy.stats import norm
@@ -24,10 +24,11 @@ from designer.base.progress import Progress
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.centering.answer_cache import AnswerCache
+from designer.centering.bandwidth_check import BANDWIDTH, LaggingBoards
 from designer.centering.candidate import (
     Candidate,
     Contribution,
-    NgspiceOutcome,
+    RungOutcome,
     SearchResult,
     Step,
     better,
@@ -42,7 +43,7 @@ from designer.centering.levers import (
     topologies,
     variants,
 )
-from designer.centering.ngspice_check import LISTENED, RUNG, Agreement, Listen
+from designer.centering.ngspice_check import LISTENED, RUNG, Listen
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.windows import OperatingPoint, Stretch, open_in, stretches
 from designer.check.synthesis_result import Synthesis
@@ -149,7 +150,7 @@ class _Hunt:
     ) -> None:
         self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
         self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
-        self.listen, self.checks = listen, list[NgspiceOutcome]()
+        self.listen, self.checks = listen, list[RungOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
@@ -241,46 +242,62 @@ class _Hunt:
         return candidate if candidate is not None and gained else best
 
     def _borne_out(self, best: Candidate) -> Candidate:
-        """The design, or the same with a slower time scale where ngspice loses boards of it."""
+        """The design, or the same with a slower time scale where real op-amps lose boards of it.
+
+        ngspice is asked about what the exact circuit with bandwidth bears out, until one design
+        stands; where it bears none out, about the one of which it keeps the most boards.
+        """
         if self.listen is None:
             return best
-        checked: list[tuple[Candidate, float, tuple[Agreement, ...]]] = []
-        unit = self.modelfile.model.second_order().own_frequency
-        frequency = best.design.errors.scales.frequency(unit)
-        low, _ = self.modelfile.circuit.frequency
-        for choice in (best.choice, *slower(best.choice, frequency, low)):
-            candidate: Candidate | None = best
-            if choice != best.choice:
-                candidate = self._candidate(
-                    choice, best.model_responses, f"time scale {_setting_text(choice.frequency)}"
-                )
-            if candidate is None:
-                self._note("time scale", _setting_text(choice.frequency), None, False)
-                continue
-            at = candidate.design.errors.scales.frequency(unit)
-            step = self.progress.stage(
-                f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(candidate.scored)
-            )
-            responses, design = candidate.model_responses, candidate.design
-            bench = self._bench(candidate.choice, responses, design, LISTENED)
-            agreements = self.listen(bench, [s.stand for s in candidate.scored], step)
-            checked.append((candidate, at, agreements))
-            if not any(h.borne_out is False for h in agreements):
-                break
-        answered = [r for r, h in enumerate(checked[0][2]) if h.borne_out is not None]
-        final = max(checked, key=lambda t: min((t[2][r].ngspice for r in answered), default=0))[0]
-        for candidate, at, agreements in checked:
-            self.checks.append(NgspiceOutcome(at, agreements, candidate is final))
-            text = ", ".join(str(h) for h in agreements)
-            self.progress.note(f"  {at:.4g} Hz: boards that ngspice keeps, by response: {text}")
+        lagging: list[tuple[Candidate, RungOutcome]] = []
+        confirmed: list[tuple[Candidate, RungOutcome]] = []
+        for candidate in self._slower(best):
+            lagging.append(self._asked(candidate, BANDWIDTH, LaggingBoards(self.memory)))
+            if lagging[-1][1].stands:
+                confirmed.append(self._asked(candidate, RUNG, self.listen))
+                if confirmed[-1][1].stands:
+                    break
+        if not confirmed:
+            confirmed.append(self._asked(_most_surviving(lagging), RUNG, self.listen))
+        final = _most_surviving(confirmed)
+        for candidate, outcome in lagging + confirmed:
+            self.checks.append(replace(outcome, adopted=candidate is final))
+        for candidate, _ in lagging:
             if candidate is not best:
-                self._note(
-                    "time scale",
-                    _setting_text(candidate.choice.frequency),
-                    candidate,
-                    candidate is final,
-                )
+                setting = _setting_text(candidate.choice.frequency)
+                self._note("time scale", setting, candidate, candidate is final)
         return final
+
+    def _slower(self, best: Candidate) -> Iterator[Candidate]:
+        """The design, and as it is with slower time scales."""
+        yield best
+        low, _ = self.modelfile.circuit.frequency
+        for choice in slower(best.choice, self._frequency(best), low):
+            setting = _setting_text(choice.frequency)
+            candidate = self._candidate(choice, best.model_responses, f"time scale {setting}")
+            if candidate is None:
+                self._note("time scale", setting, None, False)
+            else:
+                yield candidate
+
+    def _frequency(self, candidate: Candidate) -> float:
+        """[Hz] at ω = 1."""
+        unit = self.modelfile.model.second_order().own_frequency
+        return candidate.design.errors.scales.frequency(unit)
+
+    def _asked(
+        self, candidate: Candidate, rung: str, listen: Listen
+    ) -> tuple[Candidate, RungOutcome]:
+        frequency = self._frequency(candidate)
+        engine = "exact circuit with" if rung == BANDWIDTH else "ngspice, rung"
+        title = f"{engine} {rung}, {frequency:.4g} Hz at ω = 1"
+        step = self.progress.stage(title, len(candidate.scored))
+        responses, design = candidate.model_responses, candidate.design
+        bench = self._bench(candidate.choice, responses, design, LISTENED)
+        agreements = listen(bench, [s.stand for s in candidate.scored], step)
+        text = ", ".join(map(str, agreements))
+        self.progress.note(f"  {title}: boards that show it as well, by response: {text}")
+        return candidate, RungOutcome(rung, frequency, agreements)
 
     def _bench(
         self, choice: DesignChoice, responses: Sequence[ModelResponse], design: Design, boards: int
@@ -338,6 +355,7 @@ class _Hunt:
                 )
             )
         slowed = bool(self.checks) and not self.checks[0].adopted
+        slower_for = "ngspice" if slowed and self.checks[0].stands else BANDWIDTH
         for lever in LEVERS:
             before, after = start.choice.get(lever), final.choice.get(lever)
             if before != after:
@@ -348,7 +366,7 @@ class _Hunt:
                         _setting_text(after),
                         self._rank(start.choice.with_lever(lever, after), start.model_responses),
                         self._rank(final.choice.with_lever(lever, before), final.model_responses),
-                        "ngspice" if slowed and lever == "time scale" else "exact",
+                        slower_for if slowed and lever == "time scale" else "exact",
                     )
                 )
         return tuple(out)
@@ -409,6 +427,16 @@ class _Hunt:
                 f"  {lever}: {setting}: smallest distance {candidate.rank[0]:.2f} σ "
                 f"(predicted yield {worst:.4f}){', kept' if adopted else ''}"
             )
+
+
+def _most_surviving(asked: Sequence[tuple[Candidate, RungOutcome]]) -> Candidate:
+    """The design whose worst response most boards keep, of those that the first has answers to."""
+    answered = [r for r, a in enumerate(asked[0][1].agreements) if a.borne_out is not None]
+
+    def worst(one: tuple[Candidate, RungOutcome]) -> int:
+        return min((one[1].agreements[r].survivors for r in answered), default=0)
+
+    return max(asked, key=worst)[0]
 
 
 def _setting_text(value: object) -> str:

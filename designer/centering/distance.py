@@ -182,12 +182,31 @@ class Stretched:
 
     def subjects(self, stand: Stand, boards: range, stretch: float) -> list[GateSubject]:
         """Those of these boards that show the response at this stretch, for ngspice."""
-        rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
-        starts = np.tile(stand.orbit.start, (len(rows), 1))
-        orbits = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
         excitation = self.excitation(stand.place)
         return [
             GateSubject(self._boards.reduction(row), excitation, orbit)
+            for row, orbit in self._showing(stand, boards, stretch)
+        ]
+
+    def lagging(self, stand: Stand, boards: range, stretch: float) -> list[Orbit]:
+        """Where those of these boards that show the response at this stretch settle from their own
+        orbit, their op-amps with bandwidth."""
+        showing = self._showing(stand, boards, stretch)
+        if not showing:
+            return []
+        rows, orbits = zip(*showing, strict=True)
+        some = Ensemble(self._boards.boards.take(rows), jobs=self.jobs, bandwidth=True)
+        starts = np.array([orbit.start for orbit in orbits])
+        drives = [stand.drive] * len(rows)
+        return some.settle(range(len(rows)), drives, starts, jobs=self.jobs)
+
+    def _showing(self, stand: Stand, boards: range, stretch: float) -> list[tuple[int, Orbit]]:
+        """Rows and orbits of those of these boards that show the response at this stretch."""
+        rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
+        starts = np.tile(stand.orbit.start, (len(rows), 1))
+        orbits = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
+        return [
+            (row, orbit)
             for row, orbit in zip(rows, orbits, strict=True)
             if orbit is not None and _shows(orbit, stand)
         ]

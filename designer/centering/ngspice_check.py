@@ -1,6 +1,7 @@
 """What ngspice says of a candidate, on op-amps with gain-bandwidth and slew rate.
 
-A search decides on the exact circuit, whose op-amps are ideal up to their limits. Real ones take
+A search decides on the exact circuit, whose op-amps are ideal up to their limits; then the exact
+circuit with bandwidth is asked (``bandwidth_check``), and ngspice to confirm that. Real ones take
 time at the dead zone: while its diodes change over, the loop is open and the output has to cross
 two diode drops, so a contact comes late by about √(2·V/(GBW·β·dv/dt)), and a late spring force is
 negative damping. In units of the model's time this falls with the root of the frequency at ω = 1,
@@ -38,12 +39,13 @@ REFINEMENTS = 1
 
 @dataclass(frozen=True)
 class Agreement:
-    """How many of ``LISTENED`` boards of one response both engines agree on."""
+    """How many of ``LISTENED`` boards show one response on the exact circuit and with op-amps that
+    take time: in ngspice, or on the exact circuit with bandwidth."""
 
     exact: int
     """Boards that show it on the exact circuit."""
-    ngspice: int
-    """Of these, boards that show it in ngspice as well."""
+    survivors: int
+    """Of these, boards that show it with those op-amps as well."""
     unanswered: int = 0
     """Boards of these without an answer: too long a way to be asked, runs that failed,
     step sizes of which one shows it, a contact that cannot be counted, a numerics gate that does
@@ -51,13 +53,13 @@ class Agreement:
 
     def __str__(self) -> str:
         open_ = f" ({self.unanswered} without an answer)" if self.unanswered else ""
-        return f"{self.ngspice}/{self.exact}{open_}"
+        return f"{self.survivors}/{self.exact}{open_}"
 
     @property
     def borne_out(self) -> bool | None:
         """None where there are too few answers to tell."""
         answers = self.exact - self.unanswered
-        return answers - self.ngspice <= FEWER if answers >= LEAST else None
+        return answers - self.survivors <= FEWER if answers >= LEAST else None
 
 
 Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Agreement, ...]]

@@ -8,6 +8,7 @@ from typing import Any
 
 from scipy.stats import norm
 
+from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import Candidate, Contribution, SearchResult
 from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
@@ -44,23 +45,35 @@ def search_json(result: SearchResult) -> dict[str, Any]:
             for s in result.steps
         ],
         "contributions": [_contribution(c) for c in result.contributions],
-        "ngspice": {
-            "rung": RUNG,
-            "stretch": STRETCH,
-            "designs": [
-                {
-                    "frequency_hz": row.frequency,
-                    "kept": row.adopted,
-                    "responses": [{**h.__dict__, "borne_out": h.borne_out} for h in row.agreements],
-                }
-                for row in result.checks
-            ],
-        },
+        "bandwidth": _checks(result, BANDWIDTH, "bandwidth"),
+        "ngspice": _checks(result, RUNG, "ngspice"),
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
             for row in result.windows
         ],
     }
+
+
+def _checks(result: SearchResult, rung: str, survivors: str) -> dict[str, Any]:
+    """What a rung was asked about. survivors : key of the boards that it keeps."""
+    designs = [
+        {
+            "frequency_hz": row.frequency,
+            "kept": row.adopted,
+            "responses": [
+                {
+                    "exact": a.exact,
+                    survivors: a.survivors,
+                    "unanswered": a.unanswered,
+                    "borne_out": a.borne_out,
+                }
+                for a in row.agreements
+            ],
+        }
+        for row in result.checks
+        if row.rung == rung
+    ]
+    return {"rung": rung, "stretch": STRETCH, "designs": designs}
 
 
 def confirmation_json(

@@ -36,7 +36,7 @@ from designer.spice.pool import SpicePool
 
 ASKED, CANDIDATES = "asked.toml", "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
-RULES = 5
+RULES = 6
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 

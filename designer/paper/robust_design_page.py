@@ -188,8 +188,9 @@ def _levers(levers: Sequence[Mapping[str, Any]]) -> Table | None:
         return "no such design" if distance is None else f"{distance:.2f} σ"
 
     def name(lever: Mapping[str, Any]) -> str:
-        """A lever that ngspice moved costs distance on the exact circuit, if anything."""
-        note = " (for ngspice)" if lever.get("by") == "ngspice" else ""
+        """A lever that real op-amps moved costs distance on the exact circuit, if anything."""
+        by = lever.get("by", "exact")
+        note = "" if by == "exact" else f" (for {by})"
         return f"{lever['lever']}{note}"
 
     columns: Columns = {

@@ -11,11 +11,12 @@ import pytest
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.centering import levers
-from designer.centering.candidate import ALIKE, GAIN, Candidate, NgspiceOutcome, better
+from designer.centering.bandwidth_check import BANDWIDTH
+from designer.centering.candidate import ALIKE, GAIN, Candidate, RungOutcome, better
 from designer.centering.design_search import BOARDS, look, search
 from designer.centering.distance import Stand, Stretched
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
-from designer.centering.ngspice_check import Agreement
+from designer.centering.ngspice_check import RUNG, Agreement
 from designer.centering.operating_points import Scored, score
 from designer.centering.windows import OperatingPoint, Stretch
 from designer.model import find_responses
@@ -158,6 +159,9 @@ def test_a_dead_zone_gets_its_chance_at_the_places_that_were_found(
     assert not any(better(c.rank, found.final.rank) for c in every)
 
 
+Agreements = tuple[Agreement, ...]
+
+
 def _enumerated(modelfile: ModelFile, choice: DesignChoice) -> Candidate:
     model, spec = modelfile.model, choice.spec(modelfile.circuit)
     found = find_responses.find(model, modelfile.responses)
@@ -177,7 +181,7 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     wanted = file(PLACE)
 
-    def asked(limit: float) -> list[NgspiceOutcome]:
+    def asked(limit: float) -> list[RungOutcome]:
         def listen(
             bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
         ) -> tuple[Agreement, ...]:
@@ -186,9 +190,13 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
             return (Agreement(16, 8 if fast else 15),) * len(stands)
 
         found = search(wanted, catalog(), listen=listen)
-        (kept,) = [h for h in found.checks if h.adopted]
+        lagging = [h for h in found.checks if h.rung == BANDWIDTH]
+        checks = [h for h in found.checks if h.rung == RUNG]
+        assert all(h.stands for h in lagging)
+        assert [h.frequency for h in lagging] == [h.frequency for h in checks]
+        (kept,) = [h for h in checks if h.adopted]
         assert found.synthesis.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
-        return list(found.checks)
+        return checks
 
     free = asked(1e9)
     assert len(free) == 1
@@ -217,7 +225,35 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     wanted = file(PLACE)
     fastest = [search(wanted, catalog()).synthesis.design.errors.scales.frequency(1.0)]
     found = search(wanted, catalog(), listen=listen)
-    assert [h.adopted for h in found.checks] == [True, False]
+    assert [h.adopted for h in found.checks if h.rung == RUNG] == [True, False]
+
+
+@pytest.mark.parametrize("bears_out", [True, False])
+def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
+    monkeypatch: pytest.MonkeyPatch, bears_out: bool
+) -> None:
+    """The bandwidth bears out the third time scale or none, ngspice all: it is asked once."""
+    monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
+    asked: list[float] = []
+
+    def listen(bench: Stretched, stands: Sequence[Stand | None], _: object) -> Agreements:
+        asked.append(bench.design.errors.scales.frequency(1.0))
+        return (Agreement(16, 16),) * len(stands)
+
+    played = itertools.chain([8, 8], itertools.repeat(15 if bears_out else 8))
+
+    def lagging(_: object) -> Callable[..., Agreements]:
+        return lambda bench, stands, progress: (Agreement(16, next(played)),) * len(stands)
+
+    monkeypatch.setattr("designer.centering.design_search.LaggingBoards", lagging)
+    found = search(file(PLACE), catalog(), listen=listen)
+    answers = [h.adopted for h in found.checks if h.rung == BANDWIDTH]
+    if bears_out:
+        assert answers == [False, False, True]
+    else:  # the first of the best
+        assert answers == [True] + [False] * (len(answers) - 1)
+        assert len(answers) > 2
+    assert asked == [h.frequency for h in found.checks if h.rung == RUNG and h.adopted]
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:

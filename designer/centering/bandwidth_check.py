@@ -1,0 +1,51 @@
+"""What the exact circuit with bandwidth says of a candidate, before ngspice is asked.
+
+The question is that of ``ngspice_check``: which boards that show a response on the exact circuit
+keep it with op-amps that take time, started on their own orbit. The exact flow answers it in
+milliseconds a board (``circuit.nodal_bandwidth``), where ngspice takes seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from designer.centering.answer_cache import AnswerCache
+from designer.centering.distance import Stand, Stretched
+from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement
+from designer.verdicts.verdict import Verdict, judge
+
+BANDWIDTH = "bandwidth"
+"""Name of the rung."""
+
+
+class LaggingBoards:
+    """Asks the exact circuit with bandwidth, and remembers. memory : of the search."""
+
+    def __init__(self, memory: AnswerCache) -> None:
+        self._memory = memory
+
+    def __call__(
+        self,
+        bench: Stretched,
+        stands: Sequence[Stand | None],
+        progress: Callable[[], None] = lambda: None,
+    ) -> tuple[Agreement, ...]:
+        """For each response; where the nominal board does not show it there is nothing to ask."""
+        out = []
+        for stand in stands:
+            agreement = Agreement(0, 0)
+            if stand is not None:
+                query = [BANDWIDTH, bench.query(stand, range(LISTENED), (STRETCH,))]
+                (counts,) = self._memory.get_all([query], partial(_counted, bench, stand))
+                agreement = Agreement(*counts)
+            out.append(agreement)
+            progress()
+        return tuple(out)
+
+
+def _counted(bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
+    orbits = bench.lagging(stand, range(LISTENED), STRETCH)
+    verdicts = [judge(orbit, stand.spec, stand.orbit)[0] for orbit in orbits]
+    unanswered = sum(v in (Verdict.GRAZING, Verdict.FAILED) for v in verdicts)
+    return [(len(orbits), verdicts.count(Verdict.OK), unanswered)]
