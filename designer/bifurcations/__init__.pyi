@@ -1,5 +1,6 @@
 from . import (
     basins as basins,
+    border_curves as border_curves,
     captions as captions,
     parameter_map as parameter_map,
     point_captions as point_captions,
@@ -12,6 +13,10 @@ from .basins import (
     BasinPlan as BasinPlan,
     Basins as Basins,
 )
+from .border_curves import (
+    BorderCurve as BorderCurve,
+    CurvePlan as CurvePlan,
+)
 from .branch_survey import (
     Survey as Survey,
     survey as survey,
@@ -20,17 +25,25 @@ from .continuation import (
     Branch as Branch,
     End as End,
 )
+from .curve_store import (
+    CurveBlocks as CurveBlocks,
+    curves_csv as curves_csv,
+)
 from .doubling_cascade import (
     Cascade as Cascade,
     cascade as cascade,
 )
 from .flow_family import (
     Family as Family,
+    FlowPlane as FlowPlane,
 )
 from .parameter_map import (
     MapCell as MapCell,
     MapPlan as MapPlan,
     ParameterMap as ParameterMap,
+)
+from .plane_curves import (
+    PlaneWindow as PlaneWindow,
 )
 from .point_captions import (
     caption as caption,
@@ -58,6 +71,7 @@ from .sweep import (
 )
 from .titles import (
     NAMES as NAMES,
+    curves_title as curves_title,
     title as title,
 )
 from .windows import (

@@ -1,7 +1,8 @@
-"""Flows that differ in one parameter: what a branch of orbits is followed over.
+"""Flows that differ in one or two parameters: what a branch or a border is followed over.
 
 A model's family runs over one of its dimensionless parameters or over ω, a board's over one of the
-generator's settings. Each value has a flow of its own; the last few are kept.
+generator's settings; a plane over two of them. Each value has a flow of its own; the last few are
+kept.
 """
 
 from __future__ import annotations
@@ -51,3 +52,34 @@ class Family:
     def contains(self, value: float) -> bool:
         """Whether the value lies inside the domain."""
         return self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class FlowPlane:
+    """One flow for each pair of values of two parameters."""
+
+    first: Family
+    """Name and domain of the first parameter; its flows are at the second's nominal value."""
+    second: Family
+    """Name and domain of the second parameter; its flows are at the first's nominal value."""
+    build: Callable[[float, float], Flow]
+    """Makes the flow at a pair of values, the first parameter's before the second's."""
+
+    @property
+    def parameters(self) -> tuple[str, str]:
+        """Names of both parameters."""
+        return self.first.parameter, self.second.parameter
+
+    def contains(self, first: float, second: float) -> bool:
+        """Whether both values lie inside their domains."""
+        return self.first.contains(first) and self.second.contains(second)
+
+    def along_first(self, second: float) -> Family:
+        """The family over the first parameter, at a value of the second."""
+        one = self.first
+        return Family(one.parameter, one.low, one.high, lambda v: self.build(v, second))
+
+    def along_second(self, first: float) -> Family:
+        """The family over the second parameter, at a value of the first."""
+        one = self.second
+        return Family(one.parameter, one.low, one.high, lambda v: self.build(first, v))

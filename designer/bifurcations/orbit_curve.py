@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.attractors import peaks_near
-from designer.dynamics.flow import FlowStatus
+from designer.dynamics.flow import Flow, FlowStatus
 
 NEWTON = 10
 """Most iterations of the corrector."""
@@ -33,6 +33,38 @@ grazing points that lie near, narrower ones drown in rounding."""
 ASTRAY = 1.0
 """Of the distance between two neighbouring points: the most that the curve between them lies off
 their chord. It does not turn by more than ``continuation.TURN`` from one to the next."""
+
+
+@dataclass(frozen=True)
+class MapImage:
+    """What the map of an orbit's period makes of a state."""
+
+    x: Array
+    """(states,) image of the state."""
+    jacobian: Array
+    """(states, states) Jacobian of the map there."""
+    impacts: Index
+    """(clearances, 2) impacts on the lower and the upper stop on the way."""
+
+
+def map_image(flow: Flow, x: Array, n: int, *, symmetric: bool) -> MapImage | None:
+    """The image of x under the n-period map, or the mirrored half-period one of symmetric orbits.
+
+    None where the flow does not come to an end.
+    """
+    eye = np.eye(len(x))
+    if symmetric:
+        run = flow.run(x, n, points=2, stretches=n, tangent=eye)
+    else:
+        run = flow.run(x, n, tangent=eye)
+    if run.status is not FlowStatus.DONE or run.tangent is None:
+        return None
+    impacts = run.counts.sum(axis=0)
+    if not symmetric:
+        return MapImage(run.strobes[-1], run.tangent, impacts)
+    mirror = flow.system.mirror
+    assert mirror is not None
+    return MapImage(mirror @ run.strobes[-1], mirror @ run.tangent, impacts)
 
 
 @dataclass(frozen=True)
@@ -91,19 +123,8 @@ class Curve:
 
     def image(self, x: Array, value: float) -> tuple[Array, Array] | None:
         """P(x) and its Jacobian at a value, or None where the flow does not come to an end."""
-        flow = self.family.flow(value)
-        eye = np.eye(len(x))
-        if self.symmetric:
-            run = flow.run(x, self.n, points=2, stretches=self.n, tangent=eye)
-        else:
-            run = flow.run(x, self.n, tangent=eye)
-        if run.status is not FlowStatus.DONE or run.tangent is None:
-            return None
-        if not self.symmetric:
-            return run.strobes[-1], run.tangent
-        mirror = flow.system.mirror
-        assert mirror is not None
-        return mirror @ run.strobes[-1], mirror @ run.tangent
+        image = map_image(self.family.flow(value), x, self.n, symmetric=self.symmetric)
+        return None if image is None else (image.x, image.jacobian)
 
     def slope(self, x: Array, value: float) -> Array | None:
         """(states,) ∂P/∂λ, by a central difference of the exact flow inside the domain."""

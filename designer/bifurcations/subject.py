@@ -8,7 +8,7 @@ from typing import Protocol
 
 from designer.base.arrays import Array
 from designer.base.si_unit import Unit
-from designer.bifurcations.flow_family import Family
+from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.dynamics.steady_state import DrivenSystem
 
 
@@ -88,6 +88,10 @@ class Subject(Protocol):
 
     def family(self, parameter: str) -> Family:
         """One flow for each value of a parameter, the others as they stand."""
+        ...
+
+    def plane(self, first: str, second: str) -> FlowPlane:
+        """One flow for each pair of values of two parameters, the others as they stand."""
         ...
 
     def fixed(self, swept: Mapping[str, float | None]) -> Mapping[str, float | None]:

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 
 from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
@@ -47,6 +48,17 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
         heading += f"{_name(plan.y)}, other states 0"
         changed = plan.changes
     lines = [name, heading, "held: " + ", ".join(_fixed(plan.subject, changed))]
+    return "\n".join(
+        part for line in lines for part in textwrap.wrap(line, width, break_on_hyphens=False)
+    )
+
+
+def curves_title(name: str, plan: CurvePlan, width: int = 100) -> str:
+    """The same of bifurcation curves over two parameters."""
+    over = f"{_name(plan.first)} and {_name(plan.second)}"
+    heading = f"bifurcation curves of the {plan.subject.whose} over {over}"
+    held = _fixed(plan.subject, {plan.first: None, plan.second: None})
+    lines = [name, heading, "held: " + ", ".join(held)]
     return "\n".join(
         part for line in lines for part in textwrap.wrap(line, width, break_on_hyphens=False)
     )

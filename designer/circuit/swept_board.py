@@ -12,7 +12,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.base.si_unit import Unit
-from designer.bifurcations.flow_family import Family
+from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.subject import ShownStop
 from designer.circuit.design import Design
 from designer.circuit.netlist import Excitation
@@ -129,6 +129,14 @@ class BoardSubject:
         stand = {"frequency": frequency(own)} if self.frequency is None else {}
         return Family(
             parameter, *SETTINGS[parameter], lambda value: self._flow({**stand, parameter: value})
+        )
+
+    def plane(self, first: str, second: str) -> FlowPlane:
+        """One flow for each pair of values of two settings, the others as they stand."""
+        return FlowPlane(
+            self.family(first),
+            self.family(second),
+            lambda a, b: self._flow({first: a, second: b}),
         )
 
     def _flow(self, change: Mapping[str, float]) -> Flow:

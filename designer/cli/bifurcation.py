@@ -63,6 +63,10 @@ def bifurcation(
         tuple[str, str, str, int] | None,
         option("--map", "NAME A B N", "A map over this parameter too."),
     ] = None,
+    and_: Annotated[
+        tuple[str, str, str] | None,
+        option("--and", "NAME A B", "Continue the points as curves over this parameter too."),
+    ] = None,
     basins: Annotated[
         bool, option("--basins", None, "Where starts on a plane of states end.")
     ] = False,
@@ -93,6 +97,7 @@ def bifurcation(
         periods=periods,
         keep=keep,
         map_=map_,
+        and_=and_,
         basins=basins,
         circuit=circuit,
         points=points,

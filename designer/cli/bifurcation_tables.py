@@ -49,6 +49,35 @@ def _sweep(answer: Mapping[str, Any]) -> None:
         say("\nBifurcation points")
         for text in _points(answer["points"][:LONGEST], si):
             say(text)
+    if "curves" in answer:
+        _curves(answer)
+
+
+def _curves(answer: Mapping[str, Any]) -> None:
+    """Every curve, and below them the points of codimension two."""
+    first, second = answer["parameter"], answer["and"]["name"]
+    table(
+        f"Bifurcation curves over {first} and {second}",
+        (
+            {
+                "curve": str(number),
+                "kind": c["kind"],
+                "response": c["response"],
+                "points": str(len(c["points"])),
+                **{
+                    f"{end} ({first}, {second})": f"({at[0]:.6g}, {at[1]:.6g}): {why}"
+                    for end, at, why in zip(
+                        ("from", "to"), (c["points"][0], c["points"][-1]), c["ends"], strict=True
+                    )
+                },
+            }
+            for number, c in enumerate(answer["curves"][:LONGEST], 1)
+        ),
+    )
+    for number, c in enumerate(answer["curves"][:LONGEST], 1):
+        for met in c["codimension_two"]:
+            a, b = met["values"]
+            say(f"curve {number}: {met['kind']} at {first} = {a:.9g}, {second} = {b:.9g}")
 
 
 def _exponents(window: Mapping[str, Any]) -> str:

@@ -67,6 +67,11 @@ from .modal_tables import (
     WORST_RESONANCE as WORST_RESONANCE,
     Oscillators as Oscillators,
 )
+from .mode_tables import (
+    augmented as augmented,
+    augmented_row as augmented_row,
+    step_length as step_length,
+)
 from .orbit import (
     ANSWERS as ANSWERS,
     SYMMETRY_TOLERANCE as SYMMETRY_TOLERANCE,
@@ -95,6 +100,7 @@ from .step_budget import (
 )
 from .turning_points import (
     heights as heights,
+    turning_points_of as turning_points_of,
 )
 from .working_modes import (
     ANCHORS as ANCHORS,

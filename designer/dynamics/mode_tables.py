@@ -27,7 +27,7 @@ def augmented(mode: Mode, drive: Drive) -> Array:
     return M
 
 
-def _augmented_row(row: Array, drive: Drive) -> Array:
+def augmented_row(row: Array, drive: Drive) -> Array:
     """A row over (x, u, 1) as one over (x, sin, cos, 1)."""
     C, D, e = row[:-2], row[-2], row[-1]
     return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
@@ -65,11 +65,11 @@ def fill(
     tables.clipped[i] = mode.clipped
     for j, past in enumerate(touched):
         if past is not None:
-            tables.depth[i, j] = _augmented_row(past, drive) @ powers
+            tables.depth[i, j] = augmented_row(past, drive) @ powers
     for r, row in enumerate(watched):
-        tables.watched[i, r] = _augmented_row(row, drive) @ powers
+        tables.watched[i, r] = augmented_row(row, drive) @ powers
     for g, guard in enumerate(mode.guards):
-        taylor = _augmented_row(np.concatenate([guard.C, [guard.D, guard.e]]), drive) @ powers
+        taylor = augmented_row(np.concatenate([guard.C, [guard.D, guard.e]]), drive) @ powers
         tables.guard[i, g] = taylor
         # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
         weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0

@@ -10,6 +10,7 @@ interval errs by the square of its penetration, so the sign of the height and it
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,12 +24,36 @@ FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
 
 
+@dataclass(frozen=True)
+class TurningPoint:
+    """A turning point of the displacement in a clearance, seen from one of its stops."""
+
+    clearance: int
+    """Index of the clearance."""
+    side: int
+    """1 for its upper stop, -1 for the lower."""
+    tip: bool
+    """Whether the displacement is nearest to the stop there, or deepest in it; else it is least
+    deep: the dip between two contacts."""
+    phase: float
+    """When, in drive periods after the orbit's strobe."""
+    height: float
+    """How far past the stop it lies, positive in contact, in units of the displacement."""
+
+
 def heights(flow: Flow, orbit: Orbit, clearances: Iterable[int] | None = None) -> Array:
     """(k,) how far past its stop each turning point of each displacement lies, least first.
 
     Positive in contact; in units of the displacement; tips and dips at both stops, unordered in
     time. Empty for a system without clearances. clearances : those that are looked at; None: all.
     """
+    return np.sort([point.height for point in turning_points_of(flow, orbit, clearances)])
+
+
+def turning_points_of(
+    flow: Flow, orbit: Orbit, clearances: Iterable[int] | None = None
+) -> list[TurningPoint]:
+    """Every turning point of each displacement, seen from each of its stops; see ``heights``."""
     system, drive = flow.system, flow.drive
     rate = max(_rate(flow, orbit), drive.omega)
     points = int(np.clip(np.ceil(drive.period * rate / RESOLUTION), FEWEST, MOST))
@@ -38,17 +63,21 @@ def heights(flow: Flow, orbit: Orbit, clearances: Iterable[int] | None = None) -
     du = drive.amplitude * drive.omega * np.cos(angle)
     ddu = -(drive.omega**2) * drive.amplitude * np.sin(angle)
     looked_at = range(len(system.clearances)) if clearances is None else clearances
-    rows = [row for j in looked_at for row in system.contact_rows(j).values()]
-    if not rows:
-        return np.zeros(0)
+    stops = [(j, side, row) for j in looked_at for side, row in system.contact_rows(j).items()]
+    if not stops:
+        return []
+    rows = [row for _, _, row in stops]
     past = np.stack([x @ row[:-2] + row[-2] * u + row[-1] for row in rows])
     first, second = _derivatives(flow, x, u, du)
     step = drive.period / points
-    found = []
-    for row, h in zip(rows, past, strict=True):
+    found: list[TurningPoint] = []
+    for (clearance, side, row), h in zip(stops, past, strict=True):
         C, D = row[:-2], row[-2]
-        found.append(_turning(h, first @ C + D * du, second @ C + D * ddu, step))
-    return np.sort(np.concatenate(found))
+        found += [
+            TurningPoint(clearance, side, tip, node / points, height)
+            for node, height, tip in _turning(h, first @ C + D * du, second @ C + D * ddu, step)
+        ]
+    return found
 
 
 def _rate(flow: Flow, orbit: Orbit) -> float:
@@ -76,22 +105,23 @@ def _derivatives(flow: Flow, x: Array, u: Array, du: Array) -> tuple[Array, Arra
     return first, second
 
 
-def _turning(h: Array, dh: Array, ddh: Array, step: float) -> Array:
-    """(k,) values of h where its rate changes sign between two nodes."""
+def _turning(h: Array, dh: Array, ddh: Array, step: float) -> list[tuple[float, float, bool]]:
+    """(place, value, greatest) of h where its rate changes sign; places in nodes."""
     out = []
     for i in np.flatnonzero((dh[:-1] > 0.0) != (dh[1:] > 0.0)):
         quintic = _quintic(h[i : i + 2], step * dh[i : i + 2], step**2 * ddh[i : i + 2])
         rate = np.polynomial.Polynomial(quintic).deriv()
         low, high = 0.0, 1.0
-        rising = rate(0.0) > 0.0
+        rising = bool(rate(0.0) > 0.0)
         for _ in range(60):
             middle = 0.5 * (low + high)
             if (rate(middle) > 0.0) == rising:
                 low = middle
             else:
                 high = middle
-        out.append(float(np.polynomial.Polynomial(quintic)(0.5 * (low + high))))
-    return np.array(out)
+        place = 0.5 * (low + high)
+        out.append((float(i) + place, float(np.polynomial.Polynomial(quintic)(place)), rising))
+    return out
 
 
 def _quintic(h: Array, dh: Array, ddh: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from designer.base.si_unit import Unit
 from designer.base.version import __version__
 from designer.bifurcations import (
     basins,
+    border_curves,
     captions,
     parameter_map,
     point_captions,
@@ -27,13 +28,16 @@ from designer.bifurcations import (
     window_ends,
 )
 from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.curve_store import CurveBlocks, curves_csv
 from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
-from designer.jobs.bifurcation_request import Plan, Request, Swept, plan_of
+from designer.jobs.bifurcation_request import Plan, Request, Swept, curve_plan, plan_of
 from designer.jobs.design_source import read_design, source
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
@@ -43,8 +47,12 @@ from designer.model.swept_model import ModelSubject
 if TYPE_CHECKING:
     import pandas as pd
 
-_Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Any]]
-"""What is in the JSON object, what it cost, and what draws the picture."""
+Files = dict[str, str | bytes]
+"""Contents of files by name."""
+_Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
+"""What is in the JSON object, what it cost, and what makes the pictures and tables."""
+CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
+"""Tables and pictures of bifurcation curves."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,10 @@ class BifurcationResult:
     def windows(self) -> pd.DataFrame:
         """The windows of a sweep, a row each; empty of a map and of basins."""
         return frame(self.answer.get("windows", ()))
+
+    def curves(self) -> pd.DataFrame:
+        """The curves over two parameters, a row each; empty where none were asked for."""
+        return frame(self.answer.get("curves", ()))
 
     def points(self) -> pd.DataFrame:
         """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
@@ -91,6 +103,7 @@ def bifurcation(
     periods: int | None = None,
     keep: int | None = None,
     map_: tuple[str, float | str, float | str, int] | None = None,
+    and_: tuple[str, float | str, float | str] | None = None,
     basins: bool = False,
     circuit: bool = False,
     points: bool = True,
@@ -103,9 +116,10 @@ def bifurcation(
     """The verb ``bifurcation``: a diagram, a map of two parameters, or basins of attraction.
 
     model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
-    texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. out : a folder to write
-    into; without one nothing is written. The other words are those of the command line
-    (docs/bifurcations.md).
+    texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. ``and_`` : (name,
+    from, to) of a second parameter, over which the sweep's points are continued as curves. out : a
+    folder to write into; without one nothing is written. The other words are those of the command
+    line (docs/bifurcations.md).
 
     Raises
     ------
@@ -124,6 +138,7 @@ def bifurcation(
         periods=periods,
         keep=keep,
         second=map_,
+        and_=and_,
         basins=basins,
         circuit=circuit,
         points=points,
@@ -160,14 +175,14 @@ def _answer(
     if request.circuit:
         inputs["catalogue"] = load_catalog().hash
     kind = request.kind
-    stages: Stages = {kind: (inputs, _names(kind, plan))}
+    stages: Stages = {kind: (inputs, _names(kind, work))}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         before = None if folder.manifest is None else folder.manifest.provenance
         with folder.working(stages, before or work.provenance):
             answer, figure = _make(work, folder)
             progress.stage("pictures")
-            for name, content in _image_files(kind, figure()).items():
+            for name, content in figure().items():
                 folder.write(name, content)
             answer["cost"]["seconds"] = time.perf_counter() - began
             folder.write(f"{kind}.json", dumps(answer))
@@ -201,7 +216,12 @@ class _Work:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
-        more = {"points": request.points} if request.kind == "sweep" else {}
+        self.curves = None
+        more: dict[str, Any] = {}
+        if isinstance(plan, SweepPlan):
+            self.curves = curve_plan(request, plan, modelfile)
+            more = {"points": request.points}
+            more |= {} if self.curves is None else {"and": self.curves.as_dict()}
         decides = {"kind": request.kind, **plan.as_dict(), **more}
         self.hash = work_hash(decides)
         self.provenance = provenance(
@@ -212,8 +232,9 @@ class _Work:
         )
 
 
-def _names(kind: StageName, plan: Plan) -> list[str]:
+def _names(kind: StageName, work: _Work) -> list[str]:
     """Files of a stage."""
+    plan = work.plan
     if isinstance(plan, SweepPlan):
         blocks = [
             SweepStore.name(track, k)
@@ -222,11 +243,13 @@ def _names(kind: StageName, plan: Plan) -> list[str]:
         ]
     else:
         blocks = [GridStore.name(kind, row) for row in range(len(plan.ys))]
+    if work.curves is not None:
+        blocks += [*CurveBlocks.names(), *CURVE_FILES]
     return [*blocks, f"{kind}.json", f"{kind}.png", f"{kind}.svg"]
 
 
-def _make(work: _Work, folder: Folder | None) -> tuple[dict[str, Any], Callable[[], Any]]:
-    """The JSON object, and what draws the picture."""
+def _make(work: _Work, folder: Folder | None) -> tuple[dict[str, Any], Callable[[], Files]]:
+    """The JSON object, and what makes the pictures and tables."""
     plan = work.plan
     if isinstance(plan, SweepPlan):
         body, cost, draw = _sweep(work, plan, folder)
@@ -237,7 +260,7 @@ def _make(work: _Work, folder: Folder | None) -> tuple[dict[str, Any], Callable[
 
 
 def _sweep(work: _Work, plan: SweepPlan, folder: Folder | None) -> _Made:
-    from designer.report import bifurcation_plots
+    from designer.report import bifurcation_plots, curve_plots
 
     progress, jobs, name = work.progress, work.jobs, plan.parameter
     store = None
@@ -271,7 +294,41 @@ def _sweep(work: _Work, plan: SweepPlan, folder: Folder | None) -> _Made:
     }
     marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
     cost = {"periods": swept.periods}
-    return body, cost, lambda: bifurcation_plots.diagram(swept, marks, work.title)
+
+    def files() -> Files:
+        return _image_files("sweep", bifurcation_plots.diagram(swept, marks, work.title))
+
+    if work.curves is None:
+        return body, cost, files
+    curves = _curves(work, work.curves, points, folder)
+    body["and"] = _with_si(
+        {**work.curves.as_dict(), "at": work.curves.at},
+        plan.subject.si.get(work.curves.second),
+    )
+    body["curves"] = [curve.as_dict() for curve in curves]
+    labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
+
+    def all_files() -> Files:
+        assert work.curves is not None
+        picture = curve_plots.curves(curves, work.curves, work.title, labels)
+        table = curves_csv(curves, work.curves.first, work.curves.second)
+        return {**files(), "curves.csv": table, **_image_files("curves", picture)}
+
+    return body, cost, all_files
+
+
+def _curves(
+    work: _Work, plan: CurvePlan, points: Sequence[Bifurcation], folder: Folder | None
+) -> list[BorderCurve]:
+    """The curves through the sweep's points, or what of them the folder has not."""
+    store = None
+    if folder is not None:
+        store = CurveBlocks(
+            folder.path, work.hash, work.provenance, work.progress.note, folder.vouches
+        )
+    over = f"bifurcation curves over {plan.first} and {plan.second}"
+    step = work.progress.stage(over, border_curves.BLOCKS)
+    return border_curves.run(plan, points, work.jobs, store, step)
 
 
 def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Made:
@@ -292,14 +349,18 @@ def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Mad
     if isinstance(plan, MapPlan):
         mapped = parameter_map.run(plan, jobs, store, step)
         body["counts"] = mapped.counts
-        return body, {}, lambda: bifurcation_plots.parameter_map(mapped, work.title)
+        return (
+            body,
+            {},
+            lambda: _image_files(kind, bifurcation_plots.parameter_map(mapped, work.title)),
+        )
     plane = basins.run(plan, jobs, store, step)
     body |= {
         "at": plan.changes,
         "attractors": [dict(a.__dict__) for a in plane.attractors],
         "cells": [c.attractor for c in plane.cells],
     }
-    return body, {}, lambda: bifurcation_plots.basins(plane, work.title)
+    return body, {}, lambda: _image_files(kind, bifurcation_plots.basins(plane, work.title))
 
 
 def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:
@@ -315,7 +376,7 @@ def _with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
     return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
 
 
-def _image_files(kind: StageName, figure: Any) -> dict[str, str | bytes]:
+def _image_files(kind: str, figure: Any) -> Files:
     from designer.base.figure_style import to_png, to_svg
 
     return {f"{kind}.png": to_png(figure, 200.0), f"{kind}.svg": to_svg(figure)}

@@ -14,7 +14,9 @@ from designer.base.manifest import StageName
 from designer.base.schema import one_of
 from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.steady_state import Course
@@ -62,6 +64,8 @@ class Request:
     """Drive periods that are kept; None for the default."""
     second: tuple[str, float | str, float | str, int] | None = None
     """(name, from, to, steps) of a map's or a basin's other axis."""
+    and_: tuple[str, float | str, float | str] | None = None
+    """(name, from, to) of the second parameter that the sweep's points are continued over."""
     basins: bool = False
     """Whether basins of attraction are asked for."""
     circuit: bool = False
@@ -116,6 +120,37 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     return SweepPlan(subject, over, values, course=_course(request, Course()), **tracks)
 
 
+def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> CurvePlan | None:
+    """The bifurcation curves that a request asks for through the points of its sweep, if any.
+
+    Raises
+    ------
+    InputError : the second parameter cannot be swept, is the first one, or its value along the
+        sweep lies outside the ends.
+    """
+    if request.and_ is None:
+        return None
+    name, *ends = request.and_
+    subject = plan.subject
+    assert isinstance(subject, ModelSubject | BoardSubject)
+    if name == plan.parameter:
+        raise InputError(None, "--and", name, f"another parameter than --over {name}")
+    read = _reader(subject, modelfile)
+    one, other = (_checked(read, subject, "--and", name, value) for value in ends)
+    held = subject.fixed({plan.parameter: None})
+    at = held.get(name)
+    if at is None:
+        names = [n for n, value in held.items() if value is not None and n != plan.parameter]
+        raise InputError(None, "--and", name, one_of(name, names))
+    low, high = min(one, other), max(one, other)
+    if not low < high or not low <= at <= high:
+        expected = f"two ends about {at:.6g}, the value along the sweep"
+        raise InputError(None, "--and", f"{name} from {low:g} to {high:g}", expected)
+    values = plan.values
+    window = PlaneWindow((float(values[0]), float(values[-1])), (low, high))
+    return CurvePlan(subject, plan.parameter, name, float(at), window)
+
+
 # ---------------------------------------------------------------------------------------------
 
 
@@ -134,7 +169,7 @@ def _checked(
     if value is None:
         raise InputError(None, option, MISSING, f"a value of {name}")
     if name not in subject.parameters:
-        over = "--map" if option == "--map" else "--over"
+        over = option if option in ("--map", "--and") else "--over"
         raise InputError(None, over, name, one_of(name, subject.parameters))
     number = read.value(option, name, value)
     subject.check(option, name, number)
@@ -153,6 +188,9 @@ def _check_options(request: Request) -> None:
             None, "--down, --up or --starts", "given", "none with --map or --basins: every point "
             "has the same start"
         )  # fmt: skip
+    if request.and_ is not None and (request.kind != "sweep" or not request.points):
+        expected = "a sweep with its points: none of --map, --basins and --no-points"
+        raise InputError(None, "--and", request.and_[0], expected)
     if request.periods is not None:
         at_least("--periods", request.periods, 0)
     if request.keep is not None:

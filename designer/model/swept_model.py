@@ -13,7 +13,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.base.si_unit import Unit
-from designer.bifurcations.flow_family import Family
+from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.subject import ShownStop
 from designer.dynamics.flow import Flow
 from designer.dynamics.steady_state import UPPER, DrivenSystem
@@ -140,6 +140,17 @@ class ModelSubject:
     def family(self, parameter: str) -> Family:
         """One flow for each value of a parameter, the others as they stand."""
         return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)
+
+    def plane(self, first: str, second: str) -> FlowPlane:
+        """One flow for each pair of values of two parameters, the others as they stand."""
+
+        def build(a: float, b: float) -> Flow:
+            change = {first: a, second: b}
+            omega = change.get("omega", self.omega)
+            assert omega is not None
+            return model_flow(_changed(self.model, change), omega, fast=False)
+
+        return FlowPlane(self.family(first), self.family(second), build)
 
     def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters, in the order in which a model file has them; those

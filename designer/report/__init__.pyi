@@ -3,6 +3,7 @@ from . import (
     compare_plots as compare_plots,
     compare_table as compare_table,
     comparison as comparison,
+    curve_plots as curve_plots,
     measured_table as measured_table,
     orbit_plots as orbit_plots,
     simulate_plots as simulate_plots,

@@ -301,3 +301,53 @@ def test_circuit_in_hertz_and_volts(design: Path, capfd: pytest.CaptureFixture[s
 
 def test_reproduce_says_what_there_is_not(capfd: pytest.CaptureFixture[str]) -> None:
     assert entry.status(["reproduce", "everything"]) == 2
+
+
+def test_curves_over_a_second_parameter(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = (model, *SWEEP, "--and", "b", "0.22", "0.28", "--out", out)
+    answer = _asked(capfd, *words)
+    (curve,) = answer["curves"]
+    assert (curve["kind"], curve["response"], curve["ends"]) == (
+        "pitchfork",
+        "1-1-1",
+        ["edge of b", "edge of b"],
+    )
+    assert min(abs(w - answer["points"][0]["value"]) for w, _ in curve["points"]) < 1e-9
+    assert answer["and"] == {"name": "b", "from": 0.22, "to": 0.28, "at": 0.25}
+    header, *rows = (out / "curves.csv").read_text().splitlines()
+    assert header == "curve,kind,response,symmetric,omega,b,stable"
+    assert len(rows) == len(curve["points"])
+    kept = [
+        row
+        for f in sorted((out / "curves.parquet").iterdir())
+        for row in pq.read_table(f).to_pylist()
+    ]
+    assert [row["points"] for row in kept] == [curve["points"]]
+    # A block that is left is taken as it is; the work is the same again.
+    written = _tree(out)
+    (out / "sweep.json").unlink()
+    (out / "curves.parquet" / "block-000003.parquet").unlink()
+    again = _asked(capfd, *words, "--overwrite")
+    assert {**again, "cost": 0} == {**answer, "cost": 0}
+    assert _tree(out)["curves.csv"] == written["curves.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("--and", "omega", "1", "2"), "another parameter"),
+        (("--and", "b", "0.3", "0.4"), "0.25, the value along the sweep"),
+        (("--and", "mass", "0.3", "0.4"), "b"),
+        (("--and", "b", "0.2", "0.4", "--no-points"), "a sweep with its points"),
+    ],
+)
+def test_bad_second_parameter(
+    model: Path, capfd: pytest.CaptureFixture[str], words: tuple[str, ...], part: str
+) -> None:
+    assert entry.status(["bifurcation", str(model), *SWEEP, *words]) == 2
+    text = capfd.readouterr().err
+    assert "--and" in text
+    assert part in text

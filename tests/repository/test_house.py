@@ -23,6 +23,7 @@ LAZY = {
         ("board.schematic_drawing", "base.figure_style"),
         ("jobs.bifurcation_job", "base.figure_style"),
         ("jobs.bifurcation_job", "report.bifurcation_plots"),
+        ("jobs.bifurcation_job", "report.curve_plots"),
         ("jobs.board_files", "board.schematic_drawing"),
         ("jobs.cure_job", "base.figure_style"),
         ("jobs.cure_job", "centering.cure_plots"),

@@ -1,0 +1,264 @@
+"""What holds on a bifurcation curve beside that the orbit is periodic, as smooth equations.
+
+- A multiplier σ (1 at a fold, -1 at a doubling or, of the half-period map, at a pitchfork): the
+  scalar g of the bordered system [[J - σ, b], [c', 0]] [w; g] = [0; 1], which is zero where J - σ
+  is singular (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000,
+  chapter 3). b and c are the last point's singular vectors.
+- A pair of multipliers on the unit circle: the logarithm of its product. Product and sum of the
+  pair are smooth also where it becomes real.
+- Grazing: the height of one turning point over its stop and its rate are zero
+  (``bifurcations.touch``); the phase of the turning point is a further unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.bifurcations.points import PointKind
+from designer.bifurcations.touch import StopTouch, height
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Complex, Orbit, OrbitStatus
+from designer.dynamics.turning_points import turning_points_of
+
+Jacobian = Callable[[], Array | None]
+"""Gives the (states, states) Jacobian of the map in scaled units; None where the flow fails."""
+CLEAR = 3e-12
+"""Of the displacement's peak: how far short of its stop a tip is held, and how far in it a dip. So
+the multipliers along the curve are those of the side that does not change with its square root."""
+
+SAME_PHASE = 1e-3
+"""In drive periods: turning points no farther apart are one."""
+
+
+class Condition(Protocol):
+    """The equations of one kind of curve."""
+
+    @property
+    def kind(self) -> PointKind:
+        """The kind of the curve."""
+        ...
+
+    @property
+    def unknowns(self) -> int:
+        """How many unknowns it adds beside state and parameters."""
+        ...
+
+    def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
+        """(1 + unknowns,) zero on the curve; None where the flow does not come to an end."""
+        ...
+
+    def renewed(self, jacobian: Array) -> Condition:
+        """The same, set up at a point of the curve with this scaled Jacobian."""
+        ...
+
+    def others(self, multipliers: Complex) -> Complex:
+        """The multipliers that the condition does not bind."""
+        ...
+
+
+@dataclass(frozen=True)
+class Multiplier:
+    """A real multiplier of the map is ``value``."""
+
+    kind: PointKind
+    """Fold, period doubling or pitchfork."""
+    value: float
+    """1 or -1."""
+    left: Array
+    """(states,) left null vector of J - value at the last point, unit, in scaled units."""
+    right: Array
+    """(states,) right null vector there."""
+    unknowns: int = 0
+    """None beside state and parameters."""
+
+    @classmethod
+    def at(cls, kind: PointKind, jacobian: Array) -> Multiplier:
+        """At a located point with this scaled Jacobian."""
+        value = 1.0 if kind is PointKind.FOLD else -1.0
+        left, _, right = np.linalg.svd(jacobian - value * np.eye(len(jacobian)))
+        return cls(kind, value, left[:, -1], right[-1])
+
+    def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
+        """(1,) g of the bordered system."""
+        J = jacobian()
+        if J is None:
+            return None
+        size = len(J)
+        matrix = np.zeros((size + 1, size + 1))
+        matrix[:size, :size] = J - self.value * np.eye(size)
+        matrix[:size, size] = self.left
+        matrix[size, :size] = self.right
+        try:
+            return np.linalg.solve(matrix, np.eye(size + 1)[size])[size:]
+        except np.linalg.LinAlgError:
+            return None
+
+    def renewed(self, jacobian: Array) -> Multiplier:
+        """With this Jacobian's null vectors, turned as those before."""
+        new = Multiplier.at(self.kind, jacobian)
+        left = new.left if new.left @ self.left >= 0.0 else -new.left
+        right = new.right if new.right @ self.right >= 0.0 else -new.right
+        return replace(self, left=left, right=right)
+
+    def others(self, multipliers: Complex) -> Complex:
+        """All but the one nearest to ``value``."""
+        return np.delete(multipliers, int(np.argmin(np.abs(multipliers - self.value))))
+
+
+@dataclass(frozen=True)
+class MultiplierPair:
+    """A pair of multipliers has the product 1."""
+
+    total: float
+    """Sum of the pair at the last point."""
+    kind: PointKind = PointKind.TORUS
+    """Torus."""
+    unknowns: int = 0
+    """None beside state and parameters."""
+
+    @classmethod
+    def at(cls, jacobian: Array) -> MultiplierPair:
+        """At a located point with this scaled Jacobian."""
+        values = np.linalg.eigvals(jacobian).astype(complex)
+        complex_ones = values[np.abs(values.imag) > 1e-9 * np.abs(values)]
+        nearest = complex_ones[np.argmin(np.abs(np.abs(complex_ones) - 1.0))]
+        return cls(2.0 * float(nearest.real))
+
+    def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
+        """(1,) logarithm of the product."""
+        J = jacobian()
+        if J is None:
+            return None
+        i, j = self._places(np.linalg.eigvals(J).astype(complex))
+        values = np.linalg.eigvals(J)
+        return np.array([np.log(abs(values[i] * values[j]))])
+
+    def renewed(self, jacobian: Array) -> MultiplierPair:
+        """With this Jacobian's pair."""
+        values = np.linalg.eigvals(jacobian).astype(complex)
+        i, j = self._places(values)
+        return replace(self, total=float((values[i] + values[j]).real))
+
+    def others(self, multipliers: Complex) -> Complex:
+        """All but the pair."""
+        return np.delete(multipliers, self._places(multipliers))
+
+    def _places(self, values: Complex) -> tuple[int, int]:
+        """The two with product nearest to 1 and sum nearest to the last one's."""
+
+        def off(pair: tuple[int, int]) -> float:
+            a, b = values[pair[0]], values[pair[1]]
+            return float(abs(a * b - 1.0) + abs(a + b - self.total))
+
+        pairs = [(i, j) for i in range(len(values)) for j in range(i)]
+        return min(pairs, key=off)
+
+
+@dataclass(frozen=True)
+class Grazing:
+    """A turning point touches a stop."""
+
+    touch: StopTouch
+    """Which of them touches which stop."""
+    n: int
+    """Period of the orbit, in drive periods."""
+    size: float
+    """Peak of the displacement in the clearance."""
+    kind: PointKind = PointKind.GRAZING
+    """Grazing."""
+    unknowns: int = 1
+    """The phase of the turning point, in drive periods."""
+
+    def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
+        """(2,) height, and its rate by the phase, over the peak."""
+        found = height(flow, x, self.n, self.touch, float(extra[0]))
+        if found is None:
+            return None
+        clear = CLEAR if self.touch.tip else -CLEAR
+        return np.array([found[0] / self.size + clear, found[1] / self.size])
+
+    def curvature(self, flow: Flow, x: Array, phase: float) -> float:
+        """Second derivative of the height by the phase, over the peak; negative at a tip."""
+        found = height(flow, x, self.n, self.touch, phase)
+        return float("nan") if found is None else float(found[2]) / self.size
+
+    def renewed(self, jacobian: Array) -> Grazing:
+        """The same: nothing is set up."""
+        return self
+
+    def others(self, multipliers: Complex) -> Complex:
+        """All."""
+        return multipliers
+
+
+@dataclass(frozen=True)
+class Both:
+    """Two conditions at once: a point of codimension two."""
+
+    first: Condition
+    """The curve's own."""
+    second: Condition
+    """What holds too."""
+
+    @property
+    def kind(self) -> PointKind:
+        """The first one's."""
+        return self.first.kind
+
+    @property
+    def unknowns(self) -> int:
+        """The first one's, then the second one's."""
+        return self.first.unknowns + self.second.unknowns
+
+    def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
+        """Those of both, one after the other."""
+        split = self.first.unknowns
+        parts = [
+            self.first.residual(flow, x, extra[:split], jacobian),
+            self.second.residual(flow, x, extra[split:], jacobian),
+        ]
+        held = [part for part in parts if part is not None]
+        return np.concatenate(held) if len(held) == 2 else None
+
+    def renewed(self, jacobian: Array) -> Both:
+        """Both, set up at a point."""
+        return Both(self.first.renewed(jacobian), self.second.renewed(jacobian))
+
+    def others(self, multipliers: Complex) -> Complex:
+        """Those that the first does not bind."""
+        return self.first.others(multipliers)
+
+
+def grazings(
+    flow: Flow, x: Array, n: int, but: tuple[Grazing, float] | None = None
+) -> list[tuple[Grazing, float]]:
+    """The turning points of an orbit as what may graze, nearest to its stop first, each with its
+    phase. but : one that is left out, and its mirror image."""
+    orbit = Orbit(OrbitStatus.PERIODIC, n=n, start=x)
+    spans = np.abs(flow.run(x, n, measure=True).spans).max(axis=1)
+    near = sorted(turning_points_of(flow, orbit), key=lambda t: abs(t.height))
+    out = []
+    for t in near:
+        touch = StopTouch(t.clearance, t.side, t.tip)
+        if but is None or not _is_same(
+            touch, t.phase, *but, mirrored=flow.system.mirror is not None
+        ):
+            out.append((Grazing(touch, n, float(spans[t.clearance])), t.phase))
+    return out
+
+
+def _is_same(touch: StopTouch, phase: float, other: Grazing, at: float, *, mirrored: bool) -> bool:
+    """Whether two turning points are one, or mirror images of each other on a symmetric orbit."""
+    if (touch.clearance, touch.tip) != (other.touch.clearance, other.touch.tip):
+        return False
+    n = other.n
+    shift = 0.0 if touch.side == other.touch.side else 0.5 * n
+    if shift and not mirrored:
+        return False
+    off = (phase - at - shift) % n
+    return min(off, n - off) < SAME_PHASE

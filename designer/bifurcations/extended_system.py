@@ -1,0 +1,296 @@
+"""The equations of a bifurcation curve over two parameters, and Newton's method on them.
+
+A point is z = (x, extra, λ, μ): the state at the strobe, the condition's own unknowns and both
+parameters. It obeys P(x, λ, μ) - x = 0, for the period's map P or the mirrored half-period map of
+symmetric orbits, and the condition (``bifurcations.conditions``). That is one equation less than
+there are unknowns: points are solved for on a hyperplane, as in ``bifurcations.orbit_curve``, so
+that turns of the curve, in either parameter, are points like others. ∂P/∂x is exact; all other
+derivatives are differences at the guess, which Broyden's formula then keeps up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from designer.base.arrays import Array, Index
+from designer.bifurcations.conditions import Both, Condition
+from designer.bifurcations.flow_family import FlowPlane
+from designer.bifurcations.orbit_curve import CONVERGED, STALLED, MapImage, map_image
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Complex
+
+NEWTON = 14
+"""Most iterations of the corrector."""
+DIFFERENCE = 3e-8
+"""In scaled units: step of the differences."""
+MOST_FLOWS = 8
+"""Flows that are kept."""
+FARTHEST = 1.0
+"""In scaled units: longest step of Newton's method."""
+SLOW = 0.3
+"""An iteration that leaves more of the residual than this has the derivatives computed anew."""
+ASTRAY = 0.5
+"""Of the distance between two neighbouring points: the most that the curve between them lies off
+its interpolation."""
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of a bifurcation curve."""
+
+    z: Array
+    """(unknowns,) state, the condition's unknowns, and both parameters."""
+    jacobian: Array
+    """(states, states) Jacobian of the map in scaled units."""
+    impacts: Index
+    """(clearances, 2) impacts on the lower and the upper stop in one map."""
+    tangent: Array
+    """(unknowns,) unit tangent in scaled units."""
+    condition: Condition
+    """The condition, set up at this point."""
+    iterations: int
+    """Steps of Newton's method that were spent."""
+    residual: float
+    """What was left of the equations, in scaled units."""
+
+    @property
+    def values(self) -> tuple[float, float]:
+        """Of both parameters."""
+        return float(self.z[-2]), float(self.z[-1])
+
+    @property
+    def multipliers(self) -> Complex:
+        """(states,) of the map."""
+        return np.linalg.eigvals(self.jacobian).astype(complex)
+
+    @property
+    def stable_beside(self) -> bool:
+        """Whether the orbit is stable on one side of the curve: all multipliers but those that the
+        condition binds lie inside the unit circle."""
+        others = self.condition.others(self.multipliers)
+        return bool((np.abs(others) < 1.0).all())
+
+
+@dataclass(frozen=True)
+class _Value:
+    """The equations at a point."""
+
+    gap: Array
+    """(states + conditions,) what is left of them, in scaled units."""
+    jacobian: Array
+    """(states, states) of the map, in scaled units."""
+    impacts: Index
+    """(clearances, 2) in one map."""
+
+
+@dataclass(frozen=True)
+class ExtendedSystem:
+    """Periodic orbits over two parameters, to be held to a condition."""
+
+    plane: FlowPlane
+    """Flows by the two parameters."""
+    n: int
+    """Period of the orbits, in drive periods."""
+    symmetric: bool
+    """Whether they are those that the half-period map finds."""
+    states: int
+    """Number of states."""
+    scale: Array
+    """(unknowns,) what each unknown is measured in: peaks, 1 for a phase, widths of the window."""
+    _flows: dict[tuple[float, float], Flow] = field(default_factory=dict, repr=False)
+
+    def flow(self, z: Array) -> Flow:
+        """The flow at a point's parameters; the last few are kept."""
+        key = float(z[-2]), float(z[-1])
+        if key not in self._flows:
+            while len(self._flows) >= MOST_FLOWS:
+                self._flows.pop(next(iter(self._flows)))
+            self._flows[key] = self.plane.build(*key)
+        return self._flows[key]
+
+    def image(self, z: Array) -> MapImage | None:
+        """The image of a point's state, with the Jacobian in scaled units."""
+        n = self.states
+        found = map_image(self.flow(z), z[:n], self.n, symmetric=self.symmetric)
+        if found is None:
+            return None
+        return replace(found, jacobian=found.jacobian * self.scale[:n] / self.scale[:n, None])
+
+    def correct(
+        self,
+        guess: Array,
+        border: Array,
+        condition: Condition,
+        along: Array | None = None,
+    ) -> CurvePoint | None:
+        """The point of the curve with border·(z - guess) = 0 in scaled units, by Newton's method.
+
+        border : (unknowns,). along : orients the tangent (default: border). None where Newton's
+        method does not converge or leaves the parameters' domain.
+        """
+        return self._solve(guess, border[None], condition, border if along is None else along)
+
+    def meet(self, p: CurvePoint, other: Condition, extra: Array) -> CurvePoint | None:
+        """The orbit near a point of a curve that obeys another condition too, by Newton's method.
+
+        extra : the other's own unknowns there. The answer is a point of the same curve; its
+        tangent is that of p. None where there is none.
+        """
+        both = Both(p.condition, other)
+        split = len(p.z) - 2
+        scale = np.concatenate([self.scale[:split], np.ones(len(extra)), self.scale[split:]])
+        system = replace(self, scale=scale, _flows={})
+        z = np.concatenate([p.z[:split], extra, p.z[split:]])
+        found = system._solve(z, np.zeros((0, len(z))), both, np.zeros(len(z)))
+        if found is None:
+            return None
+        own = np.concatenate([found.z[:split], found.z[-2:]])
+        return replace(
+            found, z=own, tangent=p.tangent, condition=p.condition.renewed(found.jacobian)
+        )
+
+    def _solve(
+        self, guess: Array, border: Array, condition: Condition, along: Array
+    ) -> CurvePoint | None:
+        """With border (k, unknowns), k as many rows as the equations are short of."""
+        z = centre = np.array(guess, dtype=float)
+        value = self._value(z, condition)
+        if value is None:
+            return None
+        rows = self._derivatives(z, value, condition)
+        fresh = True
+        for iteration in range(1, NEWTON + 1):
+            if rows is None:
+                return None
+            gap = np.append(value.gap, border @ ((z - centre) / self.scale))
+            error = float(np.abs(gap).max())
+            if error < CONVERGED:
+                return _point(z, value, rows, condition, iteration, along, error)
+            try:
+                step = -np.linalg.solve(np.vstack([rows, border]), gap)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.all(np.isfinite(step)) or np.abs(step).max() > FARTHEST:
+                return None
+            new = z + self.scale * step
+            after = self._value(new, condition)
+            if after is None:
+                return None
+            left = float(np.abs(after.gap).max())
+            if left > SLOW * error:
+                if fresh and left > 0.5 * error and error < STALLED:
+                    return _point(z, value, rows, condition, iteration, along, error)
+                if left < FARTHEST:
+                    z, value = new, after
+                elif fresh:
+                    return None
+                rows, fresh = self._derivatives(z, value, condition), True
+                continue
+            change = after.gap - value.gap - rows @ step
+            rows = rows + np.outer(change, step) / float(step @ step)
+            z, value, fresh = new, after, False
+        return None
+
+    def between(self, a: CurvePoint, b: CurvePoint, share: float) -> CurvePoint | None:
+        """The point of the curve at a share of the way from a to b, share in [0, 1]; None where
+        none lies near."""
+        guess, chord = hermite(a, b, share, self.scale)
+        length = float(np.linalg.norm(chord))
+        found = self.correct(guess, chord / length, a.condition)
+        if found is None or self.distance(found.z, guess) > ASTRAY * length:
+            return None
+        return found
+
+    def distance(self, a: Array, b: Array) -> float:
+        """Between two points, in scaled units."""
+        return float(np.linalg.norm((b - a) / self.scale))
+
+    def _value(self, z: Array, condition: Condition) -> _Value | None:
+        """The equations at z; None outside the domain and where the flow does not end."""
+        n = self.states
+        if not np.all(np.isfinite(z)) or np.abs(z[:n] / self.scale[:n]).max() > 1e3:
+            return None
+        if not self.plane.contains(float(z[-2]), float(z[-1])):
+            return None
+        image = self.image(z)
+        if image is None:
+            return None
+        held = condition.residual(self.flow(z), z[:n], z[n:-2], lambda: image.jacobian)
+        if held is None:
+            return None
+        gap = (image.x - z[:n]) / self.scale[:n]
+        return _Value(np.concatenate([gap, held]), image.jacobian, image.impacts)
+
+    def _derivatives(self, z: Array, value: _Value, condition: Condition) -> Array | None:
+        """(equations, unknowns) derivatives in scaled units."""
+        n, total = self.states, len(z)
+        rows = np.zeros((len(value.gap), total))
+        rows[:n, :n] = value.jacobian - np.eye(n)
+        for i in range(total):
+            beside = z.copy()
+            beside[i] += DIFFERENCE * self.scale[i]
+            if i < total - 2:
+                held = self._held(beside, condition)
+                if held is None:
+                    return None
+                rows[n:, i] = (held - value.gap[n:]) / DIFFERENCE
+                continue
+            sign = 1.0
+            if not self.plane.contains(float(beside[-2]), float(beside[-1])):
+                sign = -1.0
+                beside[i] = z[i] - DIFFERENCE * self.scale[i]
+            after = self._value(beside, condition)
+            if after is None:
+                return None
+            rows[:, i] = (after.gap - value.gap) / (sign * DIFFERENCE)
+        return rows
+
+    def _held(self, z: Array, condition: Condition) -> Array | None:
+        """The condition alone at z; the map is run only where it asks for the Jacobian."""
+
+        def jacobian() -> Array | None:
+            image = self.image(z)
+            return None if image is None else image.jacobian
+
+        n = self.states
+        return condition.residual(self.flow(z), z[:n], z[n:-2], jacobian)
+
+
+def hermite(a: CurvePoint, b: CurvePoint, share: float, scale: Array) -> tuple[Array, Array]:
+    """The cubic through two points with their tangents, at a share of the way (also beyond), and
+    the chord between them in scaled units."""
+    chord = (b.z - a.z) / scale
+    length = float(np.linalg.norm(chord))
+    ta = a.tangent * (1.0 if a.tangent @ chord > 0.0 else -1.0)
+    tb = b.tangent * (1.0 if b.tangent @ chord > 0.0 else -1.0)
+    s = share
+    cubic = (
+        (3.0 * s**2 - 2.0 * s**3) * chord
+        + length * (s - 2.0 * s**2 + s**3) * ta
+        + length * (s**3 - s**2) * tb
+    )
+    return a.z + scale * cubic, chord
+
+
+def _point(
+    z: Array,
+    value: _Value,
+    rows: Array,
+    condition: Condition,
+    iteration: int,
+    along: Array,
+    error: float,
+) -> CurvePoint:
+    """The point that Newton's method ended at, with the rows of its derivatives."""
+    tangent = np.linalg.svd(rows)[2][-1]
+    return CurvePoint(
+        z,
+        value.jacobian,
+        value.impacts,
+        tangent if tangent @ along >= 0.0 else -tangent,
+        condition.renewed(value.jacobian),
+        iteration,
+        error,
+    )

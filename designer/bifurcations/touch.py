@@ -1,0 +1,92 @@
+"""The height of one turning point over its stop, and its rate, on the exact flow.
+
+The motion about the turning point is that of one mode: open at a tip, in contact at a dip. It is
+taken on smoothly where a shallow contact (or a short gap between two contacts) interrupts it, so
+that height and rate are smooth functions of state, phase and parameters. Where the height is zero
+nothing interrupts it, and both are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.mode_tables import augmented, augmented_row, step_length
+from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
+
+FEWEST, MOST = 32, 20_000
+"""Nodes in a drive period from which the motion is taken on."""
+TERMS = 24
+"""Of the Taylor series from a node on: beyond rounding for a step of the general kernel."""
+
+
+@dataclass(frozen=True)
+class StopTouch:
+    """Which turning point touches which stop."""
+
+    clearance: int
+    """Index of the clearance."""
+    side: int
+    """1 for its upper stop, -1 for the lower."""
+    tip: bool
+    """Whether it is the tip of a near miss or a shallow contact; else the dip between two."""
+
+
+def height(flow: Flow, x: Array, n: int, touch: StopTouch, phase: float) -> Array | None:
+    """(3,) height over the stop, positive in contact, with its first and second derivative by the
+    phase, at a phase in drive periods after the strobe x of an orbit of period n.
+
+    None where the flow does not come to an end.
+    """
+    period = flow.drive.period
+    nodes = _nodes(flow, touch)
+    place = (phase % n) * nodes
+    k = int(place)
+    state = x
+    if k:
+        run = flow.run(x, -(-k // nodes), points=nodes, stretches=k)
+        if run.status is not FlowStatus.DONE:
+            return None
+        state = run.strobes[-1]
+    angle = 2.0 * np.pi * k / nodes
+    drive = flow.drive
+    u = drive.amplitude * float(np.sin(angle)) + drive.offset
+    mode = _mode(flow.system, state, u, touch)
+    row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive)
+    z = np.concatenate([state, [np.sin(angle), np.cos(angle), 1.0]])
+    return _derivatives(row, augmented(mode, drive), z, (place - k) * period / nodes, period)
+
+
+def _nodes(flow: Flow, touch: StopTouch) -> int:
+    """Nodes in a drive period: a step of the general kernel apart, in contact too."""
+    rest = flow.system.mode(flow.system.start)
+    contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == touch.clearance]
+    step = min(step_length(mode.A, flow.drive.omega) for mode in (rest, *contacts))
+    return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
+
+
+def _mode(system: PiecewiseLinearSystem, x: Array, u: float, touch: StopTouch) -> Mode:
+    """The mode about the turning point: the one at x but for the contact at the stop itself."""
+    mode = system.mode(system.mode_at(x, u))
+    wanted = 0 if touch.tip else touch.side
+    if mode.sides[touch.clearance] == wanted:
+        return mode
+    for guard in mode.guards:
+        other = system.mode(guard.target)
+        if guard.clearance == touch.clearance and other.sides[touch.clearance] == wanted:
+            return other
+    return mode
+
+
+def _derivatives(row: Array, M: Array, z: Array, time: float, period: float) -> Array:
+    """(3,) value and first two derivatives, by time over the period, of row · exp(M time) z."""
+    terms = np.empty(TERMS)
+    for k in range(TERMS):
+        terms[k] = row @ z
+        z = M @ z * (period / (k + 1))
+    series = np.polynomial.Polynomial(terms)
+    share = time / period
+    return np.array([series(share), series.deriv()(share), series.deriv(2)(share)])

@@ -1,0 +1,101 @@
+"""Pictures of bifurcation curves over two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.titles import NAMES, curves_title
+from designer.report.bifurcation_plots import MARKS, OTHERS
+from designer.report.si_axes import si_x, si_y
+
+MEETINGS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "*", "h", "p")
+"""Marks of points of codimension two, by name."""
+Label = tuple[str, float, float]
+"""A response, and from where to where along the sweep it is seen."""
+
+
+@styled
+def curves(
+    found: Sequence[BorderCurve],
+    plan: CurvePlan,
+    name: str = "",
+    labels: Sequence[Label] = (),
+) -> Figure:
+    """Every curve by its kind: thick where it bounds a stable response, thin elsewhere; points of
+    codimension two as marks. name : the model's title. labels : responses along the sweep."""
+    figure = new_figure(8.6, 5.6)
+    axes = figure.subplots()
+    figure.suptitle(curves_title(name, plan, 104), x=0.012, ha="left", fontsize=8.5, color=INK)
+    for curve in found:
+        _line(axes, curve)
+    handles = [
+        Line2D([], [], color=MARKS[kind][1], lw=1.6, label=kind)
+        for kind in dict.fromkeys(c.kind for c in found)
+    ]
+    if not all(all(c.stable) for c in found):
+        handles.append(Line2D([], [], color=MUTED, lw=0.6, label="no stable orbit beside it"))
+    handles += _meetings(axes, found)
+    axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
+    handles.append(Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label="the sweep"))
+    _axes(axes, plan)
+    _named(axes, plan, labels)
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return figure
+
+
+def _line(axes: Axes, curve: BorderCurve) -> None:
+    """A curve, thin; on top of it thick what bounds a stable response."""
+    colour = MARKS[curve.kind][1]
+    axes.plot(*curve.points.T, color=colour, lw=0.6, zorder=2)
+    thick = curve.points.copy()
+    thick[~np.array(curve.stable)] = np.nan
+    axes.plot(*thick.T, color=colour, lw=1.6, zorder=3)
+
+
+def _meetings(axes: Axes, found: Sequence[BorderCurve]) -> list[Line2D]:
+    """Points of codimension two, a mark for each name; their legend."""
+    places: dict[str, list[tuple[float, float]]] = {}
+    for curve in found:
+        for name, a, b in curve.codimension_two:
+            places.setdefault(name, []).append((a, b))
+    handles = []
+    for k, (name, at) in enumerate(sorted(places.items())):
+        look: dict[str, Any] = {"marker": MEETINGS[k % len(MEETINGS)], "ms": 5, "mew": 0.9}
+        look |= {"color": OTHERS[k % len(OTHERS)], "mfc": "white", "ls": ""}
+        axes.plot(*np.transpose(at), **look, zorder=4)
+        handles.append(Line2D([], [], label=name, **look))
+    return handles
+
+
+def _axes(axes: Axes, plan: CurvePlan) -> None:
+    subject, window = plan.subject, plan.window
+    axes.set_xlim(*window.first)
+    axes.set_ylim(*window.second)
+    axes.grid(True, color=GRID, lw=0.5)
+    for set_label, parameter in ((axes.set_xlabel, plan.first), (axes.set_ylabel, plan.second)):
+        text = subject.labels.get(parameter) or NAMES.get(parameter, parameter)
+        unit = subject.units.get(parameter, "")
+        set_label(f"{text} [{unit}]" if unit else text)
+    si_x(axes, subject.si.get(plan.first))
+    si_y(axes, subject.si.get(plan.second))
+
+
+def _named(axes: Axes, plan: CurvePlan, labels: Sequence[Label]) -> None:
+    """Names of responses on the sweep's line, those for which there is room."""
+    width = plan.window.widths[0]
+    last = -np.inf
+    for text, low, high in sorted(labels, key=lambda label: label[1]):
+        wide = 0.011 * len(text) * width
+        centre = 0.5 * (low + high)
+        if high - low < wide or centre - 0.5 * wide < last:
+            continue
+        axes.text(centre, plan.at, text, ha="center", va="bottom", fontsize=7, color=INK)
+        last = centre + 0.5 * wide
