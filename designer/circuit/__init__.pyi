@@ -38,6 +38,7 @@ from .design import (
     Certificate as Certificate,
     ConditionCheck as ConditionCheck,
     Design as Design,
+    GeneratorSetting as GeneratorSetting,
     settings as settings,
 )
 from .ensemble import (

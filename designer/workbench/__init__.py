@@ -1,8 +1,9 @@
 """A board on the bench: what an oscilloscope recorded of it, and what the record shows.
 
-``record_formats`` reads the files that oscilloscopes write; ``record`` is what was recorded, and
-what its channels are of the board. ``board_fit`` finds the board of the spread that it is of, and
-``fitted_quantities`` says which figures of it the record tells.
+``record_formats`` reads the files that oscilloscopes write; ``channel_roles`` says what their
+channels are of the board; ``naming`` says which response a record shows, and how sure that is. What
+the nominal board would show is in ``prediction``. ``board_fit`` finds the board of the spread that
+a record is of, and ``fitted_quantities`` says which figures of it the record tells.
 """
 
 import lazy_loader

@@ -6,15 +6,25 @@ from .board_fit import (
 from .board_prior import (
     Prior as Prior,
 )
+from .channel_roles import (
+    recorded_motion as recorded_motion,
+)
 from .fitted_quantities import (
     BoardFigure as BoardFigure,
     figures as figures,
     told_figures as told_figures,
 )
+from .naming import (
+    NamedMotion as NamedMotion,
+    named as named,
+)
 from .observation import (
     Observation as Observation,
     ScopeErrors as ScopeErrors,
     observe as observe,
+)
+from .prediction import (
+    BoardPrediction as BoardPrediction,
 )
 from .record import (
     Record as Record,

@@ -23,6 +23,8 @@ MOST_LEVELS = 2**16
 """Different values of a channel up to which they may be the levels of a converter."""
 FEWEST_REPEATS = 4
 """Samples a level, in the mean, from which on the values are taken for a converter's levels."""
+DITHER_SEED = 1
+"""Of the numbers that spread values over a step."""
 ON_LEVEL = 0.1
 """Of a step: how far from its level a value may be written."""
 
@@ -61,7 +63,7 @@ class Record:
         """Standard deviation of what is in each channel and no signal [V], the converter's rounding
         included: see ``noise_of``."""
         return {
-            name: max(noise_of(signal), self.quantum[name] / math.sqrt(12.0))
+            name: max(noise_of(signal, self.quantum[name]), self.quantum[name] / math.sqrt(12.0))
             for name, signal in self.signals.items()
         }
 
@@ -137,21 +139,26 @@ def step_of(signal: Array) -> float:
     return step if float(off.max()) <= ON_LEVEL * step else 0.0
 
 
-def noise_of(signal: Array) -> float:
+def noise_of(signal: Array, step: float = 0.0) -> float:
     """Standard deviation [V] of white noise on a signal that is smooth from sample to sample.
 
-    signal : (k,) values [V]. The d-th differences of white noise have variance C(2d, d) σ²; a
-    smooth signal adds less to them the higher d is, until its own kinks do. The least of the robust
-    estimates (median of the absolute value over 0.674) for d = 1 … 6 is returned, which is too
-    large for a signal with few samples a turn, never too small but by chance (differences of
-    variance: Gasser, Sroka and Jennen-Steinmetz, Biometrika 73, 1986).
+    signal : (k,) values [V]. step : of the converter [V]; the values are spread evenly over it
+    first, for the median of a few levels is no measure, and that is taken off again.
+
+    The d-th differences of white noise have variance C(2d, d) σ²; a smooth signal adds less to them
+    the higher d is, until its own kinks do. The least of the robust estimates (median of the
+    absolute value over 0.674) for d = 1 … 6 is returned, which is too large for a signal with few
+    samples a turn, never too small but by chance (differences of variance: Gasser, Sroka and
+    Jennen-Steinmetz, Biometrika 73, 1986).
     """
     estimates = []
-    differences = np.asarray(signal, dtype=np.float64)
+    dither = step * (np.random.default_rng(DITHER_SEED).random(len(signal)) - 0.5)
+    differences = np.asarray(signal, dtype=np.float64) + dither
     for order in ORDERS:
         differences = np.diff(differences)
         if len(differences) < 2:
             break
         middle = float(np.median(np.abs(differences)))
         estimates.append(middle / NORMAL / math.sqrt(math.comb(2 * order, order)))
-    return min(estimates, default=0.0)
+    least = min(estimates, default=0.0)
+    return math.sqrt(max(least**2 - step**2 / 12.0, 0.0))

@@ -1,0 +1,165 @@
+"""What the nominal board would show on a scope: the waves of its nets, and where its stops are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.check.synthesis_result import Synthesis
+from designer.circuit.design import GeneratorSetting, settings
+from designer.circuit.netlist import Circuit
+from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.circuit.reduction import Reduction
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import Drive
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
+
+POINTS = 512
+"""Of a drive period, of a predicted wave."""
+DRAWN = 60
+"""Boards that say how far the stops of one may be off."""
+DRAWN_WITH = 1
+"""Their seed."""
+
+
+@dataclass(frozen=True)
+class PredictedStop:
+    """The stage of a clearance as the nominal board has it."""
+
+    clearance: str
+    """Its name."""
+    output: str
+    """Net of its output."""
+    displacement: Mapping[str, float]
+    """Net by net what the displacement is made of: {"v1": 1.0}, or {"v1": 1.0, "v3": -1.0}."""
+    ends: Mapping[int, float]
+    """Where the stops are, by side, 1 upper and -1 lower [V of the displacement]."""
+    inside: tuple[float, float]
+    """Output inside the clearance: volts at no displacement, and per volt of it."""
+    gains: Mapping[int, float]
+    """Volts of output for each volt beyond the stop, by side, what ``inside`` adds left out."""
+
+    def output_of(self, displacement: Array) -> Array:
+        """(k,) output [V] at displacements (k,) [V]."""
+        value = self.inside[0] + self.inside[1] * displacement
+        for side, end in self.ends.items():
+            beyond = side * np.maximum(side * (displacement - end), 0.0)
+            value = value + self.gains[side] * beyond
+        return np.asarray(value)
+
+
+@dataclass(frozen=True)
+class PredictedResponse:
+    """A wanted response of the nominal board."""
+
+    setting: GeneratorSetting
+    """The generator's setting."""
+    orbit: Orbit
+    """On the exact circuit."""
+    waves: Mapping[str, Array]
+    """(n · POINTS,) voltage of each net [V], from drive phase 0 on, where the generator's voltage
+    falls through its mean."""
+
+
+class BoardPrediction:
+    """What is known of a design's boards before any is measured."""
+
+    def __init__(self, synthesis: Synthesis) -> None:
+        self.synthesis = synthesis
+        self.reduction = nominal_reduction(synthesis.design)
+        self.stops = _stops(self.reduction)
+
+    @property
+    def circuit(self) -> Circuit:
+        return self.synthesis.design.circuit
+
+    @property
+    def generator(self) -> str:
+        """Net of the generator."""
+        return self.circuit.generator.net
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        """Nets that a channel may show."""
+        return (*self.circuit.outputs, self.generator)
+
+    @cached_property
+    def settings(self) -> tuple[GeneratorSetting, ...]:
+        """The generator's settings of ``setup.csv``."""
+        return settings(self.synthesis.design, self.synthesis.model_responses)
+
+    @cached_property
+    def responses(self) -> tuple[PredictedResponse, ...]:
+        """Those wanted responses that have an orbit on the nominal board."""
+        system = self.reduction.system()
+        shown = []
+        for setting, response in zip(self.settings, self.synthesis.model_responses, strict=True):
+            orbit = on_circuit(system, self.synthesis.design, response)
+            if orbit.n:
+                shown.append(PredictedResponse(setting, orbit, self.waves(orbit, setting)))
+        return tuple(shown)
+
+    def waves(self, orbit: Orbit, setting: GeneratorSetting) -> dict[str, Array]:
+        """(n · POINTS,) voltage of each net [V] along an orbit of the nominal board."""
+        drive = Drive(2.0 * np.pi * setting.frequency_hz, -setting.amplitude_v_peak)
+        flow = Flow(self.reduction.system(), drive)
+        run = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=POINTS)
+        states = run.strobes[:-1]
+        angle = 2.0 * np.pi * np.arange(len(states)) / POINTS
+        waves = dict(zip(self.circuit.state_nets, states.T, strict=True))
+        waves[self.generator] = -setting.amplitude_v_peak * np.sin(angle)
+        for stop in self.stops:
+            moved = sum(factor * waves[net] for net, factor in stop.displacement.items())
+            waves[stop.output] = stop.output_of(np.asarray(moved))
+        return waves
+
+    @cached_property
+    def end_errors(self) -> tuple[Mapping[int, float], ...]:
+        """Standard deviation of where each clearance's stops are on the boards of the model file's
+        spread [V], by side."""
+        spread = spread_of(self.synthesis.modelfile, self.circuit, self.synthesis.catalog)
+        boards = draw_many(self.circuit, spread, DRAWN_WITH, range(DRAWN))
+        drawn = [_stops(Reduction(self.circuit, boards.board(k))) for k in range(DRAWN)]
+        return tuple(
+            {side: float(np.std([each[k].ends[side] for each in drawn])) for side in stop.ends}
+            for k, stop in enumerate(self.stops)
+        )
+
+
+def _stops(reduction: Reduction) -> tuple[PredictedStop, ...]:
+    """The stages of a board."""
+    system, circuit = reduction.system(), reduction.circuit
+    stops = []
+    for index, stop in enumerate(circuit.stops):
+        row = system.displacement[index]
+        largest = int(np.argmax(np.abs(row[:-1])))
+        made_of = {
+            net: float(row[k]) for k, net in enumerate(circuit.state_nets) if abs(row[k]) > 0.01
+        }
+        ends = {
+            side: float(-contact[-1] * row[largest] / contact[largest])
+            for side, contact in system.contact_rows(index).items()
+        }
+        opened = reduction.solution(circuit.open).voltage[stop.output]
+        slope = float(opened[largest] / row[largest])
+        gains = {}
+        for side, contact in stop.contacts:
+            carried = reduction.solution(circuit.carrying(contact)).voltage[stop.output]
+            gains[side] = float(carried[largest] / row[largest]) - slope
+        stops.append(
+            PredictedStop(
+                stop.clearance, stop.output, made_of, ends, (float(opened[-1]), slope), gains
+            )
+        )
+    return tuple(stops)
+
+
+def nearest(responses: Sequence[PredictedResponse], frequency: float) -> list[PredictedResponse]:
+    """The responses by how far their drive frequency is from this one [Hz], the nearest first."""
+    return sorted(responses, key=lambda r: abs(np.log(r.setting.frequency_hz / frequency)))

@@ -1,0 +1,117 @@
+"""Boards that ngspice ran with full op-amps, recorded coarsely: what the records are called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from designer.base.errors import InputError
+from designer.workbench.channel_roles import recorded_motion
+from designer.workbench.naming import NamedMotion, named
+from designer.workbench.prediction import BoardPrediction
+from designer.workbench.record import Record
+from tests.shared.paper_cases import synthesised
+from tests.workbench.stored_records import COUNT, stored
+
+
+@cache
+def prediction() -> BoardPrediction:
+    return BoardPrediction(synthesised())
+
+
+@cache
+def name_of(number: int) -> NamedMotion:
+    return named(recorded_motion(stored(number).record, prediction()), prediction())
+
+
+@pytest.mark.parametrize("number", range(COUNT))
+def test_channels_and_drive_are_recognised(number: int) -> None:
+    truth, motion = stored(number), name_of(number).motion
+    assert motion.channels == {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
+    assert motion.frequency == pytest.approx(truth.frequency, rel=2e-4)
+    assert np.isfinite(motion.amplitude) == ("vg" in truth.nets)
+    if "vg" in truth.nets:
+        assert motion.amplitude == pytest.approx(4.95, rel=0.03)
+
+
+@pytest.mark.parametrize("number", range(COUNT))
+def test_the_response_is_right_or_left_open(number: int) -> None:
+    """Seven of the nine are sure; the last two stand next to grazing, and their truth is among
+    what is left open."""
+    truth, name = stored(number), name_of(number)
+    assert truth.response in (name.response, *name.others)
+    assert name.sure == (number < 7)
+    if name.sure:
+        assert name.response == truth.response
+        assert (name.reason, name.would_tell, name.others) == ("", "", ())
+    else:
+        assert name.reason
+        assert name.would_tell
+
+
+def test_the_stops_are_those_of_the_board() -> None:
+    """Every record sees thresholds within the spread of the nominal ones, to a hundredth of a
+    volt."""
+    for number in range(COUNT):
+        (zone,) = name_of(number).dead_zones.values()
+        for side, end in prediction().stops[0].ends.items():
+            assert abs(zone.ends[side] - end) < 0.12 * abs(end)
+            assert zone.end_errors[side] < 0.02
+
+
+@pytest.mark.parametrize("nets", [("v1",), ("fv",)])
+def test_one_channel_is_enough_where_contacts_are_deep(nets: tuple[str, ...]) -> None:
+    truth = stored(3)
+    told = {net: f"CH{truth.nets.index(net) + 1}" for net in nets}
+    motion = recorded_motion(truth.record, prediction(), frequency=truth.frequency, told=told)
+    name = named(motion, prediction())
+    assert name.response == truth.response
+    assert not name.dead_zones
+
+
+def test_a_sine_that_drifts_is_no_period() -> None:
+    """Two lines whose ratio is irrational never repeat; a decaying one settles."""
+    truth, rng = stored(1), np.random.default_rng(4)
+    time = np.linspace(0.0, 40.0 / truth.frequency, 20_000)
+    base = 6.0 * np.sin(2.0 * np.pi * truth.frequency * time)
+    beat = np.sin(2.0 * np.pi * truth.frequency * 0.6180339887 * time)
+    fade = np.exp(-truth.frequency * time / 6.0)
+    for more, response in ((beat, "aperiodic"), (2.0 * beat * fade, "not settled")):
+        noisy = base + more + 0.02 * rng.normal(size=len(time))
+        record = Record(time, {"CH1": noisy}, "made")
+        motion = recorded_motion(
+            record, prediction(), frequency=truth.frequency, told={"v1": "CH1"}
+        )
+        assert named(motion, prediction()).response == response
+
+
+@pytest.mark.parametrize(
+    ("told", "field", "found"),
+    [
+        ({"v9": "CH1"}, "--channels", "v9"),
+        ({"v1": "CH7"}, "--channels v1", "CH7"),
+        ({}, "its length", "drive periods"),
+    ],
+)
+def test_what_cannot_be_is_refused(told: dict[str, str], field: str, found: str) -> None:
+    record = stored(2).record
+    short = replace(
+        record,
+        time=record.time[:600],
+        signals={name: signal[:600] for name, signal in record.signals.items()},
+    )
+    with pytest.raises(InputError) as error:
+        recorded_motion(short, prediction(), told=told)
+    assert error.value.field == field
+    assert found in str(error.value)
+
+
+def test_channels_that_look_like_nothing_are_asked_for() -> None:
+    truth, rng = stored(2), np.random.default_rng(9)
+    time = truth.record.time
+    square = np.sign(np.sin(2.0 * np.pi * truth.frequency * time)) + 0.1 * rng.normal(size=4000)
+    with pytest.raises(InputError, match="--channels, such as"):
+        recorded_motion(Record(time, {"CH1": square, "CH2": -square}, "made"), prediction())
