@@ -4,6 +4,7 @@ from . import (
     captions as captions,
     parameter_map as parameter_map,
     point_captions as point_captions,
+    response_region as response_region,
     sweep as sweep,
     titles as titles,
     window_ends as window_ends,
@@ -51,6 +52,9 @@ from .point_captions import (
 from .points import (
     Bifurcation as Bifurcation,
     PointKind as PointKind,
+)
+from .response_region import (
+    ResponseRegion as ResponseRegion,
 )
 from .store import (
     GridStore as GridStore,

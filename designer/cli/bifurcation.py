@@ -67,6 +67,10 @@ def bifurcation(
         tuple[str, str, str] | None,
         option("--and", "NAME A B", "Continue the points as curves over this parameter too."),
     ] = None,
+    region: Annotated[
+        str | None,
+        option("--region", "V", "With --and: where the response at this value of --over lives."),
+    ] = None,
     basins: Annotated[
         bool, option("--basins", None, "Where starts on a plane of states end.")
     ] = False,
@@ -98,6 +102,7 @@ def bifurcation(
         keep=keep,
         map_=map_,
         and_=and_,
+        region=region,
         basins=basins,
         circuit=circuit,
         points=points,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,9 @@ def _sweep(answer: Mapping[str, Any]) -> None:
             say(text)
     if "curves" in answer:
         _curves(answer)
+    if "region" in answer:
+        for text in _region(answer):
+            say(text)
 
 
 def _curves(answer: Mapping[str, Any]) -> None:
@@ -78,6 +82,22 @@ def _curves(answer: Mapping[str, Any]) -> None:
         for met in c["codimension_two"]:
             a, b = met["values"]
             say(f"curve {number}: {met['kind']} at {first} = {a:.9g}, {second} = {b:.9g}")
+
+
+def _region(answer: Mapping[str, Any]) -> Iterator[str]:
+    """What bounds the region of a response, and where to sit in it."""
+    found, names = answer["region"], (answer["parameter"], answer["and"]["name"])
+
+    def place(values: Sequence[float]) -> str:
+        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True))
+
+    kinds = Counter(end["kind"] for end in found["border"])
+    rays = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
+    yield f"\nRegion of {found['response']} about {place(found['at'])}"
+    yield f"rays end by: {rays}"
+    yield f"both parameters may be off by {found['around']['share']:.2%} there"
+    best = found["best"]
+    yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"
 
 
 def _exponents(window: Mapping[str, Any]) -> str:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from designer.base.arrays import Array
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
@@ -23,6 +25,7 @@ from designer.bifurcations import (
     captions,
     parameter_map,
     point_captions,
+    response_region,
     sweep,
     titles,
     window_ends,
@@ -32,12 +35,22 @@ from designer.bifurcations.border_curves import BorderCurve, CurvePlan
 from designer.bifurcations.curve_store import CurveBlocks, curves_csv
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.response_region import ResponseRegion
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.subject import Subject
-from designer.bifurcations.sweep import SweepPlan
+from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
-from designer.jobs.bifurcation_request import Plan, Request, Swept, curve_plan, plan_of
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import OrbitStatus
+from designer.jobs.bifurcation_request import (
+    Plan,
+    Request,
+    Swept,
+    curve_plan,
+    plan_of,
+    region_at,
+)
 from designer.jobs.design_source import read_design, source
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
@@ -104,6 +117,7 @@ def bifurcation(
     keep: int | None = None,
     map_: tuple[str, float | str, float | str, int] | None = None,
     and_: tuple[str, float | str, float | str] | None = None,
+    region: float | str | None = None,
     basins: bool = False,
     circuit: bool = False,
     points: bool = True,
@@ -117,7 +131,8 @@ def bifurcation(
 
     model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
     texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. ``and_`` : (name,
-    from, to) of a second parameter, over which the sweep's points are continued as curves. out : a
+    from, to) of a second parameter, over which the sweep's points are continued as curves. region :
+    a value of the swept parameter: the region in both parameters of the response there. out : a
     folder to write into; without one nothing is written. The other words are those of the command
     line (docs/bifurcations.md).
 
@@ -139,6 +154,7 @@ def bifurcation(
         keep=keep,
         second=map_,
         and_=and_,
+        region=region,
         basins=basins,
         circuit=circuit,
         points=points,
@@ -216,12 +232,15 @@ class _Work:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
-        self.curves = None
+        self.curves: CurvePlan | None = None
+        self.region: float | None = None
         more: dict[str, Any] = {}
         if isinstance(plan, SweepPlan):
             self.curves = curve_plan(request, plan, modelfile)
             more = {"points": request.points}
             more |= {} if self.curves is None else {"and": self.curves.as_dict()}
+            self.region = region_at(request, plan, modelfile)
+            more |= {} if self.region is None else {"region": self.region}
         decides = {"kind": request.kind, **plan.as_dict(), **more}
         self.hash = work_hash(decides)
         self.provenance = provenance(
@@ -306,15 +325,38 @@ def _sweep(work: _Work, plan: SweepPlan, folder: Folder | None) -> _Made:
         plan.subject.si.get(work.curves.second),
     )
     body["curves"] = [curve.as_dict() for curve in curves]
+    region = _region(work, work.curves, swept)
+    if region is not None:
+        body["region"] = region.as_dict()
     labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
 
     def all_files() -> Files:
         assert work.curves is not None
-        picture = curve_plots.curves(curves, work.curves, work.title, labels)
+        picture = curve_plots.curves(curves, work.curves, work.title, labels, region)
         table = curves_csv(curves, work.curves.first, work.curves.second)
         return {**files(), "curves.csv": table, **_image_files("curves", picture)}
 
     return body, cost, all_files
+
+
+def _region(work: _Work, plan: CurvePlan, swept: Sweep) -> ResponseRegion | None:
+    """The region of the response at the value that was asked for, if one was.
+
+    Raises
+    ------
+    InputError : the sweep shows no periodic response there.
+    """
+    if work.region is None:
+        return None
+    k = int(np.argmin(np.abs(swept.plan.values - work.region)))
+    at = (work.region, plan.at)
+    flows = plan.subject.plane(plan.first, plan.second)
+    orbit = settle(flows.build(*at), next(iter(swept.steps.values()))[k].start)
+    if orbit.status is not OrbitStatus.PERIODIC:
+        expected = f"a value with a periodic response ({orbit.response} there)"
+        raise InputError(None, "--region", work.region, expected)
+    step = work.progress.stage(f"region of {orbit.response}", response_region.RAYS)
+    return response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
 
 
 def _curves(

@@ -66,6 +66,8 @@ class Request:
     """(name, from, to, steps) of a map's or a basin's other axis."""
     and_: tuple[str, float | str, float | str] | None = None
     """(name, from, to) of the second parameter that the sweep's points are continued over."""
+    region: float | str | None = None
+    """Value of the swept parameter at which a response lives whose region is sought."""
     basins: bool = False
     """Whether basins of attraction are asked for."""
     circuit: bool = False
@@ -151,6 +153,24 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
     return CurvePlan(subject, plan.parameter, name, float(at), window)
 
 
+def region_at(request: Request, plan: SweepPlan, modelfile: ModelFile) -> float | None:
+    """The value of the swept parameter at which a response's region is asked for, if any.
+
+    Raises
+    ------
+    InputError : it lies outside the sweep.
+    """
+    if request.region is None:
+        return None
+    assert isinstance(plan.subject, ModelSubject | BoardSubject)
+    read = _reader(plan.subject, modelfile)
+    value = _checked(read, plan.subject, "--region", plan.parameter, request.region)
+    low, high = float(plan.values[0]), float(plan.values[-1])
+    if not low < value < high:
+        raise InputError(None, "--region", value, f"a value between {low:g} and {high:g}")
+    return value
+
+
 # ---------------------------------------------------------------------------------------------
 
 
@@ -191,6 +211,8 @@ def _check_options(request: Request) -> None:
     if request.and_ is not None and (request.kind != "sweep" or not request.points):
         expected = "a sweep with its points: none of --map, --basins and --no-points"
         raise InputError(None, "--and", request.and_[0], expected)
+    if request.region is not None and request.and_ is None:
+        raise InputError(None, "--region", request.region, "a second parameter too: --and")
     if request.periods is not None:
         at_least("--periods", request.periods, 0)
     if request.keep is not None:

@@ -9,11 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.response_region import ResponseRegion
 from designer.bifurcations.titles import NAMES, curves_title
-from designer.report.bifurcation_plots import MARKS, OTHERS
+from designer.report.bifurcation_plots import MARKS, OTHERS, SHADES
 from designer.report.si_axes import si_x, si_y
 
 MEETINGS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "*", "h", "p")
@@ -28,15 +30,20 @@ def curves(
     plan: CurvePlan,
     name: str = "",
     labels: Sequence[Label] = (),
+    region: ResponseRegion | None = None,
 ) -> Figure:
     """Every curve by its kind: thick where it bounds a stable response, thin elsewhere; points of
-    codimension two as marks. name : the model's title. labels : responses along the sweep."""
+    codimension two as marks. name : the model's title. labels : responses along the sweep.
+
+    region : of one response, shaded, with the largest box about its nominal point and the largest
+    of all.
+    """
     figure = new_figure(8.6, 5.6)
     axes = figure.subplots()
     figure.suptitle(curves_title(name, plan, 104), x=0.012, ha="left", fontsize=8.5, color=INK)
     for curve in found:
         _line(axes, curve)
-    handles = [
+    handles: list[Any] = [
         Line2D([], [], color=MARKS[kind][1], lw=1.6, label=kind)
         for kind in dict.fromkeys(c.kind for c in found)
     ]
@@ -45,6 +52,7 @@ def curves(
     handles += _meetings(axes, found)
     axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
     handles.append(Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label="the sweep"))
+    handles += [] if region is None else _region(axes, region)
     _axes(axes, plan)
     _named(axes, plan, labels)
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
@@ -75,6 +83,23 @@ def _meetings(axes: Axes, found: Sequence[BorderCurve]) -> list[Line2D]:
     return handles
 
 
+def _region(axes: Axes, region: ResponseRegion) -> list[Any]:
+    """A response's region with its boxes; their legend."""
+    shade: dict[str, Any] = {"color": SHADES[region.symmetric], "lw": 0, "alpha": 0.6}
+    axes.fill(*region.border.T, zorder=1, **shade)
+    axes.plot(*region.at, marker="+", ms=8, color=INK, ls="", zorder=5)
+    handles: list[Any] = [Patch(label=f"{region.response}, seen from +", **shade)]
+    for box, line, text in (
+        (region.around, ":", f"± {region.around.share:.1%} about +"),
+        (region.best, "-", f"± {region.best.share:.1%}, the most"),
+    ):
+        (a, b), (wide, tall) = box.centre, box.half_widths
+        x, y = [a - wide, a + wide, a + wide, a - wide], [b - tall, b - tall, b + tall, b + tall]
+        axes.plot([*x, x[0]], [*y, y[0]], color=INK, lw=1.0, ls=line, zorder=4)
+        handles.append(Line2D([], [], color=INK, lw=1.0, ls=line, label=text))
+    return handles
+
+
 def _axes(axes: Axes, plan: CurvePlan) -> None:
     subject, window = plan.subject, plan.window
     axes.set_xlim(*window.first)
@@ -97,5 +122,6 @@ def _named(axes: Axes, plan: CurvePlan, labels: Sequence[Label]) -> None:
         centre = 0.5 * (low + high)
         if high - low < wide or centre - 0.5 * wide < last:
             continue
-        axes.text(centre, plan.at, text, ha="center", va="bottom", fontsize=7, color=INK)
+        off: dict[str, Any] = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center"}
+        axes.annotate(text, (centre, plan.at), fontsize=7, color=INK, **off)
         last = centre + 0.5 * wide

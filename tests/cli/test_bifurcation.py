@@ -335,6 +335,23 @@ def test_curves_over_a_second_parameter(
     assert _tree(out)["curves.csv"] == written["curves.csv"]
 
 
+@pytest.mark.slow
+def test_region_of_a_response(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = (model, *SWEEP, "--and", "b", "0.24", "0.26", "--region", "1.49")
+    region = _asked(capfd, *words, "--out", tmp_path / "out")["region"]
+    assert (region["response"], region["symmetric"], region["at"]) == ("1-1-1", True, [1.49, 0.25])
+    kinds = [end["kind"] for end in region["border"]]
+    assert set(kinds) == {"pitchfork", "edge of the window"}
+    assert region["around"]["centre"] == [1.49, 0.25]
+    assert region["around"]["share"] <= region["best"]["share"]
+    assert entry.status(["bifurcation", *map(str, words), "--out", str(tmp_path / "out")]) == 0
+    text = capfd.readouterr().err
+    assert "Region of 1-1-1 about omega = 1.49, b = 0.25" in text
+    assert f"{region['around']['share']:.2%}" in text
+
+
 @pytest.mark.parametrize(
     ("words", "part"),
     [
@@ -342,6 +359,8 @@ def test_curves_over_a_second_parameter(
         (("--and", "b", "0.3", "0.4"), "0.25, the value along the sweep"),
         (("--and", "mass", "0.3", "0.4"), "b"),
         (("--and", "b", "0.2", "0.4", "--no-points"), "a sweep with its points"),
+        (("--region", "1.5"), "a second parameter too"),
+        (("--region", "1.6", "--and", "b", "0.2", "0.4"), "between 1.4 and 1.52"),
     ],
 )
 def test_bad_second_parameter(
@@ -349,5 +368,5 @@ def test_bad_second_parameter(
 ) -> None:
     assert entry.status(["bifurcation", str(model), *SWEEP, *words]) == 2
     text = capfd.readouterr().err
-    assert "--and" in text
+    assert "--and" in text or "--region" in text
     assert part in text
