@@ -444,6 +444,10 @@ def export(
         Path | None,
         option("--parts", "FILE", "For --fab: your list of order numbers and prices, CSV."),
     ] = None,
+    accept: Annotated[
+        list[str] | None,
+        option("--accept", "RULE", "For --fab: a design rule that may fail. May come twice."),
+    ] = None,
     **shared: Any,
 ) -> Output:
     """Write the KiCad project (schematic, placed board, netlist), decks, or orders of boards."""
@@ -459,6 +463,7 @@ def export(
         fab=fab or (),
         board=board,
         parts=parts,
+        accept=accept or (),
         progress=session.progress,
         **shared,
     )

@@ -5,15 +5,24 @@ from .board_cost import (
     cost_or_none as cost_or_none,
     cost_words as cost_words,
 )
+from .board_picture import (
+    Side as Side,
+    board_svg as board_svg,
+)
 from .fab import (
     Fab as Fab,
     fabs as fabs,
+)
+from .interactive_bom import (
+    bom_page as bom_page,
 )
 from .order import (
     BoardOrder as BoardOrder,
     order_files as order_files,
 )
 from .order_refusal import (
+    accepted_failures as accepted_failures,
+    check_accepted as check_accepted,
     not_checked as not_checked,
     refusals as refusals,
 )

@@ -6,6 +6,7 @@ import io
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 from designer.base.csv_tables import csv_text
 from designer.base.seal import sha256
@@ -14,7 +15,9 @@ from designer.board.bom_layouts import Layout
 from designer.board.kicad_reader import BoardFile
 from designer.catalog.stock_list import order_number
 from designer.fabrication.board_facts import board_facts
+from designer.fabrication.board_picture import Side, board_svg
 from designer.fabrication.fab import Fab, PositionField
+from designer.fabrication.interactive_bom import bom_page
 from designer.fabrication.kicad_plot import PartPosition, plot
 from designer.fabrication.order_notes import notes
 
@@ -39,6 +42,8 @@ class BoardOrder:
     """Its bill."""
     not_checked: Sequence[str]
     """Rules that were not run, with the reason of each."""
+    accepted: Sequence[str] = ()
+    """Rules that fail and are accepted, with what was found."""
 
 
 def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]:
@@ -63,11 +68,17 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]
     remarks = [
         *by_hand[: bool(wired)],
         *_unnumbered(order.bought, fab.table.distributor),
+        *(f"Accepted, though the rule fails: {rule}" for rule in order.accepted),
         *(f"Not checked: {rule}" for rule in order.not_checked),
         *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
     ]
     text = notes(order.title, order.name, fab, board_facts(order.board), remarks)
     files[NOTES] = text.encode("utf-8")
+    files[f"{order.name}-bom.html"] = bom_page(order.title, order.board, order.bought).encode(
+        "utf-8"
+    )
+    for side in get_args(Side):
+        files[f"{order.name}-{side}.svg"] = board_svg(order.board, side).encode("utf-8")
     files[HASHES] = "".join(
         f"{sha256(content)}  {name}\n" for name, content in sorted(files.items())
     ).encode("ascii")

@@ -46,6 +46,8 @@ def _indented(title: str) -> Iterator[str]:
 def _files(name: str) -> Iterator[str]:
     yield f"- `{name}-gerbers.zip`: the layers and holes, to be uploaded; `gerbers/` has the same."
     yield f"- `{name}-bom.csv`: the bill of materials, in this fab's columns."
+    yield f"- `{name}-bom.html`: the bill with the board's picture, for the bench; loads nothing."
+    yield f"- `{name}-top.svg`, `{name}-bottom.svg`: the finished board from above and from below."
     yield f"- `{name}-positions.csv`: where each part stands, and at which angle."
     yield "- `SHA256SUMS`: hashes of all files; `sha256sum -c SHA256SUMS` checks them."
     yield f"- All files carry the date {DATE[:10]}, so that equal boards give equal files."

@@ -4,19 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from designer.base.errors import InputError
+from designer.base.schema import one_of
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
+from designer.catalog.design_rules import RULES
 from designer.design_rules.kicad_drc import OPEN, SHORT
 
 WANTED = (OPEN, SHORT)
 """Rules that have to be run and passed; any other may stay without a run."""
 
 
-def refusals(outcomes: Sequence[RuleOutcome]) -> tuple[str, ...]:
-    """A line for each reason against an order; none where it may be sent."""
+def check_accepted(names: Sequence[str]) -> None:
+    """Whether these are rules whose failure may be accepted.
+
+    Raises
+    ------
+    InputError : no such rule, or one without which no board works.
+    """
+    known = [rule.id for rule in RULES if rule.id not in WANTED]
+    for name in names:
+        if name not in known:
+            raise InputError(None, "--accept", name, one_of(name, known))
+
+
+def refusals(outcomes: Sequence[RuleOutcome], accepted: Sequence[str] = ()) -> tuple[str, ...]:
+    """A line for each reason against an order; none where it may be sent.
+
+    accepted : rules that may fail.
+    """
     return tuple(
         f"{one.rule.id}: {one.found}; {one.rule.do}"
         for one in outcomes
-        if one.status == FAIL or (one.rule.id in WANTED and one.status != PASS)
+        if (one.status == FAIL and one.rule.id not in accepted)
+        or (one.rule.id in WANTED and one.status != PASS)
+    )
+
+
+def accepted_failures(outcomes: Sequence[RuleOutcome], accepted: Sequence[str]) -> tuple[str, ...]:
+    """A line for each rule that fails and is accepted."""
+    return tuple(
+        f"{one.rule.id}: {one.found}"
+        for one in outcomes
+        if one.status == FAIL and one.rule.id in accepted
     )
 
 

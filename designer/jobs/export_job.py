@@ -28,7 +28,12 @@ from designer.check.synthesis_result import Synthesis
 from designer.design_rules.kicad_program import KicadFailed, needed_version
 from designer.fabrication.fab import Fab, fabs
 from designer.fabrication.order import BoardOrder, order_files
-from designer.fabrication.order_refusal import not_checked, refusals
+from designer.fabrication.order_refusal import (
+    accepted_failures,
+    check_accepted,
+    not_checked,
+    refusals,
+)
 from designer.jobs import board_files, kicad_files
 from designer.jobs.board_routing import route_in_folder
 from designer.jobs.design_files import design_provenance
@@ -47,6 +52,20 @@ DECK_STAGES: Mapping[Dialect, StageName] = {
 ORDER_STAGE: StageName = "fabrication"
 ORDERS = "fabrication"
 """Folder of what fabs are sent, one folder in it for each."""
+
+
+@dataclass(frozen=True)
+class OrderRequest:
+    """What is to be ordered, and from whom."""
+
+    fabs: tuple[str, ...]
+    """Names of the fabs."""
+    board: Path | None
+    """The board file; None for the folder's own."""
+    parts: Path | None
+    """A list of order numbers and prices, or None."""
+    accepted: tuple[str, ...]
+    """Ids of rules that may fail."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +103,7 @@ def export(
     fab: Sequence[str] = (),
     board: Path | str | None = None,
     parts: Path | str | None = None,
+    accept: Sequence[str] = (),
     overwrite: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
@@ -95,7 +115,8 @@ def export(
     its tracks stay, and what is open is routed. deck : "ltspice", "portable" or both.
     fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
     project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
-    parts : with ``fab``, a list of order numbers and prices, before the catalogue's.
+    parts : with ``fab``, a list of order numbers and prices, before the catalogue's. accept : with
+    ``fab``, ids of rules that may fail.
 
     Raises
     ------
@@ -107,7 +128,8 @@ def export(
     progress = Progress() if progress is None else progress
     if deck and fab:
         raise InputError(None, "--fab", ", ".join(fab), "no --deck beside it: one after the other")
-    for option, value in (("--board", board), ("--parts", parts)):
+    only = (("--board", board), ("--parts", parts), ("--accept", ", ".join(accept) or None))
+    for option, value in only:
         if value is not None and not fab:
             raise InputError(None, option, str(value), "a fab that it is for: --fab NAME")
     if routed and (deck or fab):
@@ -119,8 +141,8 @@ def export(
     if routed:
         return export_routed(modelfile, folder, keep, options, progress)
     if fab:
-        named = (None if file is None else Path(file) for file in (board, parts))
-        return export_orders(modelfile, folder, fab, *named, options=options, progress=progress)
+        asked = OrderRequest(tuple(fab), _path(board), _path(parts), tuple(accept))
+        return export_orders(modelfile, folder, asked, options, progress)
     if deck:
         return export_decks(modelfile, folder, deck, options, progress)
     return export_into(modelfile, folder, options, progress)
@@ -197,43 +219,42 @@ def export_decks(
 def export_orders(
     modelfile: ModelFile,
     out: Path,
-    names: Sequence[str],
-    file: Path | None,
-    parts: Path | None,
-    *,
+    asked: OrderRequest,
     options: Options,
     progress: Progress,
 ) -> ExportResult:
     """Write what fabs are sent into a design folder, which is made where there is none.
 
     An order that the rules forbid is refused: nothing is written, and the answer says why.
-
-    file : the board; None for the folder's own. parts : a list of order numbers, or None.
     """
     try:
         version = needed_version()
     except KicadFailed as why:
         raise EnvironmentMissing(f"{why}: --fab needs it") from None
+    names, parts = asked.fabs, asked.parts
     fabs(names, load_catalog().folders)
+    check_accepted(asked.accepted)
     stock = () if parts is None else stock_rows(parts, "--parts")
     runner, synthesis, _ = _design(modelfile, out, options, progress)
-    folder, board = runner.folder, _board(runner, file, progress)
+    folder, board = runner.folder, _board(runner, asked.board, progress)
     inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
     inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
+    inputs["accepted"] = ", ".join(sorted(asked.accepted))
     inputs["fabs"] = _fabs_with_earlier(folder, inputs, names)
     # What stands in the way is known before any work.
     if not folder.decide({ORDER_STAGE: (inputs, [])}, **_ways(options)):
         return _ordered(runner, names, True)
     progress.stage("design rules")
     outcomes = checked(synthesis, board).outcomes
-    if reasons := refusals(outcomes):
+    if reasons := refusals(outcomes, asked.accepted):
         answer = _result(runner, [], False).answer
         refused = {**answer, "fabs": list(names), "refused": list(reasons)}
         return ExportResult(refused, folder.path, False)
     progress.stage("Gerbers, holes, positions")
     name = project_name(modelfile.title)
     bought = board_files.bought(synthesis, stock)
-    order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes))
+    accepted = accepted_failures(outcomes, asked.accepted)
+    order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes), accepted)
     files = _order_texts(order, fabs(inputs["fabs"], runner.catalog.folders), runner)
     stages: Stages = {ORDER_STAGE: (inputs, list(files))}
     folder.decide(stages, **_ways(options))
@@ -250,6 +271,10 @@ def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardF
     if file is None and not own.is_file():
         export_into(runner.modelfile, runner.folder.path, replace(runner.options), progress)
     return read_board(own if file is None else file)
+
+
+def _path(named: Path | str | None) -> Path | None:
+    return None if named is None else Path(named)
 
 
 def _ways(options: Options) -> dict[str, bool]:

@@ -21,7 +21,7 @@ from designer.fabrication.board_facts import board_facts
 from designer.fabrication.fab import fabs
 from designer.fabrication.kicad_plot import undated
 from designer.fabrication.order import BoardOrder, order_files, packed
-from designer.fabrication.order_refusal import not_checked, refusals
+from designer.fabrication.order_refusal import accepted_failures, not_checked, refusals
 from tests.shared.gerber_reader import flashes, holes
 from tests.shared.kicad_cases import case_files
 from tests.shared.stages import CATALOG
@@ -202,6 +202,8 @@ def test_an_order_is_refused_for_what_fails_and_for_nets_that_nobody_checked(
     id_: str, status: Status, refused: bool
 ) -> None:
     one = outcome(id_, status)
+    assert bool(refusals([one], ["slew"])) is (refused and id_ != "slew")
+    assert bool(accepted_failures([one], ["slew"])) is (id_ == "slew" and status == FAIL)
     reasons = refusals([one])
     assert bool(reasons) is refused
     assert not refused or reasons == (f"{id_}: why; {one.rule.do}",)

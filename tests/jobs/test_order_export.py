@@ -114,6 +114,9 @@ def test_without_kicad_nothing_begins(
         (["--fab", "jlpcb"], 'did you mean "jlcpcb"?'),
         (["--fab", "jlcpcb", "--deck", "ltspice"], "--deck"),
         (["--board", "some.kicad_pcb"], "--fab NAME"),
+        (["--accept", "slew"], "--fab NAME"),
+        (["--fab", "generic", "--accept", "slow"], 'did you mean "slew"?'),
+        (["--fab", "generic", "--accept", "unconnected"], "--accept"),
         (["--fab", "generic", "--board", "some.kicad_pcb"], "some.kicad_pcb"),
     ],
 )
