@@ -33,7 +33,9 @@ def values(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
 
 def test_the_notebook_shows_what_it_is_stored_with(tmp_path: Path) -> None:
     shutil.copy(EXAMPLES / "rig.toml", tmp_path)
-    stored = nbformat.read(EXAMPLES / "notebook.ipynb", as_version=4)
+    stored = nbformat.read(  # type: ignore[no-untyped-call]
+        EXAMPLES / "notebook.ipynb", as_version=4
+    )
     fresh = copy.deepcopy(stored)
     for cell in fresh.cells:
         if cell.cell_type == "code":
