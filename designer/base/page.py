@@ -67,7 +67,7 @@ class Gallery:
     intro: str
     """What they show."""
     key: Picture
-    """Their common legend."""
+    """Their common legend; without ``svg`` where they need none."""
     pictures: tuple[Picture, ...]
     """The pictures."""
 

@@ -16,6 +16,7 @@ from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_project import Project, files
+from designer.board.kicad_reader import BoardFile, read_board
 from designer.board.kicad_rules import board_rules, rules_text
 from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import first_run
@@ -87,11 +88,23 @@ def write(
 
 def settle(folder: Folder, synthesis: Synthesis, checked: CheckedResponse) -> None:
     """Let the sheet run at the settings of the gate, if nobody has changed it."""
-    listed = {} if folder.manifest is None else folder.manifest.files
-    sheet = next((n for n in listed if n.startswith(FOLDER) and n.endswith(".kicad_sch")), None)
-    if sheet is None:
-        return
-    _, digest = listed[sheet]
-    path = folder / sheet
-    if path.is_file() and file_hash(sheet, path.read_bytes()) == digest:
+    sheet = _untouched(folder, ".kicad_sch")
+    if sheet is not None:
         folder.rewrite(sheet, texts(synthesis, checked)[sheet])
+
+
+def own_board(folder: Folder) -> BoardFile | None:
+    """The project's board as the tool has written it; None where somebody has changed it."""
+    board = _untouched(folder, ".kicad_pcb")
+    return None if board is None else read_board(folder / board)
+
+
+def _untouched(folder: Folder, ending: str) -> str | None:
+    """Name of the project's file of this kind, if it is as the manifest says."""
+    listed = {} if folder.manifest is None else folder.manifest.files
+    name = next((n for n in listed if n.startswith(FOLDER) and n.endswith(ending)), None)
+    if name is None:
+        return None
+    path = folder / name
+    same = path.is_file() and file_hash(name, path.read_bytes()) == listed[name][1]
+    return name if same else None

@@ -21,7 +21,7 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files
+from designer.jobs import design_files, kicad_files
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
@@ -230,7 +230,8 @@ class StudyStage:
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
 
-        data = ReportData(result, self.command, design_files.starts(folder))
+        starts, board = design_files.starts(folder), kicad_files.own_board(folder)
+        data = ReportData(result, self.command, starts, board)
         write_report(data, *(folder / f"{prefix}{name}" for name in REPORTS))
 
 

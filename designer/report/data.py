@@ -9,6 +9,7 @@ from functools import cached_property
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import Numbers, components, pin_numbers, to_buy
+from designer.board.kicad_reader import BoardFile
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
@@ -33,6 +34,8 @@ class ReportData:
     """The command line that makes these results again; "" where there is none."""
     starts: tuple[str, ...] = ()
     """How to start each response, from ``setup.csv``; empty where there is none."""
+    board_file: BoardFile | None = None
+    """The board as the tool has written it beside the report; None where there is none."""
 
     @property
     def design(self) -> Design:

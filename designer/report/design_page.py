@@ -99,7 +99,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
             [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
             "maps",
         ),
-        _parts(data, pictures.get("schematic")),
+        _parts(data, pictures.get("schematic"), pictures.get("board")),
         _errors(data, pictures.get("errors")),
         _scales(data),
         _provenance(data),
@@ -276,12 +276,15 @@ def _blame_note(blame: Blame, *, lost: bool) -> str:
     )
 
 
-def _parts(data: ReportData, schematic: Picture | Gallery | None) -> PageSection:
+def _parts(
+    data: ReportData, schematic: Picture | Gallery | None, board: Picture | Gallery | None
+) -> PageSection:
     blocks: list[Block] = [
         _parts_note(data),
         PageSection("To buy", [design_tables.bom_table(data.bom)]),
         *_cost(data.board_cost),
         _one("Schematic", schematic),
+        _one("The board", board),
         Columns(
             (
                 PageSection("Values by role", [design_tables.part_table(data.design.circuit)]),

@@ -42,7 +42,7 @@ _DROPPED = re.compile(
 _ID = re.compile(r'\sid="([^"]*)"')
 _REFERENCE = re.compile(r'((?:xlink:)?href="#|url\(#)([^")]+)')
 _ROOT = re.compile(r"<svg\b([^>]*)>")
-_SIZE = re.compile(r'\s(?:width|height|style)="[^"]*"')
+_SIZE = re.compile(r'\s(?:width|height|style|role|aria-label)="[^"]*"')
 
 
 class InlineSvg:

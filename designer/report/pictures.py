@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from designer.base.figure_style import to_svg
 from designer.base.page import Gallery, Picture
 from designer.board import schematic_drawing
+from designer.board.kicad_reader import BoardFile
 from designer.check.checked_design import CheckedResponse, traces
 from designer.circuit.coefficients import EXACT
+from designer.fabrication.board_picture import Side, board_svg
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.relative_motion import relative_motions
@@ -45,6 +47,8 @@ AVOIDED = (
 )
 INDICES = "First-order: what a coordinate explains alone; total: with all others."
 
+SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
+"""From where each side is seen."""
 Element = Callable[[Figure, str], Markup]
 
 
@@ -83,7 +87,22 @@ def pictures(data: ReportData) -> Pictures:
     out["schematic"] = Picture(
         caption="Drawn from the circuit's parts; the same as schematic.svg.", svg=svg
     )
+    if data.board_file is not None:
+        out["board"] = _board(data.board_file, page)
     return out
+
+
+def _board(board: BoardFile, page: InlineSvg) -> Gallery:
+    """Both sides of the board as its file stands."""
+    routed = "with what is routed so far" if board.copper else "placed and not routed yet"
+    sides = tuple(
+        Picture(
+            caption=f"From {seen}.",
+            svg=page.element(board_svg(board, side), f"The board from {seen}."),
+        )
+        for side, seen in SEEN.items()
+    )
+    return Gallery(f"The board of the KiCad project, {routed}.", Picture(), sides)
 
 
 def _drawing_label(data: ReportData) -> str:

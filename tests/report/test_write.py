@@ -14,6 +14,7 @@ import pytest
 from designer.base import figure_style
 from designer.base.errors import InputError
 from designer.base.page import Table
+from designer.board.kicad_reader import read_board
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
 from designer.check.synthesis_result import synthesise
@@ -38,6 +39,7 @@ from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.blank_figures import blank_figures
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.kicad_cases import case_files
 from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
@@ -537,3 +539,16 @@ def test_a_place_that_cannot_be_written(whole: ReportData, tmp_path: Path) -> No
     with pytest.raises(InputError, match="a place that can be written"):
         write_report(whole, tmp_path / "no" / "report.html", tmp_path / "no" / "report.md")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_board_is_shown_from_both_sides(whole: ReportData, tmp_path: Path) -> None:
+    texts = case_files("paper")
+    board = tmp_path / "board.kicad_pcb"
+    board.write_text(next(t for n, t in texts.items() if n.endswith(".kicad_pcb")), "utf-8")
+    sides = ["The board from above", "The board from below"]
+    page = words_of(replace(whole, board_file=read_board(board)))
+    assert [shown for shown in page.pictures() if shown.startswith("The board from")] == [
+        f"{side}." for side in sides
+    ]
+    assert "placed and not routed yet" in page.text
+    assert not any(shown.startswith("The board") for shown in words_of(whole).pictures())
