@@ -83,4 +83,5 @@ from .windows import (
     BranchWindow as BranchWindow,
     all_windows as all_windows,
     outside as outside,
+    window as window,
 )

@@ -29,6 +29,9 @@ KINDS = ("S", "AS")
 COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")
 """Of the branches, by how many times they left another."""
 CAPTIONS = {
+    "borders-b": "Borders of the symmetric responses 1-1-1 to 1-8-8 over ω and b; a response lives "
+    "between its two borders.",
+    "borders-k0": "The same over ω and k0.",
     "branches": "Followed branches: least x1 of each orbit over ω; solid where stable.",
     "fig3": "Fig. 3: phase portraits of 1-p-p, symmetric and as twins in black and red; shaded: "
     "contact.",

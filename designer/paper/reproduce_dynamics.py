@@ -46,6 +46,7 @@ from designer.paper.dynamics_page import (
     portrait_sheet,
 )
 from designer.paper.report_files import README, write_files
+from designer.paper.response_borders import SECOND, response_borders
 from designer.paper.response_order import gaps
 from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
 from designer.report import bifurcation_plots
@@ -70,6 +71,7 @@ STARTS = 64
 NAMES = frozenset(
     [README, DATA, "branches.parquet", *(f"{name}.parquet" for name in FIGURES)]
     + [f"{name}.{kind}" for name in ("branches", "fig3", *FIGURES) for kind in ("png", "svg")]
+    + [f"borders-{name}.{kind}" for name in SECOND for kind in ("png", "svg", "csv")]
 )
 """Of the report's files."""
 CHATTER = (0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
@@ -88,6 +90,8 @@ class DynamicsExtent:
     """Branch switches in a row."""
     figures: tuple[str, ...] = tuple(FIGURES)
     """Names of those of ``FIGURES`` that are drawn."""
+    borders: tuple[str, ...] = tuple(SECOND)
+    """Second parameters over which the borders of the symmetric windows are followed."""
     shared: tuple[float, ...] = SHARED
     """ω at which coexisting attractors are looked for."""
     chatter: tuple[float, ...] = CHATTER
@@ -122,10 +126,14 @@ def reproduce(
     dynamics = measure(extent, progress)
     source = _provenance(extent)
     sweeps = {name: _sweep(name, jobs, progress) for name in extent.figures}
-    figures = _figures(dynamics, extent, sweeps)
+    mains = [w for _, w in symmetric_mains(dynamics.windows)]
+    borders = [response_borders(mains, name, jobs, progress) for name in extent.borders]
+    figures = _figures(dynamics, extent, sweeps) | {b.name: b.figure() for b in borders}
     page = dynamics_page(dynamics, figures, COMMAND, first=FIRST, starts=STARTS)
     write_files(out, (DATA, _document(dynamics, extent, source)), page, figures, ("png", "svg"))
     _parquet(out / "branches.parquet", dynamics.survey, source)
+    for found in borders:
+        write(out / f"{found.name}.csv", found.table())
     for name, result in sweeps.items():
         write_sweep(out / f"{name}.parquet", result, source)
     return dynamics

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
@@ -24,6 +26,17 @@ Label = tuple[str, float, float]
 """A response, and from where to where along the sweep it is seen."""
 
 
+UPRIGHT = 0.012
+"""Of the axes: width of a name that is written upwards, for want of room."""
+
+
+def _round_values(low: float, high: float) -> list[float]:
+    """1, 1.5, 2, 3, 4, 5, 7 in every decade between two values > 0."""
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    every = [first * 10.0**k for k in decades for first in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)]
+    return [value for value in every if low <= value <= high]
+
+
 @styled
 def curves(
     found: Sequence[BorderCurve],
@@ -31,12 +44,14 @@ def curves(
     name: str = "",
     labels: Sequence[Label] = (),
     region: ResponseRegion | None = None,
+    *,
+    log: bool = False,
 ) -> Figure:
     """Every curve by its kind: thick where it bounds a stable response, thin elsewhere; points of
     codimension two as marks. name : the model's title. labels : responses along the sweep.
 
     region : of one response, shaded, with the largest box about its nominal point and the largest
-    of all.
+    of all. log : whether the first parameter has a logarithmic axis.
     """
     figure = new_figure(8.6, 5.6)
     axes = figure.subplots()
@@ -50,10 +65,19 @@ def curves(
     if not all(all(c.stable) for c in found):
         handles.append(Line2D([], [], color=MUTED, lw=0.6, label="no stable orbit beside it"))
     handles += _meetings(axes, found)
+    second = NAMES.get(plan.second, plan.second)
     axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
-    handles.append(Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label="the sweep"))
+    handles.append(
+        Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label=f"{second} = {plan.at:.6g}")
+    )
     handles += [] if region is None else _region(axes, region)
+    if log:
+        axes.set_xscale("log")
     _axes(axes, plan)
+    if log:
+        axes.xaxis.set_major_locator(FixedLocator(_round_values(*plan.window.first)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     _named(axes, plan, labels)
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return figure
@@ -115,13 +139,18 @@ def _axes(axes: Axes, plan: CurvePlan) -> None:
 
 def _named(axes: Axes, plan: CurvePlan, labels: Sequence[Label]) -> None:
     """Names of responses on the sweep's line, those for which there is room."""
-    width = plan.window.widths[0]
+    to_axes = axes.transAxes.inverted().transform
     last = -np.inf
     for text, low, high in sorted(labels, key=lambda label: label[1]):
-        wide = 0.011 * len(text) * width
-        centre = 0.5 * (low + high)
-        if high - low < wide or centre - 0.5 * wide < last:
+        ends = to_axes(axes.transData.transform([(low, plan.at), (high, plan.at)]))[:, 0]
+        wide, middle = 0.011 * len(text), float(ends.mean())
+        upright = ends[1] - ends[0] < wide
+        wide = UPRIGHT if upright else wide
+        if ends[1] - ends[0] < wide or middle - 0.5 * wide < last:
             continue
+        centre = float(np.sqrt(low * high)) if axes.get_xscale() == "log" else 0.5 * (low + high)
         off: dict[str, Any] = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center"}
+        off |= {"path_effects": [withStroke(linewidth=2.5, foreground="white")], "zorder": 6}
+        off |= {"rotation": 90, "va": "bottom"} if upright else {}
         axes.annotate(text, (centre, plan.at), fontsize=7, color=INK, **off)
-        last = centre + 0.5 * wide
+        last = middle + 0.5 * wide

@@ -47,7 +47,9 @@ from designer.paper.statements import (
 )
 from designer.report import bifurcation_plots
 
-SMALL = DynamicsExtent(low=1.29, high=1.6, depth=2, figures=(), shared=(1.55,), chatter=(0.2, 0.05))
+SMALL = DynamicsExtent(
+    low=1.29, high=1.6, depth=2, figures=(), borders=(), shared=(1.55,), chatter=(0.2, 0.05)
+)
 DOCS = Path(__file__).parents[2] / "docs" / "bifurcations.md"
 
 
@@ -249,7 +251,7 @@ def test_statements_say_where_the_paper_is_wrong() -> None:
 def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "paper-dynamics"
     monkeypatch.setitem(reproduce_dynamics.FIGURES, "fig2c", (1.4, 1.5, 21))
-    few = replace(SMALL, low=1.32, depth=2, figures=("fig2c",))
+    few = replace(SMALL, low=1.32, depth=2, figures=("fig2c",), borders=("b",))
     titles: list[str] = []
     draw = bifurcation_plots.diagram
 
@@ -281,7 +283,7 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(rows) == sum(len(b.points) for b in found.survey.branches)
     text = (out / "README.md").read_text(encoding="utf-8")
     assert text.splitlines()[2].startswith("Made by `designer reproduce dynamics")
-    pictures = re.findall(r"\((\w+\.png)\)", text)
+    pictures = re.findall(r"\(([\w-]+\.png)\)", text)
     assert pictures
     for name in pictures:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
