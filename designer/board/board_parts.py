@@ -42,6 +42,8 @@ MOST_SERIES = 10e6
 """Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
 PROBES = 10
 """Probes that the numbers before the trim's leave room for; with more, the trim's moves on."""
+WAYS = 40
+"""Most ways of a header that each output has a pin of ground beside its own on."""
 GENERATOR_MOST = 10.0
 """Most [V peak] that a usual function generator gives without a load."""
 
@@ -201,7 +203,8 @@ def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
             yield TestPoint(f"TP{i}", out, f"probe of {net}")
     if choice.spec.test_points:
         yield TestPoint(f"TP{len(behind) + 1}", GROUND, "ground of the probes")
-    yield Connector("J3", (*behind, GROUND), "outputs")
+    paired = tuple(net for out in behind for net in (out, GROUND))
+    yield Connector("J3", paired if len(paired) <= WAYS else (*behind, GROUND), "outputs")
 
 
 def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Diode]:

@@ -34,6 +34,8 @@ class PadShape:
     """Diameter of its hole [mm], 0 on the surface."""
     first: bool = False
     """Whether it is drawn square, as pin 1 of a row of holes is."""
+    plated: bool = True
+    """Whether it has copper; False for a bare hole."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +168,13 @@ def _bare_pad(name: str, diameter: str) -> FootprintShape:
     return FootprintShape(name, (PadShape("1", 0, 0, size, size),), (0.0, 0.0), soldered=False)
 
 
+def _mounting_hole(name: str, drill: str) -> FootprintShape:
+    """A hole without copper, with the room of a screw's head of twice its width."""
+    size = float(drill)
+    hole = PadShape("", 0.0, 0.0, size, size, size, plated=False)
+    return FootprintShape(name, (hole,), (2.0 * size, 2.0 * size), soldered=False)
+
+
 def _bourns_3296w(name: str) -> FootprintShape:
     """Three pins in a row at 2.54 mm below a body of 9.53 mm by 4.83 mm (Bourns 3296)."""
     return FootprintShape(name, _row(3, (-2.54, 0.0), (1.44, 1.44), 0.8), (9.53, 4.83), mark=True)
@@ -246,6 +255,7 @@ _RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
     "TO-92_Inline": ("TO-92_Inline", _transistor_outline),
     "PinHeader_1x03_P2.54mm_Vertical": (rf"PinHeader_1x(\d+)_P{_N}mm_Vertical", _header),
     "TestPoint_Pad_D1.5mm": (rf"TestPoint_Pad_D{_N}mm", _bare_pad),
+    "MountingHole_3.2mm_M3": (rf"MountingHole_{_N}mm_M\d+", _mounting_hole),
     "Potentiometer_Bourns_3296W_Vertical": ("Potentiometer_Bourns_3296W_Vertical", _bourns_3296w),
     "Potentiometer_Bourns_3224W_Vertical": ("Potentiometer_Bourns_3224W_Vertical", _bourns_3224w),
 }

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
+from designer.base.seal import sha256
 from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.kicad_footprint import on_board
 from designer.board.kicad_items import Entry
 from designer.board.kicad_layout import PAPERS
 from designer.board.kicad_names import BOARD_VERSION, HEAD, identifier, kicad_net, safe_text
-from designer.board.kicad_placement import Placement
+from designer.board.kicad_placement import SCREW, Placement
 from designer.board.kicad_sheet import symbol_id
+from designer.board.placed_component import LETTER, TEXT
 
 LAYERS = (
     (0, "F.Cu", "signal"),
@@ -56,7 +58,7 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
             **HEAD,
             general={"thickness": THICKNESS, "legacy_teardrops": False},
             paper=_paper(placement),
-            title_block={"title": safe_text(title)},
+            title_block={"title": safe_text(title), "rev": revision(entries)},
             layers=layers(LAYERS),
             setup={"pad_to_mask_clearance": 0, "allow_soldermask_bridges_in_footprints": False},
         ),
@@ -73,6 +75,19 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
             )
             for spot in placement.spots
         ),
+        *(
+            on_board(
+                hole,
+                owner=(project, hole.component.reference),
+                path=None,
+                sheet=f"{project}.kicad_sch",
+                fields=(),
+                nets=nets,
+                names={},
+            )
+            for hole in placement.holes
+        ),
+        *_texts(project, f"{safe_text(title)}  {revision(entries)}", placement),
         expression(
             "gr_rect",
             start=(box.left, box.top),
@@ -83,6 +98,48 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
             uuid=identifier(project, "outline"),
         ),
         *lists(embedded_fonts=False),
+    )
+
+
+def revision(entries: Sequence[Entry]) -> str:
+    """Eight digits that change with a value, a part, a case or a connection of the board."""
+    components = [e.component for e in entries if e.component is not None]
+    numbers = [c.bought.part_number if c.bought is not None else "" for c in components]
+    listed = [
+        (c.reference, c.value, c.footprint, number, sorted(c.nets.items()))
+        for c, number in zip(components, numbers, strict=True)
+    ]
+    return sha256(repr(listed).encode("utf-8"))[:8]
+
+
+def _texts(project: str, title: str, placement: Placement) -> Iterator[Expression]:
+    """The title between the lower screws, and what stands at the pins of connectors."""
+    box = placement.outline
+    most = int((box.width - 4.0 * SCREW) / LETTER)
+    at = 0.5 * (box.left + box.right), box.bottom - SCREW
+    shown = title if len(title) <= most else f"{title[: most - 11].rstrip()} … {title[-8:]}"
+    yield _text(shown, at, (project, "title"))
+    for spot in placement.spots:
+        right = spot.courtyard.right + 0.1
+        for label, pad in zip(spot.pin_labels, spot.footprint.pads, strict=False):
+            name = spot.component.reference
+            place = right, spot.pad(pad.number)[1]
+            yield _text(label, place, (project, name, pad.number), justify="left")
+
+
+def _text(
+    text: str, at: tuple[float, float], ids: tuple[str, ...], justify: str | None = None
+) -> Expression:
+    return expression(
+        "gr_text",
+        text,
+        at=(*at, 0),
+        layer="F.SilkS",
+        uuid=identifier("text", *ids),
+        effects={
+            "font": {"size": (TEXT, TEXT), "thickness": 0.12},
+            **({} if justify is None else {"justify": word(justify)}),
+        },
     )
 
 

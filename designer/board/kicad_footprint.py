@@ -33,7 +33,7 @@ def on_board(
     spot: PlacedComponent,
     *,
     owner: tuple[str, str],
-    path: str,
+    path: str | None,
     sheet: str,
     fields: Iterable[tuple[str, str]],
     nets: Mapping[str, int],
@@ -41,9 +41,9 @@ def on_board(
 ) -> Expression:
     """The footprint of a component at its place.
 
-    owner : project and reference, which the ids are made from; path : id of its symbol; sheet :
-    the schematic's file. fields : of its symbol. nets : number of each net by its KiCad name;
-    names : KiCad's name of the net of each pad.
+    owner : project and reference, which the ids are made from. path : id of its symbol, None of
+    what has none. sheet : the schematic's file. fields : of its symbol. nets : number of each net
+    by its KiCad name. names : KiCad's name of the net of each pad.
     """
     component, shape = spot.component, spot.footprint
     ids = ("board", *owner)
@@ -57,8 +57,13 @@ def on_board(
             _property(key, text, (0.0, 0.0), spot.angle, "F.Fab", ids, hide=True)
             for key, text in fields
         ),
-        *lists(path=f"/{path}", sheetname="/", sheetfile=sheet),
-        _attributes(shape, bought=component.bought is not None, fitted=component.fitted),
+        *([] if path is None else lists(path=f"/{path}", sheetname="/", sheetfile=sheet)),
+        _attributes(
+            shape,
+            bought=component.bought is not None,
+            fitted=component.fitted,
+            drawn=path is not None,
+        ),
         *_drawing(shape, ids),
         *(
             _pad(pad, spot.angle, ids, pins.get(pad.number), names.get(pad.number, ""), nets)
@@ -110,16 +115,21 @@ def _property(
     )
 
 
-def _attributes(shape: FootprintShape, *, bought: bool = True, fitted: bool = True) -> Expression:
+def _attributes(
+    shape: FootprintShape, *, bought: bool = True, fitted: bool = True, drawn: bool = True
+) -> Expression:
+    """drawn : whether it stands on the sheet too."""
     kind = [] if not shape.soldered else ["through_hole" if shape.through_hole else "smd"]
     left_out = [] if shape.soldered else ["exclude_from_pos_files"]
     left_out += [] if bought and fitted and shape.soldered else ["exclude_from_bom"]
     left_out += [] if fitted else ["dnp"]
+    left_out += [] if drawn else ["board_only"]
     return expression("attr", *map(word, [*kind, *left_out]))
 
 
 def _drawing(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression]:
-    """Body, courtyard, an outline in silk, and a dot at pin 1 where it matters."""
+    """Body, courtyard, an outline in silk, a bar at a cathode, a dot at another pin 1 that
+    matters."""
     wide, high = shape.body[0] / 2.0, shape.body[1] / 2.0
     if wide and high:
         yield _box("F.Fab", (-wide, -high, wide, high), 0.1, ids)
@@ -128,7 +138,16 @@ def _drawing(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression
     if shape.soldered:
         outline = (left - 0.17, top - 0.17, right + 0.17, bottom + 0.17)
         yield _box("F.SilkS", outline, 0.12, ids)
-    if shape.mark:
+    if shape.mark and shape.name.startswith("D_"):
+        yield expression(
+            "fp_line",
+            start=(left - 0.36, top - 0.17),
+            end=(left - 0.36, bottom + 0.17),
+            stroke={"width": 0.2, "type": word("solid")},
+            layer="F.SilkS",
+            uuid=identifier(*ids, "cathode"),
+        )
+    elif shape.mark:
         first = next(pad for pad in shape.pads if pad.number == "1")
         # Beside the outline, within the courtyard.
         if first.x < 0.0 or len(shape.pads) == 2 or first.x == 0.0:
@@ -180,13 +199,13 @@ def _pad(
     return expression(
         "pad",
         pad.number,
-        word("thru_hole" if hole else "smd"),
+        word("np_thru_hole" if not pad.plated else "thru_hole" if hole else "smd"),
         word(form),
         at=_at(pad.x, pad.y, angle),
         size=(pad.width, pad.height),
         drill=pad.drill if hole else None,
         layers=tuple(layers),
-        remove_unused_layers=False if hole else None,
+        remove_unused_layers=False if hole and pad.plated else None,
         roundrect_rratio=ROUND if form == "roundrect" else None,
         net=(nets[net], net) if nets is not None and net else None,
         pinfunction=pin.name if pin is not None and placed else None,

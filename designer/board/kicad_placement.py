@@ -9,18 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
+from designer.base.views import View
 from designer.board.block_placement import block
 from designer.board.board_parts import probed_nets
 from designer.board.component import Component
 from designer.board.footprints import footprint
-from designer.board.placed_component import ROOM, PlacedBox, PlacedComponent, bounds
-from designer.circuit.netlist import GROUND, Circuit, Section
+from designer.board.placed_component import ROOM, Label, PlacedBox, PlacedComponent, bounds
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Section
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
 
 EDGE = 3.0
-"""From the outermost part to the board's edge [mm]."""
+"""From the outermost part to the board's edge on the left and right [mm]."""
+BAND = 8.0
+"""The same above and below, for screws and the title [mm]."""
+SCREW = 4.0
+"""From the middle of a mounting hole to both edges [mm]."""
+MOUNTING_HOLE = "MountingHole:MountingHole_3.2mm_M3"
 PER_COLUMN = 12
 """Amplifiers whose packages stand below one another: those of the paper's circuit."""
 ORIGIN = (25.0, 25.0)
@@ -36,10 +42,28 @@ class Placement:
     outline: PlacedBox
     """Outline of the board."""
 
+    @property
+    def holes(self) -> tuple[PlacedComponent, ...]:
+        """Mounting holes, one at each corner; they are on no sheet and no bill."""
+        box = self.outline
+        return tuple(
+            PlacedComponent(_hole(f"H{number}"), footprint(MOUNTING_HOLE), x, y, label=label)
+            for number, (y, (x, label)) in enumerate(
+                product(
+                    (box.top + SCREW, box.bottom - SCREW),
+                    _ends(box.left + SCREW, box.right - SCREW),
+                ),
+                start=1,
+            )
+        )
+
 
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     """The board; InputError for a footprint that is not known here."""
-    spots = {c.reference: PlacedComponent(c, footprint(c.footprint)) for c in components}
+    spots = {
+        c.reference: PlacedComponent(c, footprint(c.footprint), pin_labels=_pin_labels(c, circuit))
+        for c in components
+    }
     owner = _owners(circuit, components)
     blocks: list[list[PlacedComponent]] = []
     packages = [c for c in components if c.kind == "op-amp"]
@@ -76,14 +100,48 @@ def _columns(
 def _on_board(spots: Sequence[PlacedComponent]) -> Placement:
     """The outline round the parts, its corner at ``ORIGIN``, everything on steps of 0.05 mm."""
     box = bounds(spots)
-    dx, dy = ORIGIN[0] + EDGE - box.left, ORIGIN[1] + EDGE - box.top
+    dx, dy = ORIGIN[0] + EDGE - box.left, ORIGIN[1] + BAND - box.top
     outline = PlacedBox(
         *ORIGIN,
         ORIGIN[0] + math.ceil(box.width + 2.0 * EDGE),
-        ORIGIN[1] + math.ceil(box.height + 2.0 * EDGE),
+        ORIGIN[1] + math.ceil(box.height + 2.0 * BAND),
     )
     placed = [replace(s, x=_step(s.x + dx), y=_step(s.y + dy)) for s in spots]
     return Placement(tuple(placed), outline)
+
+
+def _ends(left: float, right: float) -> tuple[tuple[float, Label], tuple[float, Label]]:
+    return (left, "right"), (right, "left")
+
+
+def _hole(reference: str) -> Component:
+    return Component(
+        reference=reference,
+        kind="mounting hole",
+        value="M3",
+        quantity=None,
+        footprint=MOUNTING_HOLE,
+        pins=(),
+        role="mounting hole",
+        stage=SUPPLY,
+        views=View.BOARD,
+        description="mounting hole",
+        bought=None,
+    )
+
+
+def _pin_labels(component: Component, circuit: Circuit) -> tuple[str, ...]:
+    """What is written at the pins of a connector."""
+    if component.kind != "connector":
+        return ()
+    volts = f"{circuit.supply:g} V"
+    names = {
+        GROUND: "0 V",
+        POSITIVE: f"+{volts}",
+        NEGATIVE: f"-{volts}",
+        circuit.generator.net: "generator",
+    }
+    return tuple(names.get(pin.net, pin.net.removesuffix("_out")) for pin in component.pins)
 
 
 def _owners(circuit: Circuit, components: Sequence[Component]) -> dict[str, list[str]]:

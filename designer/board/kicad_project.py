@@ -55,7 +55,7 @@ def files(project: Project) -> dict[str, str]:
     listed = entries(circuit, project.components, project.run, models)
     sheet = layout(listed, kicad_sim.directives(circuit, project.run))
     placed = place(circuit, [c for e in listed if e.placed and (c := e.component) is not None])
-    cases = {spot.footprint.name: spot.footprint for spot in placed.spots}
+    cases = {s.footprint.name: s.footprint for s in (*placed.spots, *placed.holes)}
     out = {
         f"{name}.kicad_sch": expression_text(schematic(name, project.title, listed, sheet)),
         f"{name}.kicad_pcb": expression_text(board(name, project.title, listed, placed)),

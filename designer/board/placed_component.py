@@ -35,6 +35,8 @@ class PlacedComponent:
 
     label: Label = "above"
     """Where its reference stands, as it is seen."""
+    pin_labels: tuple[str, ...] = ()
+    """What stands right of its pads, in their order; nothing of most."""
 
     @property
     def courtyard(self) -> PlacedBox:
@@ -62,7 +64,7 @@ class PlacedComponent:
         return PlacedBox(
             min(box.left, self.x + x - half),
             min(box.top, self.y + y - TEXT / 2.0 - 0.15),
-            max(box.right, self.x + x + half),
+            max(box.right + LETTER * max(map(len, self.pin_labels), default=0), self.x + x + half),
             max(box.bottom, self.y + y + TEXT / 2.0),
         )
 

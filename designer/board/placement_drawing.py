@@ -33,6 +33,9 @@ def placement_drawing(placement: Placement) -> Figure:
     axes.add_patch(edge)
     for spot in placement.spots:
         _component(axes, spot)
+    for hole in placement.holes:
+        (pad,) = hole.footprint.pads
+        axes.add_patch(Circle((hole.x, hole.y), 0.5 * pad.drill, fc=HOLE, lw=0.0))
     return figure
 
 

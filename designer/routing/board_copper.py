@@ -16,6 +16,8 @@ from designer.board.outline import pen_path, read_outline
 FRONT, BACK = "F.Cu", "B.Cu"
 CHORDS = 8
 """Of a quarter of a circle."""
+SCREW_ROOM = 0.3
+"""Round a bare hole, more than the clearance of copper [mm]."""
 NO_NET = 0
 """KiCad's number of what is on no net."""
 
@@ -97,8 +99,11 @@ def _pads(footprint: Expression) -> Iterator[Copper]:
         angle = math.radians(own.number(2) if len(own.atoms) > 2 else 0.0)
         net = pad.find("net")
         number = NO_NET if net is None else int(net.number(0))
-        layers = _layers(pad.get("layers").atoms)
-        yield Copper(_pad_shape(pad, place, angle), number, layers, relief=True)
+        layers, shape = _layers(pad.get("layers").atoms), _pad_shape(pad, place, angle)
+        if pad.text(1) == "np_thru_hole":
+            yield Copper(grown(shape, SCREW_ROOM), NO_NET, (True, True))
+        else:
+            yield Copper(shape, number, layers, relief=True)
 
 
 def _pad_shape(pad: Expression, place: tuple[float, float], angle: float) -> Geometry:

@@ -6,7 +6,7 @@ from round to round, until every place has one net: negotiated congestion (McMur
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,21 @@ from numpy.typing import NDArray
 
 from designer.base.progress import doing
 from designer.routing.board_copper import NO_NET, BoardCopper, Copper
-from designer.routing.kernel_router import BREAK, HISTORY, UNIT, Tariff, conflicts, count, route
-from designer.routing.net_kinds import NetKind
-from designer.routing.routing_grid import Nodes, RoutingGrid, routing_grid
+from designer.routing.kernel_router import (
+    BREAK,
+    FREE,
+    HISTORY,
+    UNIT,
+    Tariff,
+    conflicts,
+    count,
+    route,
+)
+from designer.routing.net_kinds import GROUND_KIND, NetKind
+from designer.routing.routing_grid import STEP, Nodes, RoutingGrid, routing_grid
 
+STITCH = 7.5
+"""Between the vias that join the pours [mm]."""
 ROUNDS = 100
 """Most rounds of negotiation."""
 PRESSURE, GROWTH, MOST_PRESSURE = 8, 1.4, 4000
@@ -72,7 +83,8 @@ def _nets(
     out = []
     for net in copper.nets:
         pieces = [p for p in copper.pieces if p.net == net and net != NO_NET]
-        groups = _joined(pieces)
+        # A via that only joins the pours is no end of a connection.
+        groups = [g for g in _joined(pieces) if any(piece.relief for piece in g)]
         if len(groups) < 2:
             continue
         box = shapely.bounds(shapely.union_all([p.shape for p in pieces]))
@@ -133,7 +145,21 @@ class _Negotiation:
                 self.open[net.net] = len(net.starts) - 2
                 self.paths[net.net] = np.zeros(0, dtype=np.int32)
         paths = {net: _runs(nodes) for net, nodes in self.paths.items()}
+        for net in self.nets:
+            if self.kinds[net.kind].name == GROUND_KIND:
+                paths[net.net] += tuple(self._stitches(net))
         return Routes(self.grid, paths, {n: k for n, k in self.open.items() if k}, rounds)
+
+    def _stitches(self, net: Terminals) -> Iterator[Nodes]:
+        """Vias between the pours of a net, wherever a lattice meets free room on both sides."""
+        arrays, step = self.grid.arrays, round(STITCH / STEP)
+        every = np.arange(arrays.places).reshape(-1, arrays.width)
+        for place in map(int, every[step::step, step::step].ravel()):
+            both = [place, place + arrays.places]
+            owners = {*arrays.owner[net.kind, both], arrays.via_owner[net.kind, place]}
+            taken = arrays.taken[net.kind, both].any() or arrays.via_taken[net.kind, place]
+            if owners <= {FREE, net.net} and not taken:
+                yield np.array(both, dtype=np.int32)
 
     def _route(self, net: Terminals, pressure: int) -> None:
         """Take a net's paths out, and find its cheapest ones among the others."""
