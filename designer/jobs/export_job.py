@@ -269,7 +269,7 @@ def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardF
     name = project_name(runner.modelfile.title)
     own = runner.folder / f"{kicad_files.FOLDER}/{name}.kicad_pcb"
     if file is None and not own.is_file():
-        export_into(runner.modelfile, runner.folder.path, replace(runner.options), progress)
+        export_into(runner.modelfile, runner.folder.path, runner.options, progress)
     return read_board(own if file is None else file)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -126,3 +127,24 @@ def test_wrong_options_are_named(made: Path, options: list[str], told: str) -> N
     assert done.returncode == 2, done.stderr
     assert told in done.stderr
     assert snapshot(made) == before
+
+
+@pytest.mark.kicad
+@pytest.mark.slow
+def test_a_routed_board_is_ordered_under_its_own_rules(made: Path, tmp_path: Path) -> None:
+    """Offsets disturb this system more than its rule allows: refused until that is accepted."""
+    folder = tmp_path / "design"
+    shutil.copytree(made, folder)
+    shutil.rmtree(folder / "fabrication", ignore_errors=True)
+    assert designer("export", folder, "--routed", "--overwrite").returncode == 0
+    refused = ordered(folder, "--fab", "jlcpcb")
+    assert refused.returncode == 1
+    (reason,) = json.loads(refused.stdout)["refused"]
+    assert reason.startswith("offset-force: ")
+    done = ordered(folder, "--fab", "jlcpcb", "--accept", "offset-force", "--overwrite")
+    assert done.returncode == 0, done.stderr
+    place = folder / "fabrication" / "jlcpcb"
+    assert "Accepted, though the rule fails: offset-force" in (place / "README.md").read_text()
+    copper = (place / "gerbers" / "linear-pair-B_Cu.gbl").read_text()
+    assert "D01*" in copper, "tracks are drawn"
+    assert "G36*" in copper, "the ground pour is drawn"
