@@ -17,6 +17,10 @@ from .check.simulation import (
 from .check.synthesis_result import (
     Synthesis as Synthesis,
 )
+from .jobs.bench_job import (
+    BenchAnswer as BenchAnswer,
+    bench as bench,
+)
 from .jobs.bifurcation_job import (
     BifurcationResult as BifurcationResult,
     bifurcation as bifurcation,

@@ -21,8 +21,8 @@ from designer.base.progress import Progress, progress_for
 from designer.base.version import __version__
 
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance search trade export rules reproduce "
-    "catalog new".split()
+    "run synthesise synthesize simulate bifurcation tolerance search trade export rules bench "
+    "reproduce catalog new".split()
 )
 GROUPS = ("Design", "Study", "Explore", "Make")
 """The headings of the verbs in the help, in their order."""

@@ -337,6 +337,31 @@ def rules(answer: Mapping[str, Any]) -> None:
         say(f"Not run is no pass. Rules that were not looked at: {', '.join(idle)}")
 
 
+def benched(answer: Mapping[str, Any]) -> None:
+    """What each record shows; then what is not sure, and what would tell."""
+    rows = answer["records"]
+    table(
+        "Records",
+        (
+            {
+                "record": r["file"],
+                "ω": f"{r['omega']:.4g}",
+                "drive": f"{r['frequency_hz']:.5g} Hz",
+                "shows": r["response"],
+                "sure": YES_NO[r["sure"]],
+                "wanted there": r["wanted"] or "-",
+                "exact circuit": (r["exact_circuit"] or {}).get("response", "-"),
+            }
+            for r in rows
+        ),
+    )
+    for r in rows:
+        if r["others"]:
+            say(f"{r['file']}: {r['response']}, or {' or '.join(r['others'])}")
+        if r["reason"]:
+            say(f"{r['file']}: not sure, for {r['reason']}. What would tell: {r['would_tell']}.")
+
+
 def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     written = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"

@@ -491,3 +491,48 @@ def rules(
 
     result = rules_job.rules(folder, board=board, junit=junit, progress=session.progress, **shared)
     return Output(result.answer, lambda: tables.rules(result.answer), result.passed)
+
+
+@verb("Make", "designer bench out/model --record scope.csv --out out/board-1", "overwrite")
+def bench(
+    session: Session,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A design folder.")],
+    record: Annotated[
+        list[Path] | None,
+        option("--record", "FILE", "What an oscilloscope wrote of one board; may be repeated."),
+    ] = None,
+    omega: Annotated[
+        float | None,
+        option("--omega", "W", "Drive frequency in the model's own units [found in the record]."),
+    ] = None,
+    channels: Annotated[
+        str | None,
+        option("--channels", "NET=CHANNEL,…", "What each channel shows [found by the shapes]."),
+    ] = None,
+    out: Annotated[
+        Path | None, option("--out", "DIR", "Write the answer, its page and pictures there.")
+    ] = None,
+    **shared: Any,
+) -> Output:
+    """Say what records of a board show, and how sure that is; exit status 1 where it is not sure or
+    not what is wanted there."""
+    from designer.cli import tables
+    from designer.jobs import bench_job
+
+    told = None if channels is None else bench_job.channels_of(channels)
+    result = bench_job.bench(
+        folder,
+        record or (),
+        omega=omega,
+        channels=told,
+        out=out,
+        progress=session.progress,
+        **shared,
+    )
+
+    def show() -> None:
+        tables.benched(result.answer)
+        if out is not None:
+            tables.files(out, False)
+
+    return Output(result.answer, show, result.satisfied)

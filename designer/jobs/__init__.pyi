@@ -1,4 +1,5 @@
 from . import (
+    bench_job as bench_job,
     bifurcation_job as bifurcation_job,
     cure_job as cure_job,
     export_job as export_job,

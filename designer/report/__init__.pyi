@@ -26,6 +26,12 @@ from .data import (
 from .map_plots import (
     map_files as map_files,
 )
+from .record_page import (
+    record_page_html as record_page_html,
+)
+from .record_plots import (
+    record_figure as record_figure,
+)
 from .write import (
     write_report as write_report,
 )

@@ -14,7 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from designer.base.atomic_write import write
-from designer.base.page import markdown
+from designer.base.page import Page, markdown
 from designer.report.data import ReportData
 from designer.report.design_page import FORMAT, design_page
 from designer.report.pictures import pictures
@@ -36,6 +36,11 @@ def write_report(data: ReportData, html: Path, text: Path) -> None:
 
 def render_html(data: ReportData) -> str:
     """``report.html`` as text."""
+    return render_page(design_page(data, pictures(data)))
+
+
+def render_page(page: Page) -> str:
+    """A page as one file of HTML that loads nothing."""
     templates = Environment(
         loader=PackageLoader("designer.report", "templates"),
         autoescape=True,
@@ -45,7 +50,6 @@ def render_html(data: ReportData) -> str:
         keep_trailing_newline=True,
     )
     templates.filters["text"] = _unbroken
-    page = design_page(data, pictures(data))
     return templates.get_template("page.html.j2").render(page=page, format=FORMAT)
 
 

@@ -14,6 +14,9 @@ from .fitted_quantities import (
     figures as figures,
     told_figures as told_figures,
 )
+from .folding import (
+    samples_of as samples_of,
+)
 from .naming import (
     NamedMotion as NamedMotion,
     named as named,
@@ -22,6 +25,10 @@ from .observation import (
     Observation as Observation,
     ScopeErrors as ScopeErrors,
     observe as observe,
+)
+from .overlay import (
+    Overlay as Overlay,
+    overlaid as overlaid,
 )
 from .prediction import (
     BoardPrediction as BoardPrediction,

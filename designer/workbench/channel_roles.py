@@ -60,6 +60,9 @@ def recorded_motion(
     """
     if told:
         _check(record, prediction, told)
+        if set(told) == {prediction.generator}:
+            expected = "a net of the board as well"
+            raise InputError(None, "--channels", "the generator alone", expected)
     channels = tuple(dict.fromkeys(told.values())) if told else tuple(record.signals)
     shown = [c for c in channels if record.span[c] > 0.0]
     if not shown:

@@ -80,6 +80,8 @@ class NamedMotion:
     """The curve of n periods; its channels are in the order of ``nets``. None without a period."""
     nets: tuple[str, ...]
     """The nets that were recorded, but the generator."""
+    moving: str
+    """The first state among them, else the first of them: what a phase portrait shows."""
     dead_zones: Mapping[str, DeadZoneCurve]
     """By clearance: its stage as the record shows it, where its output and displacement are
     there."""
@@ -102,7 +104,7 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
     knots = best_knots(samples, motion.frequency)
     lap = _whole_lap(samples, motion, knots)
     if lap is None:
-        return _without_period(motion, nets, samples)
+        return _without_period(motion, nets, _moving(nets, prediction), samples)
     n, doubt = lap
     curve = fold(samples, motion.frequency, n, _room(samples, n, knots))
     zones = dict(_zones(curve, nets, prediction.stops))
@@ -126,6 +128,7 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
         asymmetry_error=error,
         curve=curve,
         nets=nets,
+        moving=_moving(nets, prediction),
         dead_zones=zones,
     )
 
@@ -167,7 +170,9 @@ def _room(samples: Samples, n: int, knots: Sequence[int]) -> tuple[int, ...]:
     return tuple(max(min(k, len(samples.time) // (2 * n)), KNOTS[0] // 4) for k in knots)
 
 
-def _without_period(motion: RecordedMotion, nets: tuple[str, ...], samples: Samples) -> NamedMotion:
+def _without_period(
+    motion: RecordedMotion, nets: tuple[str, ...], moving: str, samples: Samples
+) -> NamedMotion:
     """A motion that the record does not show to repeat: still settling, aperiodic, or of a period
     that is too long for it."""
     settles = _settles(samples, motion.frequency)
@@ -193,6 +198,7 @@ def _without_period(motion: RecordedMotion, nets: tuple[str, ...], samples: Samp
         asymmetry_error=math.nan,
         curve=None,
         nets=nets,
+        moving=moving,
         dead_zones={},
     )
 
@@ -363,8 +369,8 @@ def _asymmetry(
     curve: Fold, nets: Sequence[str], prediction: BoardPrediction
 ) -> tuple[float, float]:
     """Of the first displacement that was recorded, with four standard errors."""
-    first = next((net for net in prediction.circuit.state_nets if net in nets), None)
-    if curve.n % 2 == 0 or first is None:
+    first = _moving(nets, prediction)
+    if curve.n % 2 == 0 or first not in prediction.circuit.state_nets:
         return math.nan, math.nan
     place = nets.index(first)
     wave = curve.curve[:, place] - curve.curve[:, place].mean()
@@ -374,3 +380,8 @@ def _asymmetry(
         float(np.abs(folded).max()) / peak,
         4.0 * math.sqrt(2.0) * float(curve.error[place]) / peak,
     )
+
+
+def _moving(nets: Sequence[str], prediction: BoardPrediction) -> str:
+    """The first state that was recorded, else the first net."""
+    return next((net for net in prediction.circuit.state_nets if net in nets), nets[0])

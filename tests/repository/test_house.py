@@ -21,6 +21,9 @@ STARTS = "most verbs do not need it"
 LAZY = {
     DRAWS: {
         ("board.schematic_drawing", "base.figure_style"),
+        ("jobs.bench_job", "base.figure_style"),
+        ("jobs.bench_job", "report.record_page"),
+        ("jobs.bench_job", "report.record_plots"),
         ("jobs.bifurcation_job", "base.figure_style"),
         ("jobs.bifurcation_job", "report.bifurcation_plots"),
         ("jobs.bifurcation_job", "report.curve_plots"),

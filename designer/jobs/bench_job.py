@@ -1,0 +1,266 @@
+"""The verb ``bench``: what records of an oscilloscope show of a board."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from designer.base.atomic_write import appearing
+from designer.base.design_folder import is_design_folder
+from designer.base.errors import MISSING, InputError
+from designer.base.frames import frame, table_html
+from designer.base.plain_json import dumps, plain
+from designer.base.progress import Progress
+from designer.catalog.catalog import load_catalog
+from designer.circuit.design import GeneratorSetting
+from designer.jobs.design_source import read_design
+from designer.jobs.origin import provenance
+from designer.workbench.channel_roles import recorded_motion
+from designer.workbench.naming import NamedMotion, named
+from designer.workbench.overlay import Overlay, overlaid
+from designer.workbench.prediction import BoardPrediction
+from designer.workbench.record_formats import read_record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME, PAGE = "bench.json", "bench.html"
+PLACE = "a directory that can be written"
+NEAR = 0.06
+"""Of a setting's frequency: how far from it a record may be taken for one of its response."""
+
+
+@dataclass(frozen=True)
+class BenchedRecord:
+    """A record, and what it shows."""
+
+    path: Path
+    """The file."""
+    named: NamedMotion
+    """What it shows."""
+    overlay: Overlay | None
+    """The record over the nominal board's orbit; None where there is none."""
+    setting: GeneratorSetting | None
+    """The nearest setting of ``setup.csv``; None where none is near."""
+
+    @property
+    def as_wanted(self) -> bool | None:
+        """Whether it surely shows what is wanted at the nearest setting, or its mirror twin; None
+        where nothing is wanted there."""
+        if self.setting is None or self.setting.expect is None:
+            return None
+        counts = self.named.counts
+        if not self.named.sure or counts is None:
+            return False
+        return self.setting.expect in (str(counts), str(counts.mirrored))
+
+
+@dataclass(frozen=True)
+class BenchAnswer:
+    """What the verb ``bench`` answers. It is a sequence of the records too."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md)."""
+    records: tuple[BenchedRecord, ...]
+    """Each record with what it shows."""
+
+    @property
+    def satisfied(self) -> bool:
+        """Whether every record surely shows a response, and the one that is wanted where one is."""
+        return all(r.named.sure and r.as_wanted is not False for r in self.records)
+
+    def table(self) -> pd.DataFrame:
+        """A row for each record."""
+        return frame(_row(record) for record in self.answer["records"])
+
+    def __iter__(self) -> Iterator[BenchedRecord]:
+        return iter(self.records)
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __getitem__(self, index: int) -> BenchedRecord:
+        return self.records[index]
+
+    def _repr_html_(self) -> str:
+        return table_html(self.answer["title"], [_row(r) for r in self.answer["records"]], "")
+
+
+def bench(
+    folder: Path | str,
+    record: Sequence[Path | str],
+    *,
+    omega: float | None = None,
+    channels: Mapping[str, str] | None = None,
+    out: Path | str | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> BenchAnswer:
+    """The verb ``bench``: read records of one board of a design and say what they show.
+
+    omega : the drive frequency of all of them in the model's units; found where None. channels :
+    channel by net, for all of them; found where None. out : a directory for ``bench.json``,
+    ``bench.html`` and a picture of each record; ``overwrite`` replaces files of these names.
+
+    Raises
+    ------
+    InputError : no design folder, a file that is no record, channels that cannot be told apart, or
+        files in the way; nothing is written then.
+    """
+    began, path = time.perf_counter(), Path(folder)
+    progress = Progress() if progress is None else progress
+    files = [Path(name) for name in record]
+    place = None if out is None else Path(out)
+    names = _names(files)
+    _check(path, files, place, names, overwrite)
+    catalog = load_catalog()
+    synthesis = read_design(path, catalog, progress)
+    prediction = BoardPrediction(synthesis)
+    scales = synthesis.design.errors.scales
+    frequency = None if omega is None else scales.frequency(omega)
+    benched = []
+    for file in files:
+        progress.stage(f"record {file.name}")
+        motion = recorded_motion(read_record(file), prediction, frequency=frequency, told=channels)
+        name = named(motion, prediction)
+        setting = _setting(motion.frequency, prediction)
+        benched.append(BenchedRecord(file, name, overlaid(name, prediction), setting))
+    settings = {"omega": omega, "channels": dict(channels or {})}
+    origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
+    seconds_a_radian = scales.seconds
+    answer = {
+        "format": 1,
+        "title": synthesis.modelfile.title,
+        "records": [_record_json(each, seconds_a_radian) for each in benched],
+        "files": [] if place is None else [NAME, PAGE, *names],
+        "provenance": origin,
+        "cost": {"seconds": time.perf_counter() - began},
+    }
+    result = BenchAnswer(plain(answer), tuple(benched))
+    if place is not None:
+        progress.stage("pictures")
+        _write(place, names, result)
+    return result
+
+
+def channels_of(text: str) -> dict[str, str]:
+    """Channel by net of a text such as "v1=CH1,fv=CH2".
+
+    Raises
+    ------
+    InputError : it is no list of such pairs, or a net or channel comes twice.
+    """
+    pairs = [pair.split("=", 1) for pair in text.split(",")]
+    if any(len(pair) != 2 or not all(word.strip() for word in pair) for pair in pairs):
+        raise InputError(None, "--channels", text, "NET=CHANNEL pairs such as v1=CH1,fv=CH2")
+    named_channels = {net.strip(): channel.strip() for net, channel in pairs}
+    if len(named_channels) < len(pairs) or len(set(named_channels.values())) < len(pairs):
+        raise InputError(None, "--channels", text, "each net and each channel once")
+    return named_channels
+
+
+def _check(
+    folder: Path, files: Sequence[Path], place: Path | None, names: Sequence[str], overwrite: bool
+) -> None:
+    """InputError where there is no design or no record, or files are in the way."""
+    if not is_design_folder(folder):
+        expected = "a design folder, as synthesise and run make it"
+        raise InputError(folder, "DIR", "no manifest.json", expected)
+    if not files:
+        raise InputError(None, "--record", MISSING, "a file that an oscilloscope wrote")
+    if place is None:
+        return
+    if place.exists() and not place.is_dir():
+        raise InputError(place, "--out", "a file", PLACE)
+    if is_design_folder(place):
+        raise InputError(place, "--out", "a design folder", "a directory of its own for a board")
+    for name in (NAME, PAGE, *names):
+        if (place / name).exists() and not overwrite:
+            raise InputError(place / name, "--out", "a file", "a name that is free, or --overwrite")
+
+
+def _names(files: Sequence[Path]) -> list[str]:
+    """Of the picture of each record."""
+    stems = [file.stem for file in files]
+    return [
+        f"{stem}.png" if stems.count(stem) == 1 else f"{stem}-{k + 1}.png"
+        for k, stem in enumerate(stems)
+    ]
+
+
+def _setting(frequency: float, prediction: BoardPrediction) -> GeneratorSetting | None:
+    """The setting of ``setup.csv`` whose frequency is nearest, if it is near."""
+    gaps = [(abs(frequency / s.frequency_hz - 1.0), s) for s in prediction.settings]
+    gap, setting = min(gaps, key=lambda pair: pair[0], default=(math.inf, None))
+    return setting if gap < NEAR else None
+
+
+def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
+    """seconds : of the circuit for a unit of the model's time."""
+    name, motion = benched.named, benched.named.motion
+    record, overlay, setting = motion.record, benched.overlay, benched.setting
+    return {
+        "file": benched.path.name,
+        "kind": record.kind,
+        "samples": len(record.time),
+        "periods": motion.periods,
+        "channels": dict(motion.channels),
+        "omega": 2.0 * math.pi * motion.frequency * seconds,
+        "frequency_hz": motion.frequency,
+        "frequency_error_hz": motion.frequency_error,
+        "amplitude_v_peak": motion.amplitude,
+        "response": name.response,
+        "sure": name.sure,
+        "others": list(name.others),
+        "reason": name.reason,
+        "would_tell": name.would_tell,
+        "symmetric": name.symmetric,
+        "asymmetry": name.asymmetry,
+        "asymmetry_error": name.asymmetry_error,
+        "wanted": None if setting is None else setting.expect,
+        "as_wanted": benched.as_wanted,
+        "stops": [
+            {
+                "clearance": clearance,
+                **{
+                    key: {"volts": zone.ends[side], "error": zone.end_errors[side]}
+                    for side, key in ((1, "upper"), (-1, "lower"))
+                    if side in zone.ends
+                },
+            }
+            for clearance, zone in name.dead_zones.items()
+        ],
+        "exact_circuit": None
+        if overlay is None
+        else {"response": overlay.orbit.response, "difference": dict(overlay.errors)},
+        "fitted": None,
+        "advice": None,
+    }
+
+
+def _row(record: Mapping[str, Any]) -> dict[str, Any]:
+    keys = ("file", "omega", "response", "sure", "others", "wanted", "as_wanted")
+    return {key: record[key] for key in keys}
+
+
+def _write(place: Path, names: Sequence[str], result: BenchAnswer) -> None:
+    """The answer, its page and the picture of each record."""
+    from designer.base.figure_style import to_png  # matplotlib is not needed but for them
+    from designer.report.record_page import record_page_html
+    from designer.report.record_plots import record_figure
+
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(place, "--out", error.strerror or str(error), PLACE) from None
+    figures = [record_figure(each.named, each.overlay) for each in result.records]
+    contents: dict[str, bytes] = {NAME: dumps(result.answer).encode("utf-8")}
+    contents |= {n: to_png(f) for n, f in zip(names, figures, strict=True)}
+    contents[PAGE] = record_page_html(result.answer, figures).encode("utf-8")
+    for name, content in contents.items():
+        with appearing(place / name, "--out", PLACE) as partial:
+            partial.write_bytes(content)

@@ -1,0 +1,105 @@
+"""A record laid over the prediction: the nominal board's exact orbit under the recorded drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.design import GeneratorSetting
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import Drive
+from designer.workbench.folding import POINTS as CURVE_POINTS
+from designer.workbench.naming import NamedMotion
+from designer.workbench.prediction import POINTS, BoardPrediction, nearest
+
+ASKED = 3
+"""Wanted responses, the nearest in frequency, from whose orbits the nominal board is settled."""
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """A record and the nominal board's orbit at the recorded drive, in phase."""
+
+    named: NamedMotion
+    """The record, and what it shows."""
+    setting: GeneratorSetting
+    """The generator's setting that the exact circuit has: the recorded frequency, and the recorded
+    amplitude where the generator was recorded, else that of the nearest setting."""
+    orbit: Orbit
+    """The exact circuit's orbit that is nearest to the record."""
+    nets: tuple[str, ...]
+    """The recorded nets, but the generator."""
+    recorded: Array
+    """(k, nets) curve of the record over a common lap [V]."""
+    predicted: Array
+    """(k, nets) the orbit's waves at the same phases [V]."""
+    points: int = POINTS
+    """Of both, in a drive period."""
+
+    @property
+    def errors(self) -> Mapping[str, float]:
+        """By net: root of the mean square of the difference over the orbit's peak. The scope's own
+        errors of gain and offset are in it."""
+        off = np.sqrt(((self.recorded - self.predicted) ** 2).mean(axis=0))
+        peaks = np.abs(self.predicted).max(axis=0)
+        return dict(zip(self.nets, (float(x) for x in off / peaks), strict=True))
+
+
+def overlaid(named: NamedMotion, prediction: BoardPrediction) -> Overlay | None:
+    """The record over the orbit of the nominal board that is nearest to it; None where the record
+    has no period, or the board no orbit near this frequency."""
+    curve = named.curve
+    if curve is None or not prediction.responses:
+        return None
+    recorded = curve.curve[:: CURVE_POINTS // POINTS]
+    best: Overlay | None = None
+    for setting, orbit in _orbits(named, prediction):
+        waves = prediction.waves(orbit, setting)
+        table = np.column_stack([waves[net] for net in named.nets])
+        for image in _images(table, prediction):
+            laps = math.lcm(curve.n, orbit.n)
+            shown = np.tile(recorded, (laps // curve.n, 1))
+            wave = _in_phase(shown, np.tile(image, (laps // orbit.n, 1)))
+            candidate = Overlay(named, setting, orbit, named.nets, shown, wave)
+            if best is None or sum(candidate.errors.values()) < sum(best.errors.values()):
+                best = candidate
+    return best
+
+
+def _orbits(
+    named: NamedMotion, prediction: BoardPrediction
+) -> Iterator[tuple[GeneratorSetting, Orbit]]:
+    """Orbits of the nominal board at the recorded drive, from those of the wanted responses."""
+    motion, system = named.motion, prediction.reduction.system()
+    for response in nearest(prediction.responses, motion.frequency)[:ASKED]:
+        amplitude = response.setting.amplitude_v_peak
+        if not math.isnan(motion.amplitude):
+            amplitude = motion.amplitude
+        setting = replace(
+            response.setting, frequency_hz=motion.frequency, amplitude_v_peak=amplitude
+        )
+        orbit = settle(
+            Flow(system, Drive(2.0 * np.pi * motion.frequency, -amplitude)), response.orbit.start
+        )
+        if orbit.n:
+            yield setting, orbit
+
+
+def _images(table: Array, prediction: BoardPrediction) -> Sequence[Array]:
+    """The waves (k, nets), and those of the mirror twin where there are stops on both sides."""
+    twins = all(len(stop.ends) == 2 for stop in prediction.stops)
+    return [table, -np.roll(table, POINTS // 2, axis=0)] if twins else [table]
+
+
+def _in_phase(recorded: Array, wave: Array) -> Array:
+    """The wave (k, nets), turned to where it is most like the record (k, nets)."""
+    scale = np.ptp(wave, axis=0)
+    spectra = np.fft.rfft(recorded / scale, axis=0) * np.conj(np.fft.rfft(wave / scale, axis=0))
+    product = np.fft.irfft(spectra.sum(axis=1), len(wave))
+    return np.roll(wave, int(np.argmax(product)), axis=0)

@@ -1,0 +1,93 @@
+"""The verb ``bench``: records of boards in, their names, a page and pictures out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from designer.base.errors import InputError
+from designer.cli import entry as cli
+from designer.jobs import bench_job
+from designer.jobs.bench_job import bench, channels_of
+from tests.shared.paper_cases import synthesised
+from tests.workbench.stored_records import stored
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What stands for the design folder of ``examples/paper.toml``."""
+    place = tmp_path / "design"
+    monkeypatch.setattr(bench_job, "read_design", lambda *_: synthesised())
+    monkeypatch.setattr(bench_job, "is_design_folder", lambda path: Path(path) == place)
+    return place
+
+
+def csv_of(number: int, path: Path) -> Path:
+    """A stored record as a Rigol MSO5000 writes it."""
+    record = stored(number).record
+    names = ",".join(f"{channel}(V)" for channel in record.signals)
+    table = np.column_stack([record.time, *record.signals.values()])
+    np.savetxt(
+        path, table, delimiter=",", fmt="%.7e", header=f"Time(s),{names}", comments="", newline="\n"
+    )
+    return path
+
+
+def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path) -> None:
+    files = [csv_of(2, tmp_path / "a.csv"), csv_of(8, tmp_path / "b.csv")]
+    out = tmp_path / "board"
+    result = bench(folder, files, out=out)
+    assert (
+        json.loads((out / "bench.json").read_text("utf-8"))["records"] == (result.answer["records"])
+    )
+    sure, open_ = result.answer["records"]
+    assert (sure["response"], sure["sure"], sure["wanted"]) == ("1-2-2", True, "1-2-2")
+    assert sure["as_wanted"] is True
+    assert sure["omega"] == pytest.approx(0.85, rel=3e-4)
+    assert (open_["sure"], open_["as_wanted"]) == (False, False)
+    assert stored(8).response in (open_["response"], *open_["others"])
+    assert not result.satisfied
+    for record in (sure, open_):
+        assert max(record["exact_circuit"]["difference"].values()) < 0.3
+    assert sure["exact_circuit"]["response"] == "1-2-2"
+    page = (out / "bench.html").read_text("utf-8")
+    assert page.count("<svg") >= 2
+    assert open_["would_tell"] in page
+    assert {p.name for p in out.iterdir()} == set(result.answer["files"])
+    with pytest.raises(InputError, match="--overwrite"):
+        bench(folder, files, out=out)
+    assert list(result.table()["file"]) == ["a.csv", "b.csv"]
+
+
+def test_the_verb_prints_the_object(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = csv_of(5, tmp_path / "a.csv")
+    words = ["bench", str(folder), "--record", str(file), "--omega", "0.337"]
+    assert cli.status([*words, "--channels", "v1=CH1,fv=CH2", "--json"]) == 0
+    (record,) = json.loads(capsys.readouterr().out)["records"]
+    assert record["response"] == "1-5-5"
+    assert cli.status([*words, "--channels", "v1=CH9"]) == 2
+    assert "CH9" in capsys.readouterr().err
+    assert cli.status(["bench", str(folder)]) == 2
+    assert "--record is missing" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "v1", "v1=", "v1=CH1,v1=CH2", "v1=CH1,fv=CH1"])
+def test_channels_that_are_no_pairs_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="--channels"):
+        channels_of(text)
+
+
+def test_what_is_in_the_way_is_not_replaced(folder: Path, tmp_path: Path) -> None:
+    file = csv_of(0, tmp_path / "a.csv")
+    for out, found in ((folder, "a design folder"), (file, "a file")):
+        if out == folder:
+            folder.mkdir(exist_ok=True)
+        with pytest.raises(InputError, match=found):
+            bench(folder, [file], out=out)
+    with pytest.raises(InputError, match=r"no manifest\.json"):
+        bench(tmp_path / "elsewhere", [file])
