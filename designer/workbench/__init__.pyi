@@ -1,3 +1,8 @@
+from .advice import (
+    Advice as Advice,
+    Replacement as Replacement,
+    advise as advise,
+)
 from .board_fit import (
     BoardFit as BoardFit,
     NoSuchBoard as NoSuchBoard,
@@ -39,4 +44,9 @@ from .record import (
 )
 from .record_formats import (
     read_record as read_record,
+)
+from .spread_estimate import (
+    KindSpread as KindSpread,
+    estimated_spread as estimated_spread,
+    measured_list as measured_list,
 )

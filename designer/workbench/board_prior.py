@@ -76,6 +76,11 @@ class Prior:
         moving = np.abs(slopes).max(axis=0) > 0.0
         return varying, slopes[:, moving]
 
+    @cached_property
+    def middle_values(self) -> Array:
+        """(Q,) each quantity on the board whose coordinates are all at their medians."""
+        return np.array([float(column(self._middle, q)[0]) for q in self.quantities])
+
     @property
     def size(self) -> int:
         """How many coordinates there are, K."""

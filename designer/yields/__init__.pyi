@@ -2,6 +2,12 @@ from . import (
     margins as margins,
     study_identity as study_identity,
 )
+from .adjustment import (
+    AS_BUILT as AS_BUILT,
+    Adjustment as Adjustment,
+    centring_offset as centring_offset,
+    widths as widths,
+)
 from .blame_analysis import (
     Blame as Blame,
     BlameStage as BlameStage,
@@ -38,6 +44,8 @@ from .row_store import (
 )
 from .setting_search import (
     MOST_TRIES as MOST_TRIES,
+    BoardCase as BoardCase,
+    seek as seek,
 )
 from .start_recipe import (
     Recipe as Recipe,
@@ -86,6 +94,9 @@ from .tuned_yield import (
 )
 from .two_engine_yield import (
     Combined as Combined,
+)
+from .window_path import (
+    find_window as find_window,
 )
 from .worst_corner import (
     Corner as Corner,

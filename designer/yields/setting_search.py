@@ -15,7 +15,6 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
-from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
@@ -89,7 +88,7 @@ def seek(
     ensemble: Ensemble, cases: Sequence[BoardCase], bands: Bands, *, jobs: int = 1
 ) -> Sequence[BoardCase]:
     """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
-    for propose in _rounds(ensemble.boards, bands):
+    for propose in _rounds(ensemble, bands):
         left = [case for case in cases if case.best is None]
         proposed = zip(left, parallel(propose, left, jobs), strict=True)
         proposals = [(case, setting, start) for case, some in proposed for setting, start in some]
@@ -106,7 +105,7 @@ def seek(
 Round = Callable[[BoardCase], list[Asked]]
 
 
-def _rounds(boards: Boards, bands: Bands) -> list[Round]:
+def _rounds(ensemble: Ensemble, bands: Bands) -> list[Round]:
     def centred(points: Sequence[tuple[float, float]]) -> Round:
         """Frequency and amplitude in half-bands as settings, from the nominal orbit."""
 
@@ -126,8 +125,10 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
 
     def path(first: float, tied: bool) -> Round:
         def propose(case: BoardCase) -> list[Asked]:
-            board = boards.take([case.board])
-            spots, followed = find_window(board, case.question, bands, first, tied=tied)
+            board, bandwidth = ensemble.boards.take([case.board]), ensemble.bandwidth
+            spots, followed = find_window(
+                board, case.question, bands, first, tied=tied, bandwidth=bandwidth
+            )
             case.followed += followed
             return [(s, case.question.start.start) for s in _deepest(spots, case, bands)]
 

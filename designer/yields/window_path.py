@@ -78,7 +78,13 @@ class _Slopes:
 
 
 def find_window(
-    board: Boards, question: Question, bands: Bands, first: float = 0.0, *, tied: bool = True
+    board: Boards,
+    question: Question,
+    bands: Bands,
+    first: float = 0.0,
+    *,
+    tied: bool = True,
+    bandwidth: bool = False,
 ) -> tuple[list[PathSetting], int]:
     """Follow the question's orbit to a board (``Boards`` of one): the settings met on the board
     itself, in order, or the one where the path ended on the way; and how many orbits were followed.
@@ -86,18 +92,20 @@ def find_window(
     first : half-bands of DC offset at which the path sets out on the nominal board. Where a window
     lies on either side of the symmetric setting, it says to which one the path goes. tied : where
     a step of the board must be shortened, the setting moves less with it; else it may still go as
-    far. Neither leads into every window that the other does.
+    far. Neither leads into every window that the other does. bandwidth : as of
+    ``reduction.Reduction``.
     """
-    path = _Path(board, question, bands)
+    path = _Path(board, question, bands, bandwidth)
     return path.walk(first, tied), path.followed
 
 
 class _Path:
-    def __init__(self, board: Boards, question: Question, bands: Bands) -> None:
+    def __init__(self, board: Boards, question: Question, bands: Bands, bandwidth: bool) -> None:
         self.board, self.question, self.bands = board, question, bands
+        self.bandwidth = bandwidth
         self.widths = widths(bands)
         self.followed = 0
-        self._reduced = (np.nan, Ensemble(board, fast=False))
+        self._reduced = (np.nan, Ensemble(board, fast=False, bandwidth=bandwidth))
 
     def walk(self, first: float, tied: bool) -> list[PathSetting]:
         nominal = self.question.start
@@ -189,7 +197,7 @@ class _Path:
         try:
             if self._reduced[0] != share:
                 moved = between(self.board, np.array([share]))
-                self._reduced = (share, Ensemble(moved, fast=False))
+                self._reduced = (share, Ensemble(moved, fast=False, bandwidth=self.bandwidth))
             system = self._reduced[1].reduction(0).system()
             drive = self._adjustment(setting).of(self.question.excitation).drive
             return follow(Flow(system, drive), near, self.question.start.n)
