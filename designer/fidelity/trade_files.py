@@ -26,7 +26,7 @@ from designer.base.plain_json import FORMAT, plain
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import RUNGS, VENDOR
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
-from designer.fidelity.yields import BoardTrade, LeftOut
+from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
 
 NONE = "–"
 TITLES = {
@@ -112,7 +112,7 @@ def _truth(truth: Truth) -> dict[str, Any]:
 
 def _boards(b: BoardTrade) -> dict[str, Any]:
     difference, low, high = b.difference
-    counts = {k: v for k, v in b.__dict__.items() if k not in ("label", "seconds")}
+    counts = {k: v for k, v in b.__dict__.items() if k not in ("label", "seconds", "bandwidth")}
     return {
         **b.label.as_dict(),
         **counts,
@@ -120,7 +120,13 @@ def _boards(b: BoardTrade) -> dict[str, Any]:
         "low": low,
         "high": high,
         "seconds_per_board": b.seconds,
+        "bandwidth": None if b.bandwidth is None else _with_bandwidth(b.bandwidth),
     }
+
+
+def _with_bandwidth(b: BandwidthYield) -> dict[str, Any]:
+    difference, low, high = b.difference
+    return {**b.__dict__, "difference": difference, "low": low, "high": high}
 
 
 def _cheapest(c: Cheapest) -> dict[str, Any]:
@@ -246,6 +252,28 @@ def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
         "the gate's step alone are charged to ngspice. The interval holds for all boards that were "
         "asked: those that one of them left undecided count as ok on the exact circuit alone "
         "for its upper end, and in ngspice alone for its lower end.",
+        table_of(boards, columns),
+        *_bandwidth_blocks([b for b in boards if b.get("bandwidth")]),
+    ]
+
+
+def _bandwidth_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+    if not boards:
+        return []
+    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "response": name,
+        "boards": lambda b: str(b["bandwidth"]["boards"]),
+        "ok": lambda b: str(b["bandwidth"]["ok"]),
+        "only with": lambda b: str(b["bandwidth"]["gained"]),
+        "only without": lambda b: str(b["bandwidth"]["lost"]),
+        "difference": lambda b: _percent(b["bandwidth"]["difference"]),
+        "interval": lambda b: (
+            f"{_percent(b['bandwidth']['low'])} to {_percent(b['bandwidth']['high'])}"
+        ),
+    }
+    return [
+        "What no engine with ideal op-amps sees: the yield of the exact circuit with bandwidth "
+        "less that without, on the boards that both decided, with its 95 % interval.",
         table_of(boards, columns),
     ]
 

@@ -67,9 +67,39 @@ class Tally:
     """CPU time of the exact circuit [s]."""
     resolved: int = 0
     """Boards of which ngspice says something else at the gate's step than at those that agree."""
+    lagging_decided: int = 0
+    """Boards that the exact circuit decided with bandwidth and without."""
+    lagging_ok: int = 0
+    """Of these, boards that are ok with bandwidth."""
+    lagging_gained: int = 0
+    """Of these, boards that are ok with bandwidth alone."""
+    lagging_lost: int = 0
+    """Of these, boards that are ok without bandwidth alone."""
+    lagging_seconds: float = 0.0
+    """CPU time of the exact circuit with bandwidth [s]."""
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class BandwidthYield:
+    """The same boards on the exact circuit with bandwidth; see ``Tally``."""
+
+    boards: int
+    """Boards that were decided with bandwidth and without."""
+    ok: int
+    """Boards that are ok with bandwidth."""
+    gained: int
+    """Boards that are ok with bandwidth alone."""
+    lost: int
+    """Boards that are ok without bandwidth alone."""
+
+    @property
+    def difference(self) -> tuple[float, float, float]:
+        """Yield with bandwidth less that without, of these boards, and its 95 % interval."""
+        d = (self.gained - self.lost) / self.boards if self.boards else math.nan
+        return d, *_interval(self.gained, self.lost, self.boards)
 
 
 @dataclass(frozen=True)
@@ -94,13 +124,23 @@ class BoardTrade:
     """CPU time of a board, by rung [s]."""
     resolved: int = 0
     """Boards of which ngspice says something else at the gate's step than at those that agree."""
+    bandwidth: BandwidthYield | None = None
+    """What bandwidth changes; None of a circuit without figures of its op-amp."""
 
     @classmethod
     def of(cls, label: ResponseLabel, tally: Tally, spice: float) -> BoardTrade:
         """spice : CPU time of a drive period of ngspice at the gate's settings."""
         asked = tally.decided + tally.undecided
         periods = tally.periods / tally.runs if tally.runs else math.nan
-        exactly = tally.seconds / asked if asked else math.nan
+        seconds = {
+            "circuit": tally.seconds / asked if asked else math.nan,
+            "ideal": periods * spice,
+        }
+        bandwidth = None
+        if tally.lagging_seconds:
+            seconds["bandwidth"] = tally.lagging_seconds / asked
+            counts = tally.lagging_decided, tally.lagging_ok
+            bandwidth = BandwidthYield(*counts, tally.lagging_gained, tally.lagging_lost)
         return cls(
             label,
             tally.decided,
@@ -109,8 +149,9 @@ class BoardTrade:
             tally.lost,
             tally.undecided,
             periods,
-            {"circuit": exactly, "ideal": periods * spice},
+            seconds,
             tally.resolved,
+            bandwidth,
         )
 
     @property
@@ -175,10 +216,7 @@ def tally(
     progress: Callable[[], None] = lambda: None,
 ) -> Tally:
     """These boards of a study of one response, by both engines; progress : called once a board."""
-    exact_rung.block(plan, samples[:1], jobs)  # what is compiled on the way is no cost of a board
-    began = time.process_time()
-    answers = exact_rung.block(plan, samples, jobs)
-    seconds = time.process_time() - began
+    answers, seconds = _timed(plan, samples, jobs)
     asks = [
         Ask(a.sample, 0, StartKind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED
     ]
@@ -193,7 +231,7 @@ def tally(
             both.append((answer.verdict is Verdict.OK, said))
     # The first run of each; too long a way is none.
     periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values() if h.response]
-    return Tally(
+    counts = Tally(
         decided=len(both),
         ok=sum(mine for mine, _ in both),
         gained=sum(theirs and not mine for mine, theirs in both),
@@ -203,6 +241,37 @@ def tally(
         periods=float(sum(periods)),
         seconds=seconds,
         resolved=sum(_resolved(heard.get(answer.sample), answer) for answer in answers),
+    )
+    if plan.circuit.figures is None:
+        return counts
+    return counts + _lagging(answers, *_timed(plan, samples, jobs, bandwidth=True))
+
+
+def _timed(
+    plan: StudyPlan, samples: range, jobs: int, *, bandwidth: bool = False
+) -> tuple[list[Answer], float]:
+    """What the exact circuit says of these boards, and its CPU time [s]."""
+    # What is compiled on the way is no cost of a board.
+    exact_rung.block(plan, samples[:1], jobs, bandwidth=bandwidth)
+    began = time.process_time()
+    answers = exact_rung.block(plan, samples, jobs, bandwidth=bandwidth)
+    return answers, time.process_time() - began
+
+
+def _lagging(without: list[Answer], lagging: list[Answer], seconds: float) -> Tally:
+    """Counts of the same boards without bandwidth and with it."""
+    decisive = (Verdict.OK, Verdict.LOST)
+    pairs = [
+        (a.verdict is Verdict.OK, b.verdict is Verdict.OK)
+        for a, b in zip(without, lagging, strict=True)
+        if a.verdict in decisive and b.verdict in decisive
+    ]
+    return Tally(
+        lagging_decided=len(pairs),
+        lagging_ok=sum(b for _, b in pairs),
+        lagging_gained=sum(b and not a for a, b in pairs),
+        lagging_lost=sum(a and not b for a, b in pairs),
+        lagging_seconds=seconds,
     )
 
 

@@ -42,10 +42,15 @@ def block(
     indices: range,
     jobs: int,
     progress: Callable[[], None] = lambda: None,
+    *,
+    bandwidth: bool = False,
 ) -> list[Answer]:
-    """An answer for every board and every question, in order; ``progress`` is called once each."""
-    boards = draw_many(plan.circuit, plan.spread, plan.seed, indices)
-    return of_boards(plan, boards, indices, jobs, progress)
+    """An answer for every board and every question, in order; ``progress`` is called once each.
+    bandwidth : as of ``reduction.Reduction``."""
+    boards = Ensemble(
+        draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs, bandwidth=bandwidth
+    )
+    return [answer for answer, _, _ in _settled_boards(plan, boards, indices, jobs, progress)]
 
 
 def of_boards(
@@ -56,14 +61,15 @@ def of_boards(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Answer]:
     """``block`` of what the boards of these samples have become, by an adjustment on the board."""
-    return [answer for answer, _, _ in _settled_boards(plan, boards, indices, jobs, progress)]
+    ensemble = Ensemble(boards, jobs=jobs)
+    return [answer for answer, _, _ in _settled_boards(plan, ensemble, indices, jobs, progress)]
 
 
 def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, GateSubject | None]]:
     """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
-    drawn_boards = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    drawn = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs)
     pairs: list[tuple[Answer, GateSubject | None]] = []
-    for answer, orbit, boards in _settled_boards(plan, drawn_boards, indices, jobs, lambda: None):
+    for answer, orbit, boards in _settled_boards(plan, drawn, indices, jobs, lambda: None):
         subject = None
         if len(orbit.start):
             reduction = boards.reduction(answer.sample - indices.start)
@@ -74,9 +80,8 @@ def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, G
 
 
 def _settled_boards(
-    plan: StudyPlan, board_arrays: Boards, indices: range, jobs: int, progress: Callable[[], None]
+    plan: StudyPlan, boards: Ensemble, indices: range, jobs: int, progress: Callable[[], None]
 ) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
-    boards = Ensemble(board_arrays, jobs=jobs)
     pairs = plan.rows(indices)
     settled = boards.respond(
         [i for i, _ in pairs],

@@ -512,6 +512,26 @@ def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None
         assert len(front(answer, key).axes) == 1
 
 
+def test_what_bandwidth_changes_of_a_yield_is_told_of_the_same_boards() -> None:
+    counts = Tally(decided=40, ok=39, lagging_decided=50, lagging_ok=41, lagging_gained=1,
+                   lagging_lost=6, lagging_seconds=0.4)  # fmt: skip
+    one = BoardTrade.of(ONE, counts + Tally(decided=10, ok=7, lagging_seconds=0.1), 1.0)
+    assert one.seconds["bandwidth"] == pytest.approx(0.5 / 50)
+    answer = document(judged(*LADDER, boards=one))
+    (boards,) = answer["boards"]
+    found = boards["bandwidth"]
+    assert {k: found[k] for k in ("boards", "ok", "gained", "lost")} == {
+        "boards": 50, "ok": 41, "gained": 1, "lost": 6
+    }  # fmt: skip
+    assert found["difference"] == pytest.approx(-0.1)
+    # The difference of two yields, as that of the engines is.
+    like = of_boards(50, 6, 1).difference
+    assert (found["low"], found["high"]) == pytest.approx(like[1:])
+    assert "| 1: ω = 1.55, b = 0.25 | 50 | 41 | 1 | 6 | -10 % |" in told(answer)
+    none = BoardTrade.of(ONE, Tally(decided=40, ok=39), 1.0)
+    assert document(judged(*LADDER, boards=none))["boards"][0]["bandwidth"] is None
+
+
 def test_the_full_op_amps_err_against_a_vendor_s_macromodel() -> None:
     """What was convergence while they stood for the board is an error against something else."""
     beyond = [said("vendor", "step ×1", 0.0101, 0.1), said("vendor", "step ×0.5", 0.01, 0.2)]
@@ -672,6 +692,7 @@ def test_trade_measures_a_design_and_keeps_it(
     assert by["ideal"][2]["gate"]  # the paper's case passes at the gate's first step
     # At the coarsest settings rounding decides whether a run has settled; the gate refuses them.
     assert {r["response"] for r in rows if r["gate"] is not False} == {"1-1-1"}
+    assert answer["boards"][0]["bandwidth"]["boards"] == 2
     questions = {(c["question"], c["of"]) for c in answer["cheapest"]}
     assert questions == {*product((RESPONSE, IMPACT, WAVE), (BOARD, EQUATIONS)), (SHARE, IDEAL)}
     assert entry.status(["trade", str(out), "--boards", "2", "--json", "-q"]) == 0

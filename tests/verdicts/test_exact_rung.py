@@ -12,6 +12,7 @@ from designer.base.arrays import Array
 from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
@@ -84,3 +85,19 @@ def test_answers_do_not_depend_on_the_block() -> None:
     ]
     assert [repr(a) for a in whole] == [repr(a) for a in parts]
     assert any(np.isfinite(a.waveform) for a in whole)
+
+
+def test_boards_with_bandwidth_are_judged_as_each_alone() -> None:
+    """From the nominal orbit without bandwidth; the verdict by the same rule."""
+    asked = plan(2)
+    answers = exact_rung.block(asked, range(2), 1, bandwidth=True)
+    without = exact_rung.block(asked, range(2), 1)
+    for answer in answers:
+        board = draw(asked.circuit, asked.spread, asked.seed, answer.sample)
+        system = Reduction(asked.circuit, board, bandwidth=True).system()
+        drive = asked.questions[answer.question].excitation.drive
+        orbit = settle(Flow(system, drive), asked.questions[answer.question].start.start)
+        assert answer.response == orbit.response
+        assert answer.verdict is asked.questions[answer.question].judge(orbit)[0]
+        assert answer.radius == pytest.approx(orbit.radius, abs=1e-8)
+    assert all(a.radius != b.radius for a, b in zip(answers, without, strict=True))
