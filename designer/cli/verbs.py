@@ -509,6 +509,13 @@ def bench(
         str | None,
         option("--channels", "NET=CHANNEL,…", "What each channel shows [found by the shapes]."),
     ] = None,
+    fit: Annotated[
+        bool, option("--fit", None, "Also look for the board behind them, and what to turn on it.")
+    ] = False,
+    boards: Annotated[
+        bool,
+        option("--boards", None, "Records of several boards, each in a folder with its name."),
+    ] = False,
     out: Annotated[
         Path | None, option("--out", "DIR", "Write the answer, its page and pictures there.")
     ] = None,
@@ -525,6 +532,8 @@ def bench(
         record or (),
         omega=omega,
         channels=told,
+        fit=fit,
+        boards=boards,
         out=out,
         progress=session.progress,
         **shared,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,16 +19,23 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.design import GeneratorSetting
 from designer.jobs.design_source import read_design
 from designer.jobs.origin import provenance
+from designer.spread.part_rules import spread_of
+from designer.workbench.advice import Advice
+from designer.workbench.board_prior import Prior
 from designer.workbench.channel_roles import recorded_motion
+from designer.workbench.fitted_board import FittedBoard, board_behind
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.overlay import Overlay, overlaid
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record_formats import read_record
+from designer.workbench.spread_estimate import estimated_spread, measured_list
 
 if TYPE_CHECKING:
     import pandas as pd
 
-NAME, PAGE = "bench.json", "bench.html"
+NAME, PAGE, LIST = "bench.json", "bench.html", "boards.csv"
+LISTED = 20
+"""Boards in the list for each fitted one, as probable as its records leave it."""
 PLACE = "a directory that can be written"
 NEAR = 0.06
 """Of a setting's frequency: how far from it a record may be taken for one of its response."""
@@ -46,6 +53,17 @@ class BenchedRecord:
     """The record over the nominal board's orbit; None where there is none."""
     setting: GeneratorSetting | None
     """The nearest setting of ``setup.csv``; None where none is near."""
+    board: FittedBoard | None = None
+    """The board that it is of, fitted to all of its records; None where none was asked for."""
+
+    @property
+    def advice(self) -> Advice | None:
+        """What to turn for what is wanted at the nearest setting."""
+        if self.setting is None or self.board is None:
+            return None
+        hertz = self.setting.frequency_hz
+        at = (a for a in self.board.advice if a.question.excitation.frequency == hertz)
+        return next(at, None)
 
     @property
     def as_wanted(self) -> bool | None:
@@ -67,6 +85,8 @@ class BenchAnswer:
     """The JSON object (docs/contract.md)."""
     records: tuple[BenchedRecord, ...]
     """Each record with what it shows."""
+    fitted: tuple[FittedBoard, ...] = ()
+    """The boards behind them; none where they were not asked for."""
 
     @property
     def satisfied(self) -> bool:
@@ -96,15 +116,20 @@ def bench(
     *,
     omega: float | None = None,
     channels: Mapping[str, str] | None = None,
+    fit: bool = False,
+    boards: bool = False,
     out: Path | str | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> BenchAnswer:
-    """The verb ``bench``: read records of one board of a design and say what they show.
+    """The verb ``bench``: read records of boards of a design and say what they show.
 
     omega : the drive frequency of all of them in the model's units; found where None. channels :
-    channel by net, for all of them; found where None. out : a directory for ``bench.json``,
-    ``bench.html`` and a picture of each record; ``overwrite`` replaces files of these names.
+    channel by net, for all of them; found where None. fit : also look for the board behind the
+    records, and for what to turn on it. boards : the records are of several boards, each with a
+    folder of its own that has its name; fits them, and says how far they differ. out : a directory
+    for ``bench.json``, ``bench.html``, a picture of each record and, of several boards,
+    ``boards.csv``; ``overwrite`` replaces files of these names.
 
     Raises
     ------
@@ -116,7 +141,8 @@ def bench(
     files = [Path(name) for name in record]
     place = None if out is None else Path(out)
     names = _names(files)
-    _check(path, files, place, names, overwrite)
+    lists = [LIST] if boards else []
+    _check(path, files, place, (*names, *lists), overwrite)
     catalog = load_catalog()
     synthesis = read_design(path, catalog, progress)
     prediction = BoardPrediction(synthesis)
@@ -129,22 +155,68 @@ def bench(
         name = named(motion, prediction)
         setting = _setting(motion.frequency, prediction)
         benched.append(BenchedRecord(file, name, overlaid(name, prediction), setting))
-    settings = {"omega": omega, "channels": dict(channels or {})}
+    fitted: dict[str, FittedBoard] = {}
+    if fit or boards:
+        fitted = _fitted(benched, prediction, several=boards, progress=progress)
+        benched = [replace(b, board=fitted[_board(b.path) if boards else ""]) for b in benched]
+    fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
+    settings = {
+        "omega": omega,
+        "channels": dict(channels or {}),
+        "fit": fit or boards,
+        "boards": boards,
+    }
     origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
     seconds_a_radian = scales.seconds
     answer = {
         "format": 1,
         "title": synthesis.modelfile.title,
         "records": [_record_json(each, seconds_a_radian) for each in benched],
-        "files": [] if place is None else [NAME, PAGE, *names],
+        "boards": [board.as_dict() for board in fitted.values()],
+        "spread": [k.as_dict() for k in estimated_spread([*fits.values()])]
+        if boards and fits
+        else [],
+        "files": [] if place is None else [NAME, PAGE, *names, *lists],
         "provenance": origin,
         "cost": {"seconds": time.perf_counter() - began},
     }
-    result = BenchAnswer(plain(answer), tuple(benched))
+    result = BenchAnswer(plain(answer), tuple(benched), tuple(fitted.values()))
     if place is not None:
         progress.stage("pictures")
         _write(place, names, result)
+        if lists:
+            _put(place / LIST, measured_list(fits, LISTED).encode("utf-8"))
     return result
+
+
+def _fitted(
+    benched: Sequence[BenchedRecord],
+    prediction: BoardPrediction,
+    *,
+    several: bool,
+    progress: Progress,
+) -> dict[str, FittedBoard]:
+    """The boards behind the records by name, each fitted to all of its own."""
+    synthesis = prediction.synthesis
+    prior = Prior(
+        prediction.circuit,
+        spread_of(synthesis.modelfile, prediction.circuit, synthesis.catalog),
+    )
+    own: dict[str, list[tuple[str, NamedMotion]]] = {}
+    for each in benched:
+        name = _board(each.path) if several else ""
+        own.setdefault(name, []).append((each.path.name, each.named))
+    out = {}
+    for name, records in own.items():
+        shows = ", ".join(named.response for _, named in records)
+        progress.stage(f"board {name} behind {shows}" if name else f"board behind {shows}")
+        out[name] = board_behind(name, records, prediction, prior)
+    return out
+
+
+def _board(record: Path) -> str:
+    """The name of a record's board among several: that of its folder."""
+    return record.resolve().parent.name
 
 
 def channels_of(text: str) -> dict[str, str]:
@@ -237,8 +309,8 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "exact_circuit": None
         if overlay is None
         else {"response": overlay.orbit.response, "difference": dict(overlay.errors)},
-        "fitted": None,
-        "advice": None,
+        "fitted": None if benched.board is None else benched.board.as_dict()["figures"],
+        "advice": None if benched.advice is None else benched.advice.as_dict(),
     }
 
 
@@ -262,5 +334,9 @@ def _write(place: Path, names: Sequence[str], result: BenchAnswer) -> None:
     contents |= {n: to_png(f) for n, f in zip(names, figures, strict=True)}
     contents[PAGE] = record_page_html(result.answer, figures).encode("utf-8")
     for name, content in contents.items():
-        with appearing(place / name, "--out", PLACE) as partial:
-            partial.write_bytes(content)
+        _put(place / name, content)
+
+
+def _put(path: Path, content: bytes) -> None:
+    with appearing(path, "--out", PLACE) as partial:
+        partial.write_bytes(content)

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import to_svg
-from designer.base.page import Page, PageSection, Picture, SmallPrint, table_of
+from designer.base.page import Block, Page, PageSection, Picture, SmallPrint, Table, table_of
 from designer.base.units import format_quantity
 from designer.report.inline_svg import InlineSvg
 from designer.report.write import render_page
@@ -49,7 +49,75 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
         PageSection(r["file"], list(_blocks(r, drawing)))
         for r, drawing in zip(records, drawings, strict=True)
     ]
-    return Page(f"On the bench: {answer['title']}", [intro, overview], sections)
+    boards = [PageSection(_board_title(b), list(_board(b))) for b in answer["boards"]]
+    if answer["spread"]:
+        boards.append(PageSection("How far the boards differ", list(_spread(answer["spread"]))))
+    return Page(f"On the bench: {answer['title']}", [intro, overview], [*boards, *sections])
+
+
+def _board_title(board: Mapping[str, Any]) -> str:
+    return f"Board {board['board']}" if board["board"] else "The board"
+
+
+def _board(board: Mapping[str, Any]) -> Iterator[Block]:
+    """What the records tell of a board, and what to turn on it."""
+    if board["reason"]:
+        yield f"It was not found: {board['reason']}."
+        return
+    yield (
+        "The most probable board of the model file's spread whose exact orbits draw "
+        f"{' and '.join(board['files'])}, with what the records tell of it; the rest is open."
+    )
+    if board["doubtful"]:
+        yield (
+            f"The records differ from it by {board['misfit']:.1f} times what noise explains: the "
+            "board may not be one of this spread, or the generator was set otherwise."
+        )
+    yield table_of(
+        board["figures"],
+        {
+            "figure": lambda f: f["name"],
+            "this board": lambda f: f"{f['value']:.5g} {f['unit']}".strip(),
+            "95 %": lambda f: f"{f['low']:.5g} to {f['high']:.5g}",
+            "nominal": lambda f: f"{f['nominal']:.5g}",
+        },
+    )
+    yield PageSection("What to turn", [_advice_table(board["advice"])])
+
+
+def _advice_table(advice: Sequence[Mapping[str, Any]]) -> Table | None:
+    return table_of(
+        advice,
+        {
+            "wanted": lambda a: a["expected"],
+            "ω": lambda a: f"{a['omega']:.4g}",
+            "shows as set": lambda a: _shares(a["shown"]),
+            "advice": lambda a: a["words"],
+            "generator": lambda a: _generator(a),
+            "shown then": lambda a: f"{a['share']:.0%}",
+        },
+    )
+
+
+def _shares(shown: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {share:.0%}" for name, share in shown.items())
+
+
+def _generator(advice: Mapping[str, Any]) -> str:
+    volts = f"{advice['amplitude_v_peak']:.4g} V peak, {1e3 * advice['offset_v']:.3g} mV DC"
+    return f"{advice['frequency_hz']:.5g} Hz, {volts}"
+
+
+def _spread(kinds: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
+    yield "Standard deviation on these boards over that of the spread in the model file."
+    yield table_of(
+        kinds,
+        {
+            "kind": lambda k: k["kind"],
+            "factor": lambda k: f"{k['factor']:.3g}",
+            "95 %": lambda k: f"{k['low']:.3g} to {k['high']:.3g}",
+        },
+    )
 
 
 def shown_words(record: Mapping[str, Any]) -> str:

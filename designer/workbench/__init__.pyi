@@ -14,6 +14,10 @@ from .board_prior import (
 from .channel_roles import (
     recorded_motion as recorded_motion,
 )
+from .fitted_board import (
+    FittedBoard as FittedBoard,
+    board_behind as board_behind,
+)
 from .fitted_quantities import (
     BoardFigure as BoardFigure,
     figures as figures,

@@ -83,6 +83,18 @@ class Advice:
         """Whether the advised setting shows the response on most boards."""
         return self.share >= HELPS
 
+    @property
+    def words(self) -> str:
+        """What to do, in words."""
+        if self.helps:
+            changes = zip(_LEVERS, self.setting.vector.tolist(), strict=True)
+            turned = [f"{name} {_signed(change)}" for name, change in changes if change]
+            return ", ".join(turned) or "leave it as it is set"
+        if self.parts:
+            named = ", ".join(f"{part.part} ({part.share:.0%})" for part in self.parts)
+            return f"no setting helps; exact, this part would: {named}"
+        return "no setting and no single part helps"
+
     def as_dict(self) -> dict[str, Any]:
         """As a JSON answer has it."""
         to = self.excitation
@@ -94,6 +106,7 @@ class Advice:
             "share": self.share,
             "helps": self.helps,
             "turn": self.setting != AS_BUILT,
+            "words": self.words,
             "frequency_hz": to.frequency,
             "amplitude_v_peak": to.amplitude,
             "offset_v": to.offset,
@@ -103,6 +116,11 @@ class Advice:
 
 
 _LEVERS = ("frequency", "amplitude", "offset")
+
+
+def _signed(change: float) -> str:
+    """A change as a share; that of the offset is of the amplitude."""
+    return f"{100.0 * change:+.2g} %"
 
 
 def advise(

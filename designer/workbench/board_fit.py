@@ -118,8 +118,8 @@ def fit_board(
 
     Raises
     ------
-    NoSuchBoard : no board of the spread has a periodic orbit from these starts, so there is nothing
-        to begin with.
+    NoSuchBoard : no board of the spread settles from these starts on an orbit of the records'
+        periods, so there is nothing to begin with.
     """
     problem = _Problem(prior, tuple(observations))
     place = problem.first(starts)
@@ -161,7 +161,8 @@ class _Problem:
         common = set.intersection(*(set(look) for look in looks))
         if not common:
             raise NoSuchBoard(
-                "no board of the spread settles on a periodic motion at every one of these settings"
+                f"none of {DRAWS} boards of the spread settles on motions of these periods at "
+                "all of these settings"
             )
         best = min(common, key=lambda i: sum(look[i][0] for look in looks))
         chosen = [look[best] for look in looks]
@@ -337,7 +338,7 @@ def _looks(
     settled = boards.settle(which, [obs.excitation.drive] * len(which), asked)
     best: dict[int, tuple[float, NetOrbit, float]] = {}
     for i, motion in zip(which, settled, strict=True):
-        if motion.status is not OrbitStatus.PERIODIC:
+        if motion.status is not OrbitStatus.PERIODIC or obs.n not in (None, motion.n):
             continue
         orbit = follow(boards.reduction(i), obs.excitation, obs.nets, motion.start, motion.n)
         if orbit is None:

@@ -61,6 +61,8 @@ class Observation:
     """Whether the phase is known: the generator was recorded."""
     scope: ScopeErrors
     """What else the scope does."""
+    n: int | None = None
+    """Drive periods after which the motion repeats; None where that is not known."""
 
     def spread_of(self, peak: Array) -> Array:
         """(nets,) standard deviation [V] that a sample counts with.
@@ -81,11 +83,13 @@ def observe(
     nets: Sequence[str],
     excitation: Excitation | None = None,
     scope: ScopeErrors | None = None,
+    n: int | None = None,
 ) -> Observation:
     """What a record says of these nets, those of them that were recorded.
 
-    excitation : the generator's setting as it was set; without it the amplitude that was recorded,
-    which is known as well as the scope's gain.
+    n : drive periods after which the motion repeats, where they are known. excitation : the
+    generator's setting as it was set; without it the amplitude that was recorded, which is known
+    as well as the scope's gain.
 
     Raises
     ------
@@ -117,6 +121,7 @@ def observe(
         room=scope.offset * np.maximum(np.ptp(volts, axis=0), 256.0 * _quanta(motion, there)),
         aligned=aligned,
         scope=scope,
+        n=n,
     )
 
 

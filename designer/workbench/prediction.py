@@ -17,6 +17,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
 
@@ -58,6 +59,8 @@ class PredictedStop:
 class PredictedResponse:
     """A wanted response of the nominal board."""
 
+    spec: Response
+    """As the model file asks for it."""
     setting: GeneratorSetting
     """The generator's setting."""
     orbit: Orbit
@@ -102,7 +105,8 @@ class BoardPrediction:
         for setting, response in zip(self.settings, self.synthesis.model_responses, strict=True):
             orbit = on_circuit(system, self.synthesis.design, response)
             if orbit.n:
-                shown.append(PredictedResponse(setting, orbit, self.waves(orbit, setting)))
+                waves = self.waves(orbit, setting)
+                shown.append(PredictedResponse(response.spec, setting, orbit, waves))
         return tuple(shown)
 
     def waves(self, orbit: Orbit, setting: GeneratorSetting) -> dict[str, Array]:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from designer.base.errors import InputError
@@ -74,6 +75,48 @@ def test_the_verb_prints_the_object(
     assert "CH9" in capsys.readouterr().err
     assert cli.status(["bench", str(folder)]) == 2
     assert "--record is missing" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
+    """Two boards with a record each: figures, advice for every response, a list to study."""
+    files = []
+    for name, number in (("A", 0), ("B", 2)):
+        (tmp_path / name).mkdir()
+        files.append(csv_of(number, tmp_path / name / "v1.csv"))
+    out = tmp_path / "out"
+    result = bench(folder, files, boards=True, out=out)
+    first, second = result.answer["boards"]
+    assert (first["board"], second["board"]) == ("A", "B")
+    assert not first["doubtful"]
+    for board, record in zip((first, second), result.answer["records"], strict=True):
+        assert board["files"] == ["v1.csv"]
+        assert record["fitted"] == board["figures"] != []
+        for figure in board["figures"]:
+            assert figure["low"] < figure["value"] < figure["high"]
+        assert {a["expected"] for a in board["advice"]} >= {"1-1-1", "1-2-2", "1-8-8"}
+        assert record["advice"]["expected"] == record["wanted"] == record["response"]
+        assert record["advice"]["words"] == "leave it as it is set"
+    names = set(pd.read_csv(out / "boards.csv")["board"])
+    assert names == {f"{board} {k}" for board in "AB" for k in range(1, 21)}
+    page = (out / "bench.html").read_text("utf-8")
+    assert "Board A" in page
+    assert "What to turn" in page
+
+
+def test_a_record_that_does_not_repeat_has_no_board(folder: Path, tmp_path: Path) -> None:
+    record = stored(2).record
+    time = record.time
+    noise = np.random.default_rng(1).standard_normal((len(time), 2)).cumsum(axis=0)
+    path = tmp_path / "noise.csv"
+    np.savetxt(path, np.column_stack([time, noise]), delimiter=",", header="Time(s),CH1(V),CH2(V)",
+               comments="")  # fmt: skip
+    told = {"v1": "CH1", "fv": "CH2"}
+    answer = bench(folder, [path], omega=0.85, channels=told, fit=True).answer
+    (board,) = answer["boards"]
+    assert "no record repeats" in board["reason"]
+    assert answer["records"][0]["fitted"] == []
+    assert answer["records"][0]["advice"] is None
 
 
 @pytest.mark.parametrize("text", ["", "v1", "v1=", "v1=CH1,v1=CH2", "v1=CH1,fv=CH1"])

@@ -164,6 +164,7 @@ def test_scripts_in_python_import_what_there_is() -> None:
 def test_the_picture_of_the_model_is_what_the_script_draws() -> None:
     script = _script("make-model-picture")
     assert script.PICTURE.read_text(encoding="utf-8") == script.picture()
+    assert script.RIG.read_text(encoding="utf-8") == script.rig()
     for page in ("README.md", "docs/model-file.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
         assert "images/model.svg)" in text

@@ -1,0 +1,114 @@
+"""One board and all of its records: what was fitted, what it tells, and what to turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from designer.base.errors import DesignerError
+from designer.circuit.netlist import Excitation
+from designer.verdicts.verdict import Question
+from designer.workbench.advice import Advice, advise
+from designer.workbench.board_fit import BoardFit, fit_board
+from designer.workbench.board_prior import Prior
+from designer.workbench.fitted_quantities import BoardFigure, told_figures
+from designer.workbench.naming import NamedMotion
+from designer.workbench.observation import Observation, observe
+from designer.workbench.prediction import BoardPrediction, PredictedResponse, nearest
+
+ASKED = 3
+"""Predicted responses from which a board may have come to a recorded motion: the nearest ones."""
+SAME_FREQUENCY = 1e-3
+"""Of a setting's frequency: how far a scope's clock shows it elsewhere, with room to spare."""
+SAME_AMPLITUDE = 0.06
+"""Of a setting's amplitude: three standard deviations of a scope's gain."""
+DOUBTFUL = 2.0
+"""Misfit from which on it is said: good fits of ngspice's boards have 0.7 to 1.2."""
+
+
+@dataclass(frozen=True)
+class FittedBoard:
+    """A board as its records show it."""
+
+    name: str
+    """Its name; "" where there is one board alone."""
+    files: tuple[str, ...]
+    """The names of its records, those without a period among them."""
+    fit: BoardFit | None = None
+    """The most probable board; None where there is none."""
+    figures: tuple[BoardFigure, ...] = ()
+    """What the records tell of it."""
+    advice: tuple[Advice, ...] = ()
+    """For every wanted response that the nominal board shows."""
+    reason: str = ""
+    """Why there is no fit; "" where there is one."""
+
+    @property
+    def misfit(self) -> float | None:
+        """Of the worst record; see ``BoardFit.misfits``."""
+        return None if self.fit is None else max(self.fit.misfits)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As a JSON answer has it. The residual is that of the worst record."""
+        return {
+            "board": self.name,
+            "files": list(self.files),
+            "figures": [figure.as_dict() for figure in self.figures],
+            "misfit": self.misfit,
+            "doubtful": self.misfit is not None and self.misfit > DOUBTFUL,
+            "residual": None if self.fit is None else max(self.fit.residuals),
+            "rounds": None if self.fit is None else self.fit.rounds,
+            "advice": [one.as_dict() for one in self.advice],
+            "reason": self.reason,
+        }
+
+
+def board_behind(
+    name: str,
+    records: Sequence[tuple[str, NamedMotion]],
+    prediction: BoardPrediction,
+    prior: Prior,
+) -> FittedBoard:
+    """The board behind these records, each with the name of its file.
+
+    A record without a period says nothing that an orbit could be held against; it is left out.
+    """
+    files = tuple(file for file, _ in records)
+    periodic = [named for _, named in records if named.counts is not None]
+    if not periodic:
+        reason = "no record repeats: record the board at the frequency of another response"
+        return FittedBoard(name, files, reason=reason)
+    near = [nearest(prediction.responses, n.motion.frequency)[:ASKED] for n in periodic]
+    starts = [[response.orbit.start for response in some] for some in near]
+    try:
+        seen = [_observation(n, some) for n, some in zip(periodic, near, strict=True)]
+        fit = fit_board(prior, seen, starts)
+    except DesignerError as error:  # a setting that nobody knows, or no such board
+        return FittedBoard(name, files, reason=str(error))
+    questions = [_question(response) for response in prediction.responses]
+    advice = advise(fit, questions, prediction.synthesis.modelfile.tuning)
+    return FittedBoard(name, files, fit, told_figures(fit), advice)
+
+
+def _observation(named: NamedMotion, near: Sequence[PredictedResponse]) -> Observation:
+    n = None if named.counts is None else named.counts.n
+    return observe(named.motion, (named.moving,), _setting(named, near), n=n)
+
+
+def _setting(named: NamedMotion, near: Sequence[PredictedResponse]) -> Excitation | None:
+    """The generator's setting: that of ``setup.csv`` where the record is of one, since it is known
+    better than a scope shows it; else None, for what was recorded."""
+    motion = named.motion
+    for response in near:
+        setting = response.setting
+        same = abs(motion.frequency / setting.frequency_hz - 1.0) < SAME_FREQUENCY
+        louder = abs(motion.amplitude / setting.amplitude_v_peak - 1.0)
+        if same and not louder > SAME_AMPLITUDE:  # nan: the generator was not recorded
+            return Excitation(setting.frequency_hz, setting.amplitude_v_peak)
+    return None
+
+
+def _question(response: PredictedResponse) -> Question:
+    drive = Excitation(response.setting.frequency_hz, response.setting.amplitude_v_peak)
+    return Question(response.spec, drive, response.orbit, None)
