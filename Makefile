@@ -72,6 +72,7 @@ reports: env ngspice ## make the reports that this commit lacks
 picture: env ngspice ## draw the README's pictures
 	@$(VENV)/bin/python scripts/make-model-picture
 	@$(VENV)/bin/python scripts/make-picture
+	@$(VENV)/bin/python scripts/make-board-picture
 
 site: env ## build the documentation into out/site
 	@$(VENV)/bin/python -m sphinx -q -W --keep-going -d out/site/.doctrees docs out/site

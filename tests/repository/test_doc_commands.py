@@ -67,8 +67,9 @@ NOT_RUN = {
     "trade out/paper": "minutes in ngspice; tests/fidelity/test_trade_study.py has a smaller one",
     "trade examples/paper.toml": "the same, of 400 boards",
     "tolerance out/paper --samples 100000": "a cluster; tests/jobs/test_dask_runner.py",
-    "bench out/model": "a record of an oscilloscope: tests/jobs/test_bench_job.py",
+    "bench out/": "a record of an oscilloscope: tests/jobs/test_bench_job.py",
     "export out/paper --fab": "KiCad and a routed board: tests/jobs/test_order_export.py",
+    "export out/rig --fab": "the same",
     "rules out/paper --board": "KiCad and a board: tests/design_rules/test_rules_board.py",
 }
 LONG = (
