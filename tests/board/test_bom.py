@@ -32,7 +32,7 @@ def test_every_part_is_on_the_bill_once(sides: Sides, halves: int) -> None:
     diode, reference = by_value["1N4148"], by_value["LM4040C50"]
     assert diode.quantity == 2 * halves
     assert diode.description.startswith("diode")
-    assert diode.footprint.startswith("Diode_THT:")
+    assert diode.footprint.startswith("Diode_SMD:")
     assert diode.rating == "100V reverse"
     assert reference.quantity == halves
     assert reference.part_number == "LM4040C50IDBZR"
