@@ -55,8 +55,10 @@ from .kicad_project import (
 )
 from .kicad_reader import (
     PART_NUMBER as PART_NUMBER,
+    TRACKS as TRACKS,
     BoardFile as BoardFile,
     PlacedFootprint as PlacedFootprint,
+    PlacedPad as PlacedPad,
     check_belongs as check_belongs,
     pad_corners as pad_corners,
     read_board as read_board,

@@ -422,6 +422,8 @@ def exported(folder: Path, reused: bool, refused: Sequence[str], answer: Mapping
         say("\n".join(["No order is written, since the board is not finished:", *refused]))
     else:
         files(folder, reused)
+    if "dsn" in answer:
+        say(f"{answer['dsn']}: the board for another router")
     if (routing := answer.get("routing")) is not None:
         say(
             f"{routing['board']}: {routing['length_mm']:.0f} mm of track, {routing['vias']} vias "

@@ -419,6 +419,14 @@ def export(
         bool,
         option("--keep", None, "With --routed: on the board as you changed it, only what is open."),
     ] = False,
+    routes: Annotated[
+        Path | None,
+        option("--session", "FILE", "With --routed: tracks of another router first, a .ses."),
+    ] = None,
+    dsn: Annotated[
+        Path | None,
+        option("--dsn", "FILE", "Instead: write the board for another router, a .dsn."),
+    ] = None,
     deck: Annotated[
         list[DeckName] | None,
         option(
@@ -459,6 +467,8 @@ def export(
         out,
         routed=routed,
         keep=keep,
+        session=routes,
+        dsn=dsn,
         deck=[name.value for name in deck or ()],
         fab=fab or (),
         board=board,

@@ -7,6 +7,7 @@ from typing import Any
 
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import Folder
+from designer.base.errors import InputError
 from designer.base.manifest import file_hash
 from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
@@ -16,7 +17,9 @@ from designer.board.kicad_reader import check_belongs, read_board
 from designer.board.kicad_rules import board_rules
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import kicad_files
+from designer.jobs.options import Options
 from designer.routing.routed_board import RoutedBoard, route_board
+from designer.routing.specctra import design_text, with_session
 
 
 def board_file(synthesis: Synthesis) -> str:
@@ -24,10 +27,13 @@ def board_file(synthesis: Synthesis) -> str:
     return f"{kicad_files.FOLDER}/{project_name(synthesis.modelfile.title)}.kicad_pcb"
 
 
-def route_in_folder(folder: Folder, synthesis: Synthesis, progress: Progress) -> dict[str, Any]:
+def route_in_folder(
+    folder: Folder, synthesis: Synthesis, progress: Progress, session: Path | None = None
+) -> dict[str, Any]:
     """Route what is open on the folder's board; what the answer says of it.
 
-    A board that somebody has changed stays one: the manifest keeps the hash of what was written
+    session : of another router, whose tracks and vias come first, in the place of the board's. A
+    board that somebody has changed stays one: the manifest keeps the hash of what was written
     before, so that no verb replaces it.
 
     Raises
@@ -39,13 +45,34 @@ def route_in_folder(folder: Folder, synthesis: Synthesis, progress: Progress) ->
     there = read_board(folder / name)
     check_belongs(there, components(circuit, synthesis.catalog, choice))
     progress.stage("routing")
-    routed = route_board(there.text, circuit, board_rules(circuit, synthesis.modelfile.rules))
+    text = there.text if session is None else with_session(there.text, session)
+    routed = route_board(text, circuit, board_rules(circuit, synthesis.modelfile.rules))
     before = (folder / name).read_bytes()
     if _as_written(folder, name, before):
         folder.rewrite(name, routed.text)
     else:
         _replace(folder / name, routed.text)
     return _answer(name, routed)
+
+
+def write_design(
+    folder: Folder, synthesis: Synthesis, path: Path, options: Options, progress: Progress
+) -> None:
+    """Write the folder's board as Specctra's design for another router.
+
+    Raises
+    ------
+    InputError : the board cannot be read or is of another design, or a file is in the way.
+    """
+    if path.exists() and not options.overwrite:
+        raise InputError(path, "--dsn", "a file", "a name that is free, or --overwrite")
+    circuit, choice = board_circuit(synthesis)
+    board = read_board(folder / board_file(synthesis))
+    check_belongs(board, components(circuit, synthesis.catalog, choice))
+    progress.stage("design for another router")
+    rules = board_rules(circuit, synthesis.modelfile.rules)
+    name = project_name(synthesis.modelfile.title)
+    _replace(path, design_text(board, name, circuit, rules))
 
 
 def _as_written(folder: Folder, name: str, content: bytes) -> bool:

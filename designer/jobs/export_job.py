@@ -35,7 +35,7 @@ from designer.fabrication.order_refusal import (
     refusals,
 )
 from designer.jobs import board_files, kicad_files
-from designer.jobs.board_routing import route_in_folder
+from designer.jobs.board_routing import route_in_folder, write_design
 from designer.jobs.design_files import design_provenance
 from designer.jobs.design_source import design_inputs_of, source
 from designer.jobs.options import Options
@@ -99,6 +99,8 @@ def export(
     *,
     routed: bool = False,
     keep: bool = False,
+    session: Path | str | None = None,
+    dsn: Path | str | None = None,
     deck: Sequence[Dialect] = (),
     fab: Sequence[str] = (),
     board: Path | str | None = None,
@@ -112,7 +114,9 @@ def export(
 
     model : a design folder, or a model file with ``out``. routed : with tracks and ground pours on
     the board of the KiCad project. keep : with ``routed``, on the board as somebody has changed it:
-    its tracks stay, and what is open is routed. deck : "ltspice", "portable" or both.
+    its tracks stay, and what is open is routed. session : with ``routed``, what another router made
+    of the board (.ses), whose tracks come first. dsn : a file to write the board into for such a
+    router (.dsn). deck : "ltspice", "portable" or both.
     fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
     project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
     parts : with ``fab``, a list of order numbers and prices, before the catalogue's. accept : with
@@ -135,11 +139,16 @@ def export(
     if routed and (deck or fab):
         other = "--fab" if fab else "--deck"
         raise InputError(None, other, "with --routed", "one after the other: --routed first")
-    if keep and not routed:
-        raise InputError(None, "--keep", "given alone", "--routed beside it")
+    for option, given in (("--keep", keep), ("--session", session)):
+        if given and not routed:
+            raise InputError(None, option, "given alone", "--routed beside it")
+    if dsn is not None and (routed or deck or fab):
+        raise InputError(None, "--dsn", "with another", "one after the other")
     modelfile, folder = source(model, out)
     if routed:
-        return export_routed(modelfile, folder, keep, options, progress)
+        return export_routed(modelfile, folder, keep, options, progress, _path(session))
+    if dsn is not None:
+        return export_design(modelfile, folder, Path(dsn), options, progress)
     if fab:
         asked = OrderRequest(tuple(fab), _path(board), _path(parts), tuple(accept))
         return export_orders(modelfile, folder, asked, options, progress)
@@ -169,10 +178,28 @@ def export_into(
     return _result(runner, list(files), reused and not todo)
 
 
+def export_design(
+    modelfile: ModelFile, out: Path, file: Path, options: Options, progress: Progress
+) -> ExportResult:
+    """Write the project where there is none, and its board for another router."""
+    runner, synthesis, reused = _design(modelfile, out, options, progress)
+    _board(runner, None, progress)
+    write_design(runner.folder, synthesis, file, options, progress)
+    made = _result(runner, [], reused)
+    return replace(made, answer={**made.answer, "dsn": str(file)})
+
+
 def export_routed(
-    modelfile: ModelFile, out: Path, keep: bool, options: Options, progress: Progress
+    modelfile: ModelFile,
+    out: Path,
+    keep: bool,
+    options: Options,
+    progress: Progress,
+    session: Path | None = None,
 ) -> ExportResult:
     """Write the project where there is none, and route what is open on its board.
+
+    session : of another router, or None.
 
     Raises
     ------
@@ -186,7 +213,7 @@ def export_routed(
         export_into(modelfile, out, options, progress)
         runner, synthesis, reused = _design(modelfile, out, options, progress)
         folder = runner.folder
-    routing = route_in_folder(folder, synthesis, progress)
+    routing = route_in_folder(folder, synthesis, progress, session)
     listed = {} if folder.manifest is None else folder.manifest.files
     files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
     made = _result(runner, files, reused)

@@ -2,3 +2,7 @@ from .routed_board import (
     RoutedBoard as RoutedBoard,
     route_board as route_board,
 )
+from .specctra import (
+    design_text as design_text,
+    with_session as with_session,
+)

@@ -99,7 +99,7 @@ def _pads(footprint: Expression) -> Iterator[Copper]:
         angle = math.radians(own.number(2) if len(own.atoms) > 2 else 0.0)
         net = pad.find("net")
         number = NO_NET if net is None else int(net.number(0))
-        layers, shape = _layers(pad.get("layers").atoms), _pad_shape(pad, place, angle)
+        layers, shape = layers_of(pad.get("layers").atoms), _pad_shape(pad, place, angle)
         if pad.text(1) == "np_thru_hole":
             yield Copper(grown(shape, SCREW_ROOM), NO_NET, (True, True))
         else:
@@ -115,7 +115,7 @@ def _pad_shape(pad: Expression, place: tuple[float, float], angle: float) -> Geo
     return shapely.Polygon(corners)
 
 
-def _layers(names: Iterable[str]) -> tuple[bool, bool]:
+def layers_of(names: Iterable[str]) -> tuple[bool, bool]:
     there = set(names)
     both = "*.Cu" in there or "F&B.Cu" in there
     return both or FRONT in there, both or BACK in there
@@ -127,7 +127,9 @@ def _track(item: Expression) -> Copper:
     else:
         points = pen_path(Expression((Atom("gr_arc"), *item.items[1:]), item.source))
     shape = grown(shapely.LineString(points), item.get("width").number() / 2.0)
-    return Copper(shape, int(item.get("net").number()), _layers(item.get("layer").atoms), pad=False)
+    return Copper(
+        shape, int(item.get("net").number()), layers_of(item.get("layer").atoms), pad=False
+    )
 
 
 def _via(item: Expression) -> Copper:

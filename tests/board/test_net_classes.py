@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +14,7 @@ from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY, VIA
 from designer.catalog.design_rules import BY_ID
 from tests.shared.kicad_cases import case, case_files, kicad, written
+from tests.shared.kicad_python import asked_of_pcbnew
 
 PAIRS = {DEFAULT: ("/v1", "/v2"), SUMMING: ("/s1", "/v1"), SUPPLY: ("VCC", "/v3")}
 """Two nets that lie beside one another, the first of them of the class."""
@@ -87,20 +85,8 @@ def clearances(folder: Path) -> dict[str, tuple[str, float]]:
 def nets_by_kicad(folder: Path) -> dict[str, Any]:
     """Class, clearance, width, via and drill of each net, as KiCad's Python module has them."""
     board = next(folder.glob("*.kicad_pcb"))
-    home = {**os.environ, "HOME": str(folder), "KICAD_CONFIG_HOME": str(folder / "config")}
-    home = {name: text for name, text in home.items() if name not in ("VIRTUAL_ENV", "PYTHONPATH")}
-    for place in os.environ["PATH"].split(os.pathsep):
-        # The environment of the tests has its own interpreter, which KiCad is not built for.
-        python = shutil.which("python3", path=place)
-        if python is None or (Path(place).parent / "pyvenv.cfg").exists():
-            continue
-        done = subprocess.run(
-            [python, "-c", ASK, str(board)], capture_output=True, text=True, env=home, check=False
-        )
-        for line in done.stdout.splitlines():
-            if line.startswith("ANSWER "):
-                return dict(json.loads(line.removeprefix("ANSWER ")))
-    raise AssertionError("no python3 on the path has KiCad's module pcbnew")
+    (answer,) = re.findall(r"^ANSWER (.*)$", asked_of_pcbnew(ASK, folder, board), re.MULTILINE)
+    return dict(json.loads(answer))
 
 
 def test_every_class_has_a_priority_of_its_own() -> None:

@@ -274,3 +274,24 @@ def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path:
     assert kept.returncode == 0, kept.stderr
     assert json.loads(kept.stdout)["routing"]["length_mm"] > 0.0
     assert designer("export", folder, "--routed").returncode == 2, "it is still somebody's board"
+
+
+def test_a_board_goes_to_another_router_and_comes_back(made: Path, tmp_path: Path) -> None:
+    """The session of a router that found nothing: everything is routed here."""
+    folder, dsn, session = tmp_path / "design", tmp_path / "b.dsn", tmp_path / "b.ses"
+    shutil.copytree(made, folder)
+    done = designer("export", folder, "--dsn", dsn, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["dsn"] == str(dsn)
+    assert dsn.read_text("utf-8").startswith('(pcb "linear-pair"')
+    assert designer("export", folder, "--dsn", dsn).returncode == 2
+    assert designer("export", folder, "--dsn", dsn, "--overwrite").returncode == 0
+    assert designer("export", folder, "--session", session).returncode == 2
+    missing = designer("export", folder, "--routed", "--session", session)
+    assert missing.returncode == 2
+    assert "b.ses" in missing.stderr
+    routes = "(routes (resolution um 10) (network_out))"
+    session.write_text(f"(session b {routes})", encoding="utf-8")
+    done = designer("export", folder, "--routed", "--session", session, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["routing"]["open"] == {}
