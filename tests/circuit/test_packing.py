@@ -232,7 +232,7 @@ def test_a_design_folder_of_duals_is_written_and_read_again(tmp_path: Path) -> N
     in_deck = {line.split()[0] for line in deck_text.splitlines() if line.startswith("XU")}
     assert in_deck == {f"XU{number}{letter}" for number in range(1, 5) for letter in "AB"}
     with (folder / "bom.csv").open(encoding="utf-8", newline="") as stream:
-        (line,) = (row for row in csv.DictReader(stream) if row["part_number"] == "TL072CP")
+        (line,) = (row for row in csv.DictReader(stream) if row["part_number"] == "TL072CDR")
     assert (line["quantity"], line["designators"]) == ("4", "U1 U2 U3 U4")
     supply = (folder / "board.md").read_text(encoding="utf-8")
     assert "The 8 amplifiers draw 11.2mA from each rail" in supply, "1.4 mA each"

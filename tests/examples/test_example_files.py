@@ -26,7 +26,7 @@ weight on a moving base."""
 
 
 def test_every_example_is_here() -> None:
-    assert len(FILES) == 7
+    assert len(FILES) == 8
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

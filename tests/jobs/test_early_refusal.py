@@ -110,7 +110,7 @@ def test_pins_that_the_case_does_not_have() -> None:
     wrong = with_opamp("TL072C", supply_pins=("14", "4"))
     error = refused('opamp = "TL072C"', catalog=wrong)
     assert error.field == "circuit.opamp"
-    assert "a pin 14 in Package_DIP:DIP-8" in str(error.found)
+    assert "a pin 14 in Package_SO:SOIC-8" in str(error.found)
     assert "8 pads" in error.expected
     assert "TL071C" in would_do(error)
     # A case that only the user knows is no reason to refuse: the bill can state it.

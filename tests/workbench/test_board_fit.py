@@ -177,7 +177,7 @@ def test_a_net_behind_the_dead_zone_follows_its_mode(prior: Prior) -> None:
 def test_no_start_no_board(prior: Prior) -> None:
     record = Record(np.linspace(0.0, 0.01, 500), {"v1": np.sin(np.arange(500.0))}, "scope")
     motion = RecordedMotion(record, {"v1": "v1"}, "vm", 300.0, 0.0, 5.0, 0.0, 0.0)
-    with pytest.raises(NoSuchBoard, match="no board of the spread"):
+    with pytest.raises(NoSuchBoard, match="settles on motions of these periods"):
         fit_board(prior, [observe(motion, ("v1",))], [[]])
 
 
