@@ -385,11 +385,10 @@ def _polish(
         if once.status is not FlowStatus.DONE:
             continue
         laps = once.strobes
-        least = next(
-            d
-            for d in range(1, n + 1)
-            if n % d == 0 and (np.abs(laps[d] - x) <= STROBE_TOLERANCE * peak).all()
-        )
+        closes = np.all(np.abs(laps - x) <= STROBE_TOLERANCE * peak, axis=1).tolist()
+        least = next((d for d in range(1, n + 1) if n % d == 0 and closes[d]), None)
+        if least is None:  # begun anew, in the mode that its start tells, it is another motion
+            continue
         if least < n:
             shorter = shoot(flow, x, least, None, peak)
             if shorter is None:
