@@ -9,17 +9,22 @@ from dataclasses import dataclass
 import shapely
 from shapely import Geometry
 
-from designer.base.sexpr import Atom, Expression
-from designer.board.kicad_reader import pad_corners, turned
+from designer.base.sexpr import Expression, expression, word
+from designer.board.kicad_names import identifier
+from designer.board.kicad_reader import TRACKS, pad_corners, turned
+from designer.board.net_classes import VIA
 from designer.board.outline import pen_path, read_outline
 
 FRONT, BACK = "F.Cu", "B.Cu"
+LAYERS = (FRONT, BACK)
+"""The layers that tracks are laid on."""
 CHORDS = 8
 """Of a quarter of a circle."""
 SCREW_ROOM = 0.3
 """Round a bare hole, more than the clearance of copper [mm]."""
 NO_NET = 0
 """KiCad's number of what is on no net."""
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ def read_copper(board: Expression) -> BoardCopper:
         raise board.error("no closed edge", "a closed line on Edge.Cuts")
     edge = shapely.multilinestrings([shapely.linestrings(outline.sides)])[0]
     pieces = [piece for each in board.all("footprint") for piece in _pads(each)]
-    pieces += [_track(each) for kind in ("segment", "arc") for each in board.all(kind)]
+    pieces += [_track(each) for kind in TRACKS for each in board.all(kind)]
     pieces += [_via(each) for each in board.all("via")]
     return BoardCopper(
         tuple(pieces),
@@ -121,12 +126,14 @@ def layers_of(names: Iterable[str]) -> tuple[bool, bool]:
     return both or FRONT in there, both or BACK in there
 
 
+def track_path(item: Expression) -> list[Point]:
+    """The middle of a track as straight pieces; an arc's are chords."""
+    drawn = {"segment": "gr_line", "arc": "gr_arc"}[item.name]
+    return pen_path(Expression((word(drawn), *item.items[1:]), item.source, item.offset))
+
+
 def _track(item: Expression) -> Copper:
-    if item.name == "segment":
-        points = [(item.get(end).number(0), item.get(end).number(1)) for end in ("start", "end")]
-    else:
-        points = pen_path(Expression((Atom("gr_arc"), *item.items[1:]), item.source))
-    shape = grown(shapely.LineString(points), item.get("width").number() / 2.0)
+    shape = grown(shapely.LineString(track_path(item)), item.get("width").number() / 2.0)
     return Copper(
         shape, int(item.get("net").number()), layers_of(item.get("layer").atoms), pad=False
     )
@@ -136,3 +143,35 @@ def _via(item: Expression) -> Copper:
     at = item.get("at")
     shape = grown(shapely.Point(at.number(0), at.number(1)), item.get("size").number() / 2.0)
     return Copper(shape, int(item.get("net").number()), (True, True))
+
+
+def track_item(
+    start: Point, end: Point, width: float, layer: str, net: int, name: str, key: str
+) -> Expression:
+    """A straight track of a board file.
+
+    net, name : KiCad's number and name of its net. key : of its id, so that what one writer laid
+    has other ids than what another did.
+    """
+    return expression(
+        "segment",
+        start=start,
+        end=end,
+        width=width,
+        layer=layer,
+        net=net,
+        uuid=identifier(key, name, layer, f"{start} {end}"),
+    )
+
+
+def via_item(at: Point, net: int, name: str, key: str) -> Expression:
+    """A via of a board file, of the project's size; net, name and key as in ``track_item``."""
+    return expression(
+        "via",
+        at=at,
+        size=VIA["via_diameter"],
+        drill=VIA["via_drill"],
+        layers=LAYERS,
+        net=net,
+        uuid=identifier(key, name, f"{at}"),
+    )

@@ -11,9 +11,8 @@ from designer.base.arrays import Array
 from designer.base.sexpr import Expression, expression, expression_text, lists, read, word
 from designer.board.kicad_names import circuit_net, identifier
 from designer.board.kicad_rules import CustomRule
-from designer.board.net_classes import VIA
 from designer.circuit.netlist import Circuit
-from designer.routing.board_copper import BACK, FRONT, read_copper
+from designer.routing.board_copper import LAYERS, read_copper, track_item, via_item
 from designer.routing.ground_pour import (
     BRIDGE,
     RELIEF,
@@ -26,10 +25,8 @@ from designer.routing.net_kinds import GROUND_KIND, NetKind, kinds_of_nets, net_
 from designer.routing.router import find_routes
 from designer.routing.routing_grid import Nodes, RoutingGrid
 
-LAYERS = (FRONT, BACK)
 POUR = "designer pour"
 """Name of a zone that was made here."""
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -88,9 +85,10 @@ def _items(
         for nodes in _straight(grid, run):
             start, end = (grid.place(nodes[i]) for i in (0, -1))
             if len(nodes) == 2 and start == end:
-                yield _via(start, net, name)
+                yield via_item(start, net, name, "via")
             else:
-                yield _segment(start, end, LAYERS[grid.layer(nodes[0])], net, name, kind)
+                layer = LAYERS[grid.layer(nodes[0])]
+                yield track_item(start, end, 2.0 * kind.half, layer, net, name, "track")
 
 
 def _straight(grid: RoutingGrid, run: Nodes) -> Iterator[list[int]]:
@@ -104,32 +102,6 @@ def _straight(grid: RoutingGrid, run: Nodes) -> Iterator[list[int]]:
         piece = [*(piece or [before]), after]
     if piece:
         yield piece
-
-
-def _segment(
-    start: Point, end: Point, layer: str, net: int, name: str, kind: NetKind
-) -> Expression:
-    return expression(
-        "segment",
-        start=start,
-        end=end,
-        width=2.0 * kind.half,
-        layer=layer,
-        net=net,
-        uuid=identifier("track", name, layer, f"{start} {end}"),
-    )
-
-
-def _via(at: Point, net: int, name: str) -> Expression:
-    return expression(
-        "via",
-        at=at,
-        size=VIA["via_diameter"],
-        drill=VIA["via_drill"],
-        layers=LAYERS,
-        net=net,
-        uuid=identifier("via", name, f"{at}"),
-    )
 
 
 def _pours(

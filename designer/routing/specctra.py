@@ -28,16 +28,21 @@ from designer.base.sexpr import (
     word,
 )
 from designer.base.version import __version__
-from designer.board.kicad_names import identifier
 from designer.board.kicad_reader import TRACKS, BoardFile, PlacedPad
 from designer.board.kicad_rules import CustomRule
 from designer.board.net_classes import DEFAULT, VIA
-from designer.board.outline import pen_path
 from designer.circuit.netlist import Circuit
-from designer.routing.board_copper import BACK, FRONT, BoardCopper, layers_of, read_copper
+from designer.routing.board_copper import (
+    LAYERS,
+    BoardCopper,
+    layers_of,
+    read_copper,
+    track_item,
+    track_path,
+    via_item,
+)
 from designer.routing.net_kinds import NetKind, kinds_of_nets, net_kinds
 
-LAYERS = (FRONT, BACK)
 UM = 1000.0
 """Micrometres of a millimetre."""
 PADSTACK = f"via_{VIA['via_diameter'] * UM:g}_{VIA['via_drill'] * UM:g}"
@@ -79,10 +84,13 @@ def design_text(board: BoardFile, name: str, circuit: Circuit, rules: Sequence[C
 
     Raises
     ------
-    InputError : the board has no closed edge, or a pad of a shape that is not read.
+    InputError : the board has no closed edge, several separate ones, or a pad of a shape that is
+        not read.
     """
     source = read(board.text)
     copper = read_copper(source)
+    if (outlines := len(shapely.get_parts(copper.area))) != 1:
+        raise source.error(f"{outlines} separate outlines", "one, which Specctra's format has")
     kinds, of = net_kinds(rules), kinds_of_nets(circuit, copper.nets)
     pins = list(_pins(board, source))
     padstacks = {
@@ -213,18 +221,12 @@ def _wiring(board: Expression, nets: Mapping[int, str]) -> Iterator[Expression]:
     for name in TRACKS:
         for item in board.all(name):
             width, layer = item.get("width").number() * UM, item.get("layer").text()
-            path = _path(layer, width, [_um(point) for point in pen_path(_drawn(item))])
+            path = _path(layer, width, [_um(point) for point in track_path(item)])
             yield expression("wire", path, _net(item, nets), kind)
     for item in board.all("via"):
         at = item.get("at")
         place = _um((at.number(0), at.number(1)))
         yield expression("via", word(PADSTACK), *place, _net(item, nets), kind)
-
-
-def _drawn(item: Expression) -> Expression:
-    """A track as the drawn line of the same way."""
-    name = {"segment": "gr_line", "arc": "gr_arc"}[item.name]
-    return Expression((word(name), *item.items[1:]), item.source, item.offset)
 
 
 def _net(item: Expression, nets: Mapping[int, str]) -> Expression:
@@ -265,7 +267,8 @@ def _routed(routes: Expression, numbers: Mapping[str, int]) -> Iterator[Expressi
         for wire in net.all("wire"):
             yield from _segments(wire.get("path"), numbers[name], name, scale)
         for via in net.all("via"):
-            yield _via((via.number(1) * scale, -via.number(2) * scale), numbers[name], name)
+            at = via.number(1) * scale, -via.number(2) * scale
+            yield via_item(at, numbers[name], name, "session via")
 
 
 def _segments(path: Expression, net: int, name: str, scale: float) -> Iterator[Expression]:
@@ -278,24 +281,4 @@ def _segments(path: Expression, net: int, name: str, scale: float) -> Iterator[E
     points = [(x, -y) for x, y in zip(places[::2], places[1::2], strict=True)]
     for start, end in pairwise(points):
         if start != end:
-            yield expression(
-                "segment",
-                start=start,
-                end=end,
-                width=width,
-                layer=layer,
-                net=net,
-                uuid=identifier("session", name, layer, f"{start} {end}"),
-            )
-
-
-def _via(at: Point, net: int, name: str) -> Expression:
-    return expression(
-        "via",
-        at=at,
-        size=VIA["via_diameter"],
-        drill=VIA["via_drill"],
-        layers=LAYERS,
-        net=net,
-        uuid=identifier("session via", name, f"{at}"),
-    )
+            yield track_item(start, end, width, layer, net, name, "session")

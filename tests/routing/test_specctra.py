@@ -15,6 +15,7 @@ from designer.base.sexpr import Expression, expression, expression_text, read, w
 from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY
+from designer.routing.board_copper import read_copper
 from designer.routing.routed_board import route_board
 from designer.routing.specctra import design_text, with_session
 from tests.shared.kicad_cases import case, case_files, written
@@ -240,3 +241,20 @@ def test_a_session_that_is_cut_off_is_refused(tmp_path: Path) -> None:
     file.write_text(text[: len(text) // 2], encoding="utf-8")
     with pytest.raises(InputError, match="nothing closes"):
         with_session(routed(), file)
+
+
+def test_a_board_of_several_outlines_is_refused_and_one_with_a_cut_out_is_not(
+    tmp_path: Path,
+) -> None:
+    """The format has one boundary; a hole in it is a keepout."""
+
+    def design(x: float, y: float) -> Expression:
+        cut = f'(gr_rect (start {x} {y}) (end {x + 2} {y + 2}) (layer "Edge.Cuts"))'
+        return ours(project(tmp_path, placed().replace("(gr_text", f"{cut}\n(gr_text", 1)))
+
+    with pytest.raises(InputError, match="2 separate outlines"):
+        design(-50.0, -50.0)
+    inside = read_copper(read(placed())).area.centroid
+    keepouts = design(inside.x, inside.y).get("structure").all("keepout")
+    bare = ours(project(tmp_path, placed())).get("structure").all("keepout")
+    assert len(keepouts) == len(bare) + 2
