@@ -20,7 +20,6 @@ from designer.base.arrays import Array
 from designer.centering.cure_branch import TRIMMER
 from designer.centering.cure_ways import FEW, SAMPLES, Looker, ResponseWay, foretold
 from designer.spread.board_quantities import column
-from designer.spread.spread import draw_many
 from designer.verdicts.verdict import StudyPlan
 from designer.yields import margins
 from designer.yields.margins import Margin
@@ -89,7 +88,7 @@ def without_wiper(margin: Margin, plan: StudyPlan, trim: DcTrim) -> Margin:
     deviations = np.stack([off(k) for k in remaining], axis=1)
     moves = np.linalg.lstsq(deviations, np.stack([off(k) for k in wiper], axis=1), rcond=None)[0]
     quantities = tuple(margin.quantities[k] for k in remaining)
-    plain = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    plain = plan.boards(indices)
     limits = []
     for limit in margin.limits:
         slopes = limit.slopes[remaining] + moves @ limit.slopes[wiper]

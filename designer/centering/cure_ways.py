@@ -22,7 +22,6 @@ from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.part_rules import spread_of
-from designer.spread.spread import draw_many
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields.margins import Margin
 from designer.yields.yield_count import count
@@ -263,7 +262,7 @@ class Looker:
 
 def first_boards(plan: StudyPlan, number: int) -> Boards:
     """The first boards of a study."""
-    return draw_many(plan.circuit, plan.spread, plan.seed, range(number))
+    return plan.boards(range(number))
 
 
 def moved_question(branch: CureBranch, places: Mapping[int, WindowPlace]) -> Question | None:

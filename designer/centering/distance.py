@@ -14,7 +14,7 @@ settled after 140 drive periods counts as lost.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -195,7 +195,8 @@ class Stretched:
         if not showing:
             return []
         rows, orbits = zip(*showing, strict=True)
-        some = Ensemble(self._boards.boards.take(rows), jobs=self.jobs, bandwidth=True)
+        boards_with = replace(self._boards.boards.take(rows), bandwidth=True)
+        some = Ensemble(boards_with, jobs=self.jobs)
         starts = np.array([orbit.start for orbit in orbits])
         drives = [stand.drive] * len(rows)
         return some.settle(range(len(rows)), drives, starts, jobs=self.jobs)

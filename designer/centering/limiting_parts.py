@@ -73,7 +73,7 @@ def limitings(
 ) -> tuple[Limiting, ...]:
     """What limits each question of a plan. answers : of its first samples, in any order."""
     count = max(max((a.sample for a in answers), default=0) + 1, DRAWN)
-    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
+    boards = plan.boards(range(count))
     rows = [[a for a in answers if a.question == k] for k in range(len(plan.questions))]
     found = margins.margins(
         plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress

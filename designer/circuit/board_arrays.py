@@ -44,6 +44,8 @@ class Boards:
     """Gain-bandwidth product [Hz] by section."""
     inverse_gain: Array
     """(N,) 1/open-loop gain."""
+    bandwidth: bool = False
+    """Whether they are computed with op-amps that lag, see ``reduction.Reduction``."""
 
     def __len__(self) -> int:
         return len(self.inverse_gain)
@@ -109,7 +111,9 @@ class Boards:
         def columns(groups: Sequence[Mapping[str, float]]) -> dict[str, Array]:
             return {name: np.array([group[name] for group in groups]) for name in groups[0]}
 
-        grouped = {group: columns([getattr(b, group) for b in boards]) for group in _OF_A_BOARD}
+        grouped: dict[str, Any] = {
+            group: columns([getattr(b, group) for b in boards]) for group in _OF_A_BOARD
+        }
         return cls(
             circuit=circuit,
             low=columns([{name: low for name, (low, _) in b.rails.items()} for b in boards]),

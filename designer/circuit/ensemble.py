@@ -50,20 +50,17 @@ class Ensemble:
     """N boards, reduced once each and asked as often as is wanted.
 
     fast : take the compiled way where it fits; False: ``attractors.settle`` of each board.
-    jobs : threads that reduce. bandwidth : as of ``reduction.Reduction``; where op-amps drive
-    diodes each board is then settled by itself.
+    jobs : threads that reduce. Boards with bandwidth whose op-amps drive diodes are settled one by
+    one.
     """
 
-    def __init__(
-        self, boards: Boards, *, fast: bool = True, jobs: int = 1, bandwidth: bool = False
-    ) -> None:
+    def __init__(self, boards: Boards, *, fast: bool = True, jobs: int = 1) -> None:
         self.boards = boards
-        self.bandwidth = bandwidth
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
         fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
-        fits = fits and not (bandwidth and swinging_sections(boards.circuit))  # jumps
-        self._modes = _reduced(boards, jobs, bandwidth) if fast and fits else None
+        fits = fits and not (boards.bandwidth and swinging_sections(boards.circuit))  # jumps
+        self._modes = _reduced(boards, jobs) if fast and fits else None
 
     def __len__(self) -> int:
         return len(self.boards)
@@ -73,7 +70,7 @@ class Ensemble:
         known = self._reductions.get(index)
         if known is None:
             board = self.boards.board(index)
-            known = Reduction(self.boards.circuit, board, bandwidth=self.bandwidth)
+            known = Reduction(self.boards.circuit, board, bandwidth=self.boards.bandwidth)
             self._reductions[index] = known
         return known
 
@@ -319,15 +316,15 @@ def _faint(orbit: Orbit, drive: Drive) -> bool:
     return orbit.status is OrbitStatus.NOT_SETTLED
 
 
-def _reduced(boards: Boards, jobs: int, bandwidth: bool) -> working.BoardModes:
+def _reduced(boards: Boards, jobs: int) -> working.BoardModes:
     """The first working modes, by ``jobs`` threads."""
     count = len(boards)
     if count <= TOGETHER:
-        return working.BoardModes(boards, bandwidth=bandwidth)
+        return working.BoardModes(boards)
     chunks = [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
 
     def part(chunk: range) -> working.BoardModes:
-        return working.BoardModes(boards.take(chunk), bandwidth=bandwidth)
+        return working.BoardModes(boards.take(chunk))
 
     parts = list(parallel(part, chunks, jobs))
     return working.BoardModes.joined(boards, parts)

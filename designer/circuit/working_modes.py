@@ -100,16 +100,10 @@ def _all_solved(G: Array, right: Array, key: ModeKey) -> Array:
 
 
 class BoardModes:
-    """Some of the working modes of N boards, in the form of the fast path.
+    """Some of the working modes of N boards, in the form of the fast path."""
 
-    bandwidth : as of ``reduction.Reduction``.
-    """
-
-    def __init__(
-        self, boards: Boards, keys: Iterable[ModeKey] = (), *, bandwidth: bool = False
-    ) -> None:
-        circuit = boards.circuit
-        self._boards, self._bandwidth = boards, bandwidth
+    def __init__(self, boards: Boards, keys: Iterable[ModeKey] = ()) -> None:
+        circuit, self._boards = boards.circuit, boards
         self.targets = GuardTargets(working_keys(circuit))
         between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
         self.modes = empty_modes(
@@ -127,7 +121,6 @@ class BoardModes:
         """Those of some boards, for themselves: what is added to them is not added here."""
         out = object.__new__(BoardModes)
         out._boards, out.targets = self._boards.take(which), self.targets.copy()
-        out._bandwidth = self._bandwidth
         parts = {name: getattr(self.modes, name)[which] for name in OF_EACH}
         rest = {
             name: value.copy()
@@ -166,7 +159,7 @@ class BoardModes:
         circuit, board = self._boards.circuit, self._boards.stacked
         equations = (
             LaggingEquations(circuit, board, _all_solved)
-            if self._bandwidth
+            if self._boards.bandwidth
             else NodalEquations(circuit, board)
         )
         solved = [_solved(equations, key) for key in new]

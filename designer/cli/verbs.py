@@ -45,7 +45,7 @@ STUDY_KEYS = (
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
-StudyRung = Literal["exact", "auto", "ngspice"]
+StudyRung = Literal["exact", "bandwidth", "auto", "ngspice"]
 
 
 class MapOver(StrEnum):
@@ -179,7 +179,8 @@ def tolerance(
         option(
             "--rung",
             None,
-            "exact: no ngspice; ngspice: every board in ngspice too [auto, or as the folder has].",
+            "exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board in ngspice "
+            "too [auto, or as the folder has].",
         ),
     ] = None,
     tuned: Annotated[

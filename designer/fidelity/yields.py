@@ -244,17 +244,15 @@ def tally(
     )
     if plan.circuit.figures is None:
         return counts
-    return counts + _lagging(answers, *_timed(plan, samples, jobs, bandwidth=True))
+    return counts + _lagging(answers, *_timed(replace(plan, bandwidth=True), samples, jobs))
 
 
-def _timed(
-    plan: StudyPlan, samples: range, jobs: int, *, bandwidth: bool = False
-) -> tuple[list[Answer], float]:
+def _timed(plan: StudyPlan, samples: range, jobs: int) -> tuple[list[Answer], float]:
     """What the exact circuit says of these boards, and its CPU time [s]."""
     # What is compiled on the way is no cost of a board.
-    exact_rung.block(plan, samples[:1], jobs, bandwidth=bandwidth)
+    exact_rung.block(plan, samples[:1], jobs)
     began = time.process_time()
-    answers = exact_rung.block(plan, samples, jobs, bandwidth=bandwidth)
+    answers = exact_rung.block(plan, samples, jobs)
     return answers, time.process_time() - began
 
 

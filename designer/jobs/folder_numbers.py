@@ -19,6 +19,15 @@ from designer.jobs.options import Options
 from designer.jobs.study_folder import blame_budget, blamed
 from designer.model.model_file import ModelFile
 
+RUNG = "rung"
+"""Input of a study's stage: "bandwidth", or not there."""
+
+
+def rung_input(options: Options) -> dict[str, str]:
+    """The rung among a study's inputs. Which engine is asked about the same boards beside the exact
+    circuit is a layer; op-amps that lag make another study."""
+    return {RUNG: options.rung} if options.rung == "bandwidth" else {}
+
 
 def stage_numbers(
     folder: Folder, stage: StageName, names: Collection[str], limits: Collection[str] = ()
@@ -59,9 +68,8 @@ def of_study(
     if not goes_on(model, out, options.resume):
         return options
     limits = () if options.overwrite else ("until",)
-    return _with(
-        options, stage_numbers(Folder(out), "study", ("samples", "seed", "layers"), limits), words
-    )
+    names = ("samples", "seed", "layers", RUNG)
+    return _with(options, stage_numbers(Folder(out), "study", names, limits), words)
 
 
 def of_list(modelfile: ModelFile, options: Options, words: Mapping[str, Any]) -> Options:
@@ -76,7 +84,7 @@ def of_measured(path: Path, options: Options, words: Mapping[str, Any]) -> Optio
     """The options with the numbers of the study of built boards in a design folder."""
     if not is_design_folder(path):
         return options
-    return _with(options, stage_numbers(Folder(path), "measured", ("seed", "layers")), words)
+    return _with(options, stage_numbers(Folder(path), "measured", ("seed", "layers", RUNG)), words)
 
 
 def of_search(out: Path, options: Options, words: Mapping[str, Any]) -> Options:
@@ -96,7 +104,7 @@ def _with(options: Options, numbers: dict[str, Any], words: Mapping[str, Any]) -
     layers = numbers.pop("layers", None)
     if layers is not None:
         numbers |= {"blamed": blamed(layers), "blame_budget": blame_budget(layers)}
-        if "ngspice" not in layers:
+        if "ngspice" not in layers and RUNG not in numbers:
             numbers["rung"] = "exact"
     options = replace(options, **{k: v for k, v in numbers.items() if words.get(k, k) is None})
     return options if options.blamed else replace(options, blame_budget=None)

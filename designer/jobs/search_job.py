@@ -21,7 +21,6 @@ from designer.centering.limiting_parts import limitings
 from designer.centering.ngspice_check import LEVELS, RUNG
 from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
-from designer.circuit import nominal
 from designer.jobs import design_files, folder_numbers, rung_choice
 from designer.jobs.design_source import design_inputs_of, grade_inputs, source
 from designer.jobs.job_outcome import JobOutcome
@@ -33,12 +32,11 @@ from designer.jobs.study_folder import FolderStores
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import RANDOM, SPICE_TIMEOUT, StudyHelp, study_of
 from designer.model.model_file import ModelFile
-from designer.spice import numerics_gate
 from designer.spice.batch_backend import program_version
-from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts import ngspice_runs
 from designer.verdicts.cross_check import Ask, StartKind, Why
+from designer.verdicts.rung_gate import gated
 from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import LocalRunner
 from designer.yields.tolerance_study import StudyEngine, check
@@ -159,9 +157,10 @@ def _confirm(
 ) -> dict[str, Any]:
     stores = FolderStores(folder.path, folder.watch(), progress.note, vouch=folder.vouches)
     jobs = options.workers
+    decides: StudyEngine = "bandwidth" if options.rung == "bandwidth" else "exact"
     study = study_of(
         synthesis,
-        replace(options, rung="exact", blamed=False, blame_budget=None),
+        replace(options, rung=decides, blamed=False, blame_budget=None),
         StudyHelp(jobs, None, LocalRunner(jobs)),
         check(synthesis, None, progress),
         stores,
@@ -172,17 +171,9 @@ def _confirm(
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
         require_ngspice(pool)
         progress.stage(f"ngspice, rung {RUNG}, numerics gate")
-        reduction = nominal.nominal_reduction(synthesis.design)
-        subjects = [
-            GateSubject(reduction, q.excitation, q.start, rung=RUNG) for q in study.plan.questions
-        ]
-        gates = numerics_gate.check(pool, subjects, LEVELS)
-        questions = tuple(
-            replace(q, settings=g.settings if g.passed else None)
-            for q, g in zip(study.plan.questions, gates, strict=True)
-        )
-        plan = replace(study.plan, questions=questions)
-        asks = [a for a in to_confirm(study.answers) if questions[a.question].settings is not None]
+        plan, gates = gated(study.plan, pool, RUNG, LEVELS)
+        asks = to_confirm(study.answers)
+        asks = [a for a in asks if plan.questions[a.question].settings is not None]
         step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
         cross_checks = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
     answers = {(a.sample, a.question): a for a in study.answers}

@@ -82,7 +82,7 @@ def merged(
         return options
     names = {*stored.get("layers", ()), *layers_of(options)}
     rung = options.rung
-    if "ngspice" in names:
+    if "ngspice" in names and rung != "bandwidth":
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
     has_blame = stage is not None and stage.complete and blamed(stored["layers"])
     with_blame = options.blamed or has_blame

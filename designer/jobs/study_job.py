@@ -106,7 +106,8 @@ def tolerance(
 
     model : as of ``run``, or a design, which is studied in its folder or, without one, in memory.
     samples : at least. until : width of the 95 % intervals at which the study stops growing. rung :
-    "exact" asks no ngspice, "auto" about some boards, "ngspice" about every board. tuned, reached :
+    "exact" asks no ngspice, "auto" about some boards, "ngspice" about every board, "bandwidth" is
+    "auto" with op-amps that lag by their gain-bandwidth. tuned, reached :
     also with the generator free within its bands, and from power-up. ``map_`` : settings over which
     the yield is wanted too. measured : a list of built boards, which are studied instead, in a
     design folder. cluster : address of a Dask scheduler. The others are as of ``run``.
@@ -222,7 +223,7 @@ def run_into(
     # A study is of the boards as they are bought now, whatever the design's own inputs say.
     design_now = design_inputs(modelfile, runner.catalog)
     numbers = {"seed": options.seed, "samples": options.samples, "until": options.until}
-    inputs = {**design_now, **numbers}
+    inputs = {**design_now, **numbers, **folder_numbers.rung_input(options)}
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
     labels = () if modelfile.measured is None else modelfile.measured.labels
@@ -287,7 +288,7 @@ def measured_into(
     options = rung_choice.with_rung(folder, options, progress)
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
-    inputs = {**runner.design_inputs, **numbers}
+    inputs = {**runner.design_inputs, **numbers, **folder_numbers.rung_input(options)}
     options = merged(folder, inputs, options, BUILT.stage)
     stages = BUILT.stages(inputs, options, len(modelfile.responses), census=True)
     list_file = BUILT.prefix + MEASURED

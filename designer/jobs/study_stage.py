@@ -283,7 +283,8 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
         raise InputError(path, f"stages.{place.stage}", MISSING, expected)
     samples = folder.json(place.prefix + TOLERANCE)["samples"]
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
-    options = Options(stage.inputs["seed"], samples=samples, rung="exact", blamed=False)
+    rung = stage.inputs.get("rung", "exact")
+    options = Options(stage.inputs["seed"], samples=samples, rung=rung, blamed=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
     return study_of(synthesis, options, help_, check(synthesis, None), stores)
 

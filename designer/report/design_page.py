@@ -235,12 +235,15 @@ def _study_note(data: ReportData) -> str:
     limits = "Intervals are Wilson's, at 95 %."
     if data.plan.census:
         limits = "These are all the boards there are, so their shares have no interval."
-    varies = words_of(data.plan.spread, data.design.circuit)
+    varies = words_of(data.plan.spread, data.design.circuit, bandwidth=data.plan.bandwidth)
     blame = data.study.blame_status.sentence
+    engine = "the exact circuit"
+    if data.plan.bandwidth:
+        engine += " with op-amps that lag by their gain-bandwidth, as ngspice's do here"
     return (
         f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: {varies}. "
         "Boards run as built: the generator stays at the settings above. Verdicts are those of "
-        f"the exact circuit. {limits}" + (f" {blame}" if blame else "")
+        f"{engine}. {limits}" + (f" {blame}" if blame else "")
     )
 
 

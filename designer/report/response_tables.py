@@ -206,7 +206,8 @@ def equation_table(check: EquationCheck) -> Table | None:
 def provenance_table(data: ReportData) -> Table | None:
     provenance = {k: v for k, v in data.result.provenance.items() if k != "spread"}
     spread = data.plan.spread
-    text = f"{spread.name}: {words_of(spread, data.design.circuit)} (part by part in {TOLERANCE})"
+    varies = words_of(spread, data.design.circuit, bandwidth=data.plan.bandwidth)
+    text = f"{spread.name}: {varies} (part by part in {TOLERANCE})"
     return table(("what", "value"), [*_flat(provenance), ("spread", text)])
 
 

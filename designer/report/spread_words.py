@@ -9,8 +9,11 @@ from designer.report.words import quantity
 from designer.spread.spread import NO_BANDWIDTH, Spread
 
 
-def words_of(spread: Spread, circuit: Circuit) -> str:
-    """What varies from board to board of a circuit, by how much: part of a sentence."""
+def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> str:
+    """What varies from board to board of a circuit, by how much: part of a sentence.
+
+    bandwidth : whether the boards' op-amps lag, so that its spread enters their yield.
+    """
     parts = [
         f"resistors {_grade(spread.resistor_shape, spread.resistor)}",
         f"capacitors {_grade(spread.capacitor_shape, spread.capacitor)}",
@@ -28,7 +31,7 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         ("gain-bandwidth", spread.gain_bandwidth, "Hz"),
     ):
         parts += [f"{quantity_name} {_between(law, unit)}"] if law is not None else []
-    if spread.gain_bandwidth is not None:
+    if spread.gain_bandwidth is not None and not bandwidth:
         parts[-1] += f" (which {NO_BANDWIDTH})"
     if spread.supply:
         parts.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")

@@ -24,6 +24,7 @@ from .equation_check import (
     EquationFinding as EquationFinding,
 )
 from .numerics_gate import (
+    LEVELS as LEVELS,
     GateResult as GateResult,
     GateSubject as GateSubject,
     shortest_contact as shortest_contact,

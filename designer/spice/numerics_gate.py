@@ -192,6 +192,7 @@ def job(
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
+    capacitors = start[: len(subject.circuit.states)]
     reading = Reading(
         period=subject.period,
         discard=0 if whole else subject.discard,
@@ -209,7 +210,7 @@ def job(
         settings,
         title="one response of one board",
         stop_time=stop,
-        initial=(1.0 + nudge) * start,
+        initial=(1.0 + nudge) * capacitors,
         rung=subject.rung,
         # A period before the first strobe, for the points around it: a long way takes no memory.
         kept_from=0.0 if whole else max(subject.discard - 1, 0) * subject.period,

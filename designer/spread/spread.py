@@ -36,7 +36,7 @@ ROOM = 25.0
 
 NO_BANDWIDTH = (
     "does not enter the yield: the exact circuit and ngspice's rung ideal, on which it is decided, "
-    "have no bandwidth"
+    "have no bandwidth (--rung bandwidth has)"
 )
 """What a spread of the gain-bandwidth comes with."""
 

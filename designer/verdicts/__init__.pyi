@@ -28,6 +28,7 @@ from .ngspice_runs import (
     run_queries as run_queries,
     way_to_rung as way_to_rung,
 )
+from .rung_gate import gated as gated
 from .verdict import (
     BLOCK as BLOCK,
     Answer as Answer,

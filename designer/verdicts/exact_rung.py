@@ -9,13 +9,11 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
-from designer.circuit.netlist import Excitation, nominal_board
-from designer.circuit.reduction import Reduction
+from designer.circuit.netlist import Excitation
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateSubject
-from designer.spread.spread import draw_many
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, rounded
 
 Case = tuple[int, Question, Excitation, Array]
@@ -42,14 +40,9 @@ def block(
     indices: range,
     jobs: int,
     progress: Callable[[], None] = lambda: None,
-    *,
-    bandwidth: bool = False,
 ) -> list[Answer]:
-    """An answer for every board and every question, in order; ``progress`` is called once each.
-    bandwidth : as of ``reduction.Reduction``."""
-    boards = Ensemble(
-        draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs, bandwidth=bandwidth
-    )
+    """An answer for every board and every question, in order; ``progress`` is called once each."""
+    boards = Ensemble(plan.boards(indices), jobs=jobs)
     return [answer for answer, _, _ in _settled_boards(plan, boards, indices, jobs, progress)]
 
 
@@ -61,13 +54,13 @@ def of_boards(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Answer]:
     """``block`` of what the boards of these samples have become, by an adjustment on the board."""
-    ensemble = Ensemble(boards, jobs=jobs)
+    ensemble = Ensemble(plan.modelled(boards), jobs=jobs)
     return [answer for answer, _, _ in _settled_boards(plan, ensemble, indices, jobs, progress)]
 
 
 def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, GateSubject | None]]:
     """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
-    drawn = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs)
+    drawn = Ensemble(plan.boards(indices), jobs=jobs)
     pairs: list[tuple[Answer, GateSubject | None]] = []
     for answer, orbit, boards in _settled_boards(plan, drawn, indices, jobs, lambda: None):
         subject = None
@@ -136,7 +129,7 @@ def waveform_error(waveform: Array, wanted: Array) -> float:
 
 def _nominal_displacement(plan: StudyPlan, question: Question) -> Array:
     """Empty where the nominal circuit has no answer; then no board has a waveform error."""
-    system = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
+    system = Ensemble(plan.nominal()).reduction(0).system()
     try:
         return displacement(Flow(system, question.excitation.drive), question.start)
     except ArithmeticError:

@@ -7,14 +7,16 @@ A verdict is decided on the exact circuit rung, started on the nominal design's 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from designer.circuit.netlist import Circuit, Excitation
+from designer.circuit.board_arrays import Boards
+from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
-from designer.spread.spread import Spread
+from designer.spice.opamp_model import Rung
+from designer.spread.spread import Spread, draw_many
 
 BLOCK = 250
 """Samples in a block; block edges depend on the sample index alone."""
@@ -107,6 +109,13 @@ class StudyPlan:
     """How many boards were drawn."""
     questions: tuple[Question, ...]
     """The wanted responses."""
+    bandwidth: bool = False
+    """Whether the boards are computed with op-amps that lag, see ``reduction.Reduction``."""
+
+    @property
+    def rung(self) -> Rung:
+        """The op-amps' model in ngspice that goes with these boards."""
+        return "dynamic" if self.bandwidth else "ideal"
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -122,6 +131,18 @@ class StudyPlan:
     def label(self, sample: int) -> str:
         """Name of the board that a sample is."""
         return self.labels[sample % len(self.labels)]
+
+    def boards(self, indices: range) -> Boards:
+        """The boards of these samples."""
+        return self.modelled(draw_many(self.circuit, self.spread, self.seed, indices))
+
+    def modelled(self, boards: Boards) -> Boards:
+        """Other boards of the circuit, computed as the samples are."""
+        return replace(boards, bandwidth=self.bandwidth)
+
+    def nominal(self) -> Boards:
+        """The nominal board, as ``Boards`` of one."""
+        return self.modelled(Boards.of(self.circuit, [nominal_board(self.circuit)]))
 
     def blocks(self, size: int = BLOCK) -> Iterator[range]:
         """Sample indices block by block."""

@@ -171,8 +171,8 @@ class _Advisor:
         out = [Adjustment.at(np.array([0.0, 0.0, centre]), self.bands)]
         out += [t.setting for t in case.tries if t.verdict is Verdict.OK]
         if case.best is not None:  # it is inside the window, which has a middle
-            board, bandwidth = self.boards.boards.take([0]), self.boards.bandwidth
-            spots, _ = find_window(board, self.question, self.bands, bandwidth=bandwidth)
+            board = self.boards.boards.take([0])
+            spots, _ = find_window(board, self.question, self.bands)
             deepest = sorted(spots, key=lambda spot: -spot.radius)[:DEEPEST]
             out += [spot.setting for spot in deepest]
         return list(dict.fromkeys(out))
@@ -241,6 +241,5 @@ class _Advisor:
     ) -> tuple[float, float]:
         """``_worth`` of the better of some settings on these boards, with these parts at their
         nominal values."""
-        boards = self.boards.boards.take(which).exact(names)
-        changed = Ensemble(boards, bandwidth=self.boards.bandwidth)
+        changed = Ensemble(self.boards.boards.take(which).exact(names))
         return max(self._worth(one, changed) for one in tried)

@@ -11,7 +11,7 @@ coefficient) is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -92,11 +92,11 @@ class Prior:
         for quantity, slope in zip(self.quantities, self.slopes, strict=True):
             values = column(boards, quantity) + z @ slope
             boards = with_column(boards, quantity, values)
-        return boards
+        return replace(boards, bandwidth=self.bandwidth)
 
     def ensemble(self, z: Array) -> Ensemble:
         """The boards at z (N, K), reduced."""
-        return Ensemble(self.boards(z), bandwidth=self.bandwidth)
+        return Ensemble(self.boards(z))
 
     def reductions(self, z: Array) -> list[Reduction]:
         """The exact circuits of the boards at z (N, K), one by one."""
@@ -120,7 +120,7 @@ class Prior:
 
     def _coefficients(self, z: Array) -> Array:
         """(N, coefficients) of the boards' equations, open and in every single contact."""
-        modes = BoardModes(self.boards(z), bandwidth=self.bandwidth).modes
+        modes = BoardModes(self.boards(z)).modes
         parts: Sequence[Array] = (modes.A, modes.B, modes.d, modes.guard)
         return np.concatenate([part.reshape(len(z), -1) for part in parts], axis=1)
 

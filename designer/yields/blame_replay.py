@@ -24,7 +24,6 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
-from designer.spread.spread import draw_many
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields.margins import DRAWN, ROUNDS, lost_boards
@@ -154,7 +153,7 @@ def extent_of(
     board at least of each response that lost any.
     """
     count = max(1 + max((a.sample for a in answers), default=0), DRAWN)
-    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
+    boards = plan.boards(range(count))
     rows = tuple(
         tuple(sorted((a for a in answers if a.question == i), key=lambda a: a.sample))
         for i in range(len(plan.questions))

@@ -148,7 +148,7 @@ def fill_cross_checks(
     left = {number: len(some) for number, some in missing.items()}
     for number in [n for n, count in left.items() if not count]:
         finish(number)
-    for k, row in ngspice_runs.checks_run(plan, missing.values(), pool, jobs):
+    for k, row in ngspice_runs.checks_run(plan, missing.values(), pool, jobs, rung=plan.rung):
         number = todo[k].sample // CHUNK
         if row is not None:
             answers[number][row.key] = row

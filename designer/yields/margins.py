@@ -169,7 +169,7 @@ def margins(
     parts = StoredParts() if parts is None else parts
     lost = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
     crossed = _stored_crossings(boards, lost, questions, parts, jobs, progress)
-    nominal = Boards.of(circuit, [nominal_board(circuit)])
+    nominal = replace(Boards.of(circuit, [nominal_board(circuit)]), bandwidth=boards.bandwidth)
     probes = _probes(nominal, differing)
     limits: list[list[Limit]] = []
     for number, question in enumerate(questions):

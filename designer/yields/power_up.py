@@ -22,7 +22,6 @@ from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms
-from designer.spread.spread import draw_many
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import BoardRow, Question, StudyPlan, Verdict
 from designer.yields.start_recipe import Recipe
@@ -178,7 +177,7 @@ def power_up_block(
 
     recipes : one for each question (``yields.start_recipe_search``). progress : called once a row.
     """
-    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    ensemble = Ensemble(plan.boards(indices))
     switch_on = [phases(plan.seed, question, indices).tolist() for question in plan.questions]
     pairs = plan.rows(indices)
     starts = [(i, plan.questions[k], recipes[k], switch_on[k][i]) for i, k in pairs]

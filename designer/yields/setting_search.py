@@ -125,10 +125,8 @@ def _rounds(ensemble: Ensemble, bands: Bands) -> list[Round]:
 
     def path(first: float, tied: bool) -> Round:
         def propose(case: BoardCase) -> list[Asked]:
-            board, bandwidth = ensemble.boards.take([case.board]), ensemble.bandwidth
-            spots, followed = find_window(
-                board, case.question, bands, first, tied=tied, bandwidth=bandwidth
-            )
+            board = ensemble.boards.take([case.board])
+            spots, followed = find_window(board, case.question, bands, first, tied=tied)
             case.followed += followed
             return [(s, case.question.start.start) for s in _deepest(spots, case, bands)]
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.progress import doing, part
-from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
@@ -51,8 +50,9 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter."""
-    nominal = Ensemble(Boards.of(plan.circuit, [nominal_board(plan.circuit)]))
-    sample = Ensemble(draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL))
+    nominal = Ensemble(plan.nominal())
+    drawn = draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL)
+    sample = Ensemble(plan.modelled(drawn))
     recipes = []
     for number, question in enumerate(plan.questions, start=1):
         with part(f"start recipe of response {number} of {len(plan.questions)}"):

@@ -103,6 +103,7 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         **({"limit_into": circuit.saturation_load} if circuit.saturation_load else {}),
         "figures": repr(circuit.figures),
         "spread": plain(plan.spread.as_dict()),
+        **({"bandwidth": True} if plan.bandwidth else {}),
         "seed": plan.seed,
         "questions": [
             {

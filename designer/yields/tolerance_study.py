@@ -24,6 +24,7 @@ from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields import layers
 from designer.yields.blame_analysis import Blame, blame
 from designer.yields.blame_replay import BUDGET, extent_of
+from designer.yields.lagging_plan import lagging_plan
 from designer.yields.layers import LayerName, Runner, Task
 from designer.yields.power_up import power_up_block
 from designer.yields.row_store import BlockStore
@@ -42,9 +43,10 @@ MOST_NOMINAL = 1000
 MORE_NOMINAL = 50
 """By how many their number grows."""
 
-StudyEngine = Literal["exact", "auto", "ngspice"]
-"""Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample."""
-STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "auto", "ngspice")
+StudyEngine = Literal["exact", "bandwidth", "auto", "ngspice"]
+"""Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample;
+"bandwidth": the same with op-amps that lag, in both."""
+STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "bandwidth", "auto", "ngspice")
 
 
 class Stores:
@@ -113,13 +115,14 @@ def tolerance(
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
     does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``verdicts.cross_check``
-    says, ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted; a fitted
-    trimmer is always asked for. blame_budget : steps of the blame (``blame_replay``). maps :
-    settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to
-    save the time of the gate. pool : where ngspice runs; without one ngspice is not asked. stores :
-    where rows are read from and written to. runner : who computes blocks; this process if None.
-    sampled : is given the study once the exact circuit has every board, before ngspice is asked.
-    standing : is given the study once its yields stand and the blame or maps are still to be
+    says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice`` about every board. tuned,
+    reached, blamed : whether these are wanted; a fitted trimmer is always asked for. blame_budget :
+    steps of the blame (``blame_replay``). maps : settings over which the yield is wanted
+    (``yield_maps.OVERS``). checked : of the same design, to save the time of the gate. pool : where
+    ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
+    to. runner : who computes blocks; this process if None. sampled : is given the study once the
+    exact circuit has every board, before ngspice is asked. standing : is given the study once its
+    yields stand and the blame or maps are still to be
     worked out.
     """
     need_responses(synthesis.modelfile)
@@ -140,7 +143,12 @@ def tolerance(
         samples=samples,
         seed=seed,
     )
-    if plan.spread.gain_bandwidth is not None:
+    if rung == "bandwidth":
+        progress.stage("nominal orbits with bandwidth")
+        plan, left, gone = lagging_plan(plan, pool)
+        left_out |= {indices[k]: reason for k, reason in gone.items()}
+        indices = tuple(indices[k] for k in left)
+    elif plan.spread.gain_bandwidth is not None:
         progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     laps = Laps()
     study = Study(
@@ -229,7 +237,7 @@ class Work:
         samples = -(-study.plan.samples // BLOCK) * BLOCK
         nominal = NOMINAL_SAMPLES
         study = self._with_samples(study, samples)
-        both_engines = self.pool is not None and self.engine == "auto"
+        both_engines = self.pool is not None and self.engine != "ngspice"
         checks: tuple[CrossCheck, ...] = ()
         while any(_decided(study)):
             asks = self._random(study, nominal)
@@ -368,7 +376,7 @@ class Work:
         """With the boards at a boundary, which are known only once there is no more sample, and
         those on which the engines differ, once that is known."""
         asks = self._random(study, nominal)
-        if self.engine == "auto":
+        if self.engine != "ngspice":
             asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
         study = replace(study, cross_checks=self._checks(study, asks, last=False))
         asks += cross_check.ask_differing(study.answers, study.cross_checks, asks)

@@ -15,11 +15,9 @@ import numpy as np
 
 from designer.base.threads import parallel
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import nominal_board
-from designer.circuit.reduction import FloatingCircuit, Reduction
+from designer.circuit.reduction import FloatingCircuit
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
-from designer.spread.spread import draw_many
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, Verdict, rounded
 from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset
@@ -105,7 +103,7 @@ def tuned_block(
     KeyError : the answer as built of a board is missing.
     """
     ensemble, as_built = _answers_as_built(plan, indices, answers)
-    nominal = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
+    nominal = Ensemble(plan.nominal()).reduction(0).system()
 
     def case_of(answer: Answer) -> BoardCase:
         board, question = answer.sample - indices.start, plan.questions[answer.question]
@@ -148,7 +146,7 @@ def _answers_as_built(
 ) -> tuple[Ensemble, list[Answer]]:
     """The boards of a block, and their answers as built in the order of its rows."""
     answer_of = {(a.sample, a.question): a for a in answers}
-    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    ensemble = Ensemble(plan.boards(indices))
     return ensemble, [answer_of[indices[i], number] for i, number in plan.rows(indices)]
 
 

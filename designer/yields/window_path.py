@@ -84,7 +84,6 @@ def find_window(
     first: float = 0.0,
     *,
     tied: bool = True,
-    bandwidth: bool = False,
 ) -> tuple[list[PathSetting], int]:
     """Follow the question's orbit to a board (``Boards`` of one): the settings met on the board
     itself, in order, or the one where the path ended on the way; and how many orbits were followed.
@@ -92,20 +91,18 @@ def find_window(
     first : half-bands of DC offset at which the path sets out on the nominal board. Where a window
     lies on either side of the symmetric setting, it says to which one the path goes. tied : where
     a step of the board must be shortened, the setting moves less with it; else it may still go as
-    far. Neither leads into every window that the other does. bandwidth : as of
-    ``reduction.Reduction``.
+    far. Neither leads into every window that the other does.
     """
-    path = _Path(board, question, bands, bandwidth)
+    path = _Path(board, question, bands)
     return path.walk(first, tied), path.followed
 
 
 class _Path:
-    def __init__(self, board: Boards, question: Question, bands: Bands, bandwidth: bool) -> None:
+    def __init__(self, board: Boards, question: Question, bands: Bands) -> None:
         self.board, self.question, self.bands = board, question, bands
-        self.bandwidth = bandwidth
         self.widths = widths(bands)
         self.followed = 0
-        self._reduced = (np.nan, Ensemble(board, fast=False, bandwidth=bandwidth))
+        self._reduced = (np.nan, Ensemble(board, fast=False))
 
     def walk(self, first: float, tied: bool) -> list[PathSetting]:
         nominal = self.question.start
@@ -197,7 +194,7 @@ class _Path:
         try:
             if self._reduced[0] != share:
                 moved = between(self.board, np.array([share]))
-                self._reduced = (share, Ensemble(moved, fast=False, bandwidth=self.bandwidth))
+                self._reduced = (share, Ensemble(moved, fast=False))
             system = self._reduced[1].reduction(0).system()
             drive = self._adjustment(setting).of(self.question.excitation).drive
             return follow(Flow(system, drive), near, self.question.start.n)

@@ -168,7 +168,7 @@ def _at(plan: StudyPlan, columns: Sequence[int], picks: Places) -> Boards:
     """Boards with these coordinates at their first (0) or last (1) end, a row of ``picks`` each."""
     cube = np.full((len(picks), len(plan.spread.coordinates(plan.circuit))), 0.5)
     cube[:, columns] = np.where(picks == 1, LAST, 0.0)
-    return plan.spread.from_cube(plan.circuit, cube)
+    return plan.modelled(plan.spread.from_cube(plan.circuit, cube))
 
 
 def _falling(

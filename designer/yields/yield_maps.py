@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation, nominal_board
-from designer.circuit.reduction import Reduction
+from designer.circuit.netlist import Excitation
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
@@ -233,7 +232,8 @@ def yield_map(
     counts = {name: np.zeros((len(settings), len(columns)), dtype=np.int64) for name in _COUNTS}
     for column, grade in enumerate(columns):
         spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
-        ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
+        drawn = draw_many(plan.circuit, spread, seed, range(samples))
+        ensemble = Ensemble(plan.modelled(drawn))
         tasks = [
             _Task(i, board, nominal.drive(value), orbit.start)
             for board in range(samples)
@@ -334,9 +334,7 @@ class _NominalOrbits:
     ) -> None:
         self.question, self.over, self.used = question, over, used
         self.progress, self.spent = progress, 0
-        self._system: PiecewiseLinearSystem = Reduction(
-            plan.circuit, nominal_board(plan.circuit)
-        ).system()
+        self._system: PiecewiseLinearSystem = Ensemble(plan.nominal()).reduction(0).system()
         self._known: dict[float, Orbit] = {used: question.start}
 
     def drive(self, value: float) -> Drive:

@@ -94,9 +94,10 @@ def test_boards_together_are_each_alone_and_share_their_modes_ends() -> None:
     reached, to second order of a lag of 4 % here, so that every state has a mode."""
     circuit = circuit_of(EXACT | {"R203": 62e3, "R202": 1e3})
     drawn = draw_many(circuit, Spread(0.01, 0.01, 3e-3, 1e-2), 1, range(4))
+    drawn = replace(drawn, bandwidth=True)
     drive = Drive(2.0 * np.pi * 250.0, 0.5)
     start = np.zeros(4)
-    many = Ensemble(drawn, bandwidth=True).settle(range(4), [drive] * 4, np.array([start] * 4))
+    many = Ensemble(drawn).settle(range(4), [drive] * 4, np.array([start] * 4))
     for k, orbit in enumerate(many):
         system = Reduction(circuit, drawn.board(k), bandwidth=True).system()
         alone = settle(Flow(system, drive, fast=False), start)

@@ -141,7 +141,7 @@ def _error(wave: np.ndarray, flow: Flow, orbit: object, points: int) -> float:
 def test_boards_of_a_rectifier_settle_one_by_one_from_capacitor_voltages() -> None:
     circuit = replace(stage("rectifier", "both", SCALED), figures=OPAMP)
     asked = subject(circuit, nominal_board(circuit), "both", 0.54)
-    boards = Ensemble(draw_many(circuit, BENCH, 1, range(2)), bandwidth=True)
+    boards = Ensemble(replace(draw_many(circuit, BENCH, 1, range(2)), bandwidth=True))
     drive = asked.excitation.drive
     start = asked.orbit.start
     for k, orbit in enumerate(boards.settle([0, 1], [drive] * 2, np.array([start] * 2))):

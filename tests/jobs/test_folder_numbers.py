@@ -83,6 +83,9 @@ def test_a_study_has_the_folders_own_numbers(tmp_path: Path, verb: str) -> None:
 def test_a_study_that_asked_ngspice_goes_on_asking(tmp_path: Path) -> None:
     out = folder(tmp_path / "out", study={**STUDY, "layers": ["ngspice", "samples"]})
     assert options_of("tolerance", out, "-q").rung == "auto"
+    lagging = folder(tmp_path / "lagging", study={**STUDY, "rung": "bandwidth"})
+    assert options_of("tolerance", lagging, "-q").rung == "bandwidth"
+    assert options_of("tolerance", lagging, "--rung", "exact", "-q").rung == "exact"
     exact = folder(tmp_path / "exact", study=STUDY)
     assert options_of("tolerance", exact, "--rung", "auto", "-q").rung == "auto"
 

@@ -90,7 +90,7 @@ def test_answers_do_not_depend_on_the_block() -> None:
 def test_boards_with_bandwidth_are_judged_as_each_alone() -> None:
     """From the nominal orbit without bandwidth; the verdict by the same rule."""
     asked = plan(2)
-    answers = exact_rung.block(asked, range(2), 1, bandwidth=True)
+    answers = exact_rung.block(replace(asked, bandwidth=True), range(2), 1)
     without = exact_rung.block(asked, range(2), 1)
     for answer in answers:
         board = draw(asked.circuit, asked.spread, asked.seed, answer.sample)
