@@ -67,6 +67,9 @@ from .nodal import (
     NodalEquations as NodalEquations,
     Solution as Solution,
 )
+from .nodal_bandwidth import (
+    swinging_sections as swinging_sections,
+)
 from .noise_gains import (
     SectionStage as SectionStage,
     conductance as conductance,
@@ -123,5 +126,7 @@ from .terms import (
 )
 from .working_modes import (
     BoardModes as BoardModes,
+    ModeRows as ModeRows,
     at_rest as at_rest,
+    mode_rows as mode_rows,
 )

@@ -99,6 +99,29 @@ def _all_solved(G: Array, right: Array, key: ModeKey) -> Array:
     return y
 
 
+@dataclass(frozen=True)
+class ModeRows:
+    """What holds in a mode of N boards, over (states, generator, 1)."""
+
+    rates: Array
+    """(N, n, n + 2) rows of the rates of the n states."""
+    rows: Array
+    """(N, nets, n + 2) rows of the voltages [V] of some nets."""
+
+
+def mode_rows(boards: Boards, key: ModeKey, nets: Sequence[str]) -> ModeRows:
+    """The rows of a mode of these boards; nan for a board whose equations have no unique answer
+    there."""
+    mode = _solved(_equations(boards), key)
+    return ModeRows(mode.rates, np.stack([mode.voltage[net] for net in nets], axis=1))
+
+
+def _equations(boards: Boards) -> NodalEquations:
+    if boards.bandwidth:
+        return LaggingEquations(boards.circuit, boards.stacked, _all_solved)
+    return NodalEquations(boards.circuit, boards.stacked)
+
+
 class BoardModes:
     """Some of the working modes of N boards, in the form of the fast path."""
 
@@ -156,12 +179,7 @@ class BoardModes:
         new = [key for key in keys if key not in self.targets.numbers]
         if not new:
             return
-        circuit, board = self._boards.circuit, self._boards.stacked
-        equations = (
-            LaggingEquations(circuit, board, _all_solved)
-            if self._boards.bandwidth
-            else NodalEquations(circuit, board)
-        )
+        equations = _equations(self._boards)
         solved = [_solved(equations, key) for key in new]
         most = max((len(mode.exits) for mode in solved), default=0)
         self.modes = grown(self.modes, len(self.targets.keys) + len(new), most)

@@ -4,13 +4,12 @@ Maximum a posteriori by Gauss and Newton (Nocedal and Wright, Numerical Optimiza
 10; Tarantola, Inverse Problem Theory, 2005, chapter 3). The unknowns are the coordinates of the
 board (``board_prior.Prior``), and for each record the gain and offset of each channel, its shift
 in time and, where nobody knows it better, the generator's amplitude. What is held against the
-record is the board's exact orbit. Its derivatives are difference quotients of exact orbits along
-the few directions in which the board's equation changes.
+record is the board's exact orbit, with its linear variation (``orbit_slopes``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,11 +18,11 @@ from scipy.interpolate import CubicSpline
 from designer.base.arrays import Array
 from designer.base.errors import DesignerError
 from designer.circuit.netlist import Excitation
-from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.workbench.board_orbits import POINTS, NetOrbit, follow
-from designer.workbench.board_prior import PROBE, Prior
+from designer.workbench.board_prior import Prior
 from designer.workbench.observation import Observation
+from designer.workbench.orbit_slopes import OrbitSlopes, orbit_slopes
 
 DRAWS = 16
 """Boards of the spread whose orbits are held against a record first, the nominal one among them."""
@@ -31,8 +30,12 @@ LOOK = 1024
 """Samples of a record that this first look takes."""
 ROUNDS = 16
 """Steps of Gauss and Newton at most."""
-HALVINGS = 6
-"""Of a step that leads to no better board."""
+DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
+"""Of a step, over the diagonal of its matrix: the next where one leads to no better board."""
+STARTS, GOOD = 4, 1.5
+"""Boards from which the search begins, one after the other, until the misfit is good."""
+SAME = 1e-6
+"""Relative difference of two starts of one orbit."""
 LONGEST = 2.0
 """Standard deviations that a step moves a coordinate at most."""
 ENOUGH = 0.02
@@ -122,26 +125,24 @@ def fit_board(
         periods, so there is nothing to begin with.
     """
     problem = _Problem(prior, tuple(observations))
-    place = problem.first(starts)
-    worth, gain, rounds = problem.objective(place), np.inf, 0
-    while gain > ENOUGH and rounds < ROUNDS:
-        rounds += 1
-        better = problem.step(place, worth, problem.linearised(place))
-        if better is None:
+    best: tuple[BoardFit, float] | None = None
+    for candidate in problem.candidates(starts)[:STARTS]:
+        fit = problem.climbed(candidate)
+        if best is None or fit[1] < best[1]:
+            best = fit
+        if max(best[0].misfits) < GOOD:
             break
-        gain = worth - better[1]
-        place, worth = better
-    return problem.answer(place, rounds)
+    assert best is not None
+    return best[0]
 
 
 @dataclass(frozen=True)
 class _Linearised:
     """normal (m, m) and gradient (m,) of half the objective by z, then each record's reading; the
-    directions (r, K), and the change (r, states) of each orbit's start along them."""
+    slopes (states, K + 1) of each orbit's start, see ``OrbitSlopes``."""
 
     normal: Array
     gradient: Array
-    directions: Array
     starts: tuple[Array, ...]
 
 
@@ -151,11 +152,11 @@ class _Problem:
         self.centres: list[_Reading] = []
         self.sigmas: list[Array] = []
 
-    def first(self, starts: Sequence[Sequence[Array]]) -> _Place:
-        """The board among some of the spread whose orbits look most like all records."""
+    def candidates(self, starts: Sequence[Sequence[Array]]) -> list[tuple[Array, list[_Look]]]:
+        """Some boards of the spread with their orbits, those most like all records first."""
         draws = self.prior.draws(DRAWS)
         looks = [
-            dict(_looks(self.prior, draws, obs, states))
+            _looks(self.prior, draws, obs, states)
             for obs, states in zip(self.observations, starts, strict=True)
         ]
         common = set.intersection(*(set(look) for look in looks))
@@ -164,14 +165,27 @@ class _Problem:
                 f"none of {DRAWS} boards of the spread settles on motions of these periods at "
                 "all of these settings"
             )
-        best = min(common, key=lambda i: sum(look[i][0] for look in looks))
-        chosen = [look[best] for look in looks]
-        for obs, (_, orbit, shift) in zip(self.observations, chosen, strict=True):
+        order = sorted(common, key=lambda i: sum(look[i].cost for look in looks))
+        return [(draws[i], [look[i] for look in looks]) for i in order]
+
+    def climbed(self, candidate: tuple[Array, list[_Look]]) -> tuple[BoardFit, float]:
+        """The most probable board that is found from a candidate, with its objective."""
+        z, looks = candidate
+        self.centres, self.sigmas = [], []
+        for obs, look in zip(self.observations, looks, strict=True):
             nets = len(obs.nets)
-            self.centres.append(_Reading(np.ones(nets), np.zeros(nets), shift))
-            self.sigmas.append(obs.spread_of(np.abs(orbit.volts).max(axis=0)))
-        orbits = tuple(orbit for _, orbit, _ in chosen)
-        return _Place(draws[best], orbits, tuple(self.centres))
+            self.centres.append(_Reading(np.ones(nets), np.zeros(nets), look.shift))
+            self.sigmas.append(obs.spread_of(np.abs(look.orbit.volts).max(axis=0)))
+        place = _Place(z, tuple(look.orbit for look in looks), tuple(self.centres))
+        worth, gain, rounds = self.objective(place), np.inf, 0
+        while gain > ENOUGH and rounds < ROUNDS:
+            rounds += 1
+            better = self.step(place, worth, self.linearised(place))
+            if better is None:
+                break
+            gain = worth - better[1]
+            place, worth = better
+        return self.answer(place, rounds), worth
 
     def objective(self, place: _Place) -> float:
         """Minus twice the logarithm of the probability, but for a constant."""
@@ -189,17 +203,15 @@ class _Problem:
         return np.asarray((obs.volts - reading.gain * shown - reading.offset) / self.sigmas[i])
 
     def linearised(self, place: _Place) -> _Linearised:
-        """The objective about a place, by the exact orbits of boards beside it."""
-        directions = self.prior.directions(place.z)
+        """The objective about a place, by the slopes of the exact orbits."""
         K, readings = len(place.z), [len(r.vector) for r in place.readings]
         normal = np.zeros((K + sum(readings),) * 2)
         gradient = np.zeros(len(normal))
         normal[:K, :K], gradient[:K] = np.eye(K), place.z
-        beside = self.prior.reductions(place.z + PROBE * directions)
         moved, first = [], K
         for i, (obs, size) in enumerate(zip(self.observations, readings, strict=True)):
-            slopes, start = self._slopes(i, place, beside)
-            J = np.concatenate([slopes @ directions, self._reading_slopes(i, place)], axis=1)
+            slopes = self._slopes(i, place)
+            J = self._residual_slopes(i, place, slopes)
             r = self._residual(i, place).ravel()
             at = np.r_[0:K, first : first + size]
             normal[np.ix_(at, at)] += J.T @ J
@@ -208,60 +220,44 @@ class _Problem:
             own = np.arange(first, first + size)
             normal[own, own] += known
             gradient[own] += known * (place.readings[i].vector - self.centres[i].vector)
-            moved.append(start)
+            moved.append(slopes.start)
             first += size
-        return _Linearised(normal, gradient, directions, tuple(moved))
+        return _Linearised(normal, gradient, tuple(moved))
 
-    def _slopes(self, i: int, place: _Place, beside: Sequence[Reduction]) -> tuple[Array, Array]:
-        """(k · nets, r) of what is shown, over what is allowed for, by the directions, and (r,
-        states) of the orbit's start; 0 where a board beside it has no such orbit."""
-        obs, orbit, reading = self.observations[i], place.orbits[i], place.readings[i]
-        drive = _driven(obs.excitation, reading.amplitude)
-        volts = np.zeros((len(beside), *orbit.volts.shape))
-        start = np.zeros((len(beside), len(orbit.start)))
-        for j, reduction in enumerate(beside):
-            there = follow(reduction, drive, obs.nets, orbit.start, orbit.n)
-            if there is not None:
-                volts[j] = (there.volts - orbit.volts) / PROBE
-                start[j] = (there.start - orbit.start) / PROBE
-        columns = np.moveaxis(volts, 0, -1).reshape(len(orbit.volts), -1)
-        shown = _shown(columns, obs.phase + reading.shift)
-        shown = shown.reshape(len(obs.phase), len(obs.nets), len(beside))
-        shown *= (reading.gain / self.sigmas[i])[:, None]
-        return shown.reshape(-1, len(beside)), start
+    def _slopes(self, i: int, place: _Place) -> OrbitSlopes:
+        obs = self.observations[i]
+        drive = _driven(obs.excitation, place.readings[i].amplitude)
+        return orbit_slopes(self.prior, place.z, place.orbits[i], drive, obs.nets)
 
-    def _reading_slopes(self, i: int, place: _Place) -> Array:
-        """(k · nets, reading) the same by the reading's own numbers."""
+    def _residual_slopes(self, i: int, place: _Place, slopes: OrbitSlopes) -> Array:
+        """(k · nets, K + reading) of what is shown, over what is allowed for, by the coordinates of
+        the board, then the reading's own numbers."""
         obs, reading, sigma = self.observations[i], place.readings[i], self.sigmas[i]
-        nets, orbit = len(obs.nets), place.orbits[i]
-        shown = _shown(orbit.volts, obs.phase + reading.shift)
-        out = np.zeros((len(shown), nets, 2 * nets + 2))
+        nets, volts = len(obs.nets), place.orbits[i].volts
+        phase = obs.phase + reading.shift
+        by_board = _interpolated(slopes.volts, phase) * (reading.gain / sigma)[:, None]
+        shown, rate = _shown(volts, phase), _shown(volts, phase, 1)
+        own = np.zeros((len(phase), nets, 2 * nets + 2))
         for c in range(nets):
-            out[:, c, c] = shown[:, c] / sigma[c]
-            out[:, c, nets + c] = 1.0 / sigma[c]
-        rate = _shown(orbit.volts, obs.phase + reading.shift, 1)
-        out[:, :, -2] = reading.gain * rate / sigma
-        if obs.scope.amplitude > 0.0:
-            (reduction,) = self.prior.reductions(place.z[None])
-            louder = _driven(obs.excitation, reading.amplitude * (1.0 + 1e-3))
-            there = follow(reduction, louder, obs.nets, orbit.start, orbit.n)
-            if there is not None:
-                more = _shown(there.volts - orbit.volts, obs.phase + reading.shift) / 1e-3
-                out[:, :, -1] = reading.gain * more / sigma
-        return out.reshape(-1, 2 * nets + 2)
+            own[:, c, c] = shown[:, c] / sigma[c]
+            own[:, c, nets + c] = 1.0 / sigma[c]
+        own[:, :, -2] = reading.gain * rate / sigma
+        own[:, :, -1] = by_board[:, :, -1] / reading.amplitude
+        return np.concatenate([by_board[:, :, :-1], own], axis=2).reshape(len(phase) * nets, -1)
 
     def step(self, place: _Place, worth: float, system: _Linearised) -> tuple[_Place, float] | None:
-        """A more probable place; None where no part of the step leads to one."""
+        """A more probable place, with as little damping (Levenberg and Marquardt) as leads to one;
+        None where none does."""
         K = len(place.z)
-        move: Array = np.asarray(-np.linalg.solve(system.normal, system.gradient), dtype=float)
-        move /= max(1.0, float(np.abs(move[:K]).max()) / LONGEST)
-        for _ in range(HALVINGS):
+        for damping in DAMPINGS:
+            damped = system.normal + damping * np.diag(np.diag(system.normal))
+            move: Array = np.asarray(-np.linalg.solve(damped, system.gradient), dtype=float)
+            move /= max(1.0, float(np.abs(move[:K]).max()) / LONGEST)
             there = self._moved(place, move, system)
             if there is not None:
                 now = self.objective(there)
                 if now < worth:
                     return there, now
-            move = 0.5 * move
         return None
 
     def _moved(self, place: _Place, move: Array, system: _Linearised) -> _Place | None:
@@ -274,8 +270,9 @@ class _Problem:
         ):
             size = len(reading.vector)
             new = _Reading.of(reading.vector + move[first : first + size])
+            louder = new.amplitude / reading.amplitude - 1.0
             first += size
-            near = orbit.start + (system.directions @ move[: len(z)]) @ slope
+            near = orbit.start + slope @ np.append(move[: len(z)], louder)
             drive = _driven(obs.excitation, new.amplitude)
             there = follow(reduction, drive, obs.nets, near, orbit.n)
             if there is None:
@@ -326,38 +323,61 @@ def _shown(volts: Array, phase: Array, derivative: int = 0) -> Array:
     return np.asarray(spline(np.mod(phase, periods), derivative))
 
 
+def _interpolated(values: Array, phase: Array) -> Array:
+    """(k, ...) periodic values (m, ...) of whole drive periods at phases (k,), straight between the
+    points of the grid."""
+    place = phase * POINTS
+    cell = np.floor(place).astype(np.int64)
+    share = (place - cell).reshape(-1, *(1,) * (values.ndim - 1))
+    size = len(values)
+    return np.asarray((1.0 - share) * values[cell % size] + share * values[(cell + 1) % size])
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How far a record is from an orbit, in units of the objective, at the shift [drive periods] at
+    which it is nearest."""
+
+    cost: float
+    orbit: NetOrbit
+    shift: float
+
+
 def _looks(
     prior: Prior, draws: Array, obs: Observation, starts: Sequence[Array]
-) -> Iterator[tuple[int, tuple[float, NetOrbit, float]]]:
-    """For each of the draws (N, K) that settles: how far the record is from its orbit (in units
-    of the objective), the orbit, and the shift at which it is nearest."""
+) -> dict[int, _Look]:
+    """For each of the draws (N, K) that settles the orbit that is nearest to the record."""
     boards = prior.ensemble(draws)
     which = [i for i in range(len(draws)) for _ in starts]
     asked = np.array([state for _ in draws for state in starts])
     asked = asked.reshape(len(which), len(prior.circuit.states))
     settled = boards.settle(which, [obs.excitation.drive] * len(which), asked)
-    best: dict[int, tuple[float, NetOrbit, float]] = {}
+    best: dict[int, _Look] = {}
+    seen: dict[int, list[Array]] = {}
     for i, motion in zip(which, settled, strict=True):
         if motion.status is not OrbitStatus.PERIODIC or obs.n not in (None, motion.n):
             continue
-        orbit = follow(boards.reduction(i), obs.excitation, obs.nets, motion.start, motion.n)
-        if orbit is None:
+        known = seen.setdefault(i, [])
+        if any(np.allclose(motion.start, start, rtol=SAME, atol=0.0) for start in known):
             continue
-        cost, shift = _nearest(obs, orbit)
-        if i not in best or cost < best[i][0]:
-            best[i] = (cost, orbit, shift)
-    yield from best.items()
+        known.append(motion.start)
+        orbit = follow(boards.reduction(i), obs.excitation, obs.nets, motion.start, motion.n)
+        look = None if orbit is None else _nearest(obs, orbit)
+        if look is not None and (i not in best or look.cost < best[i].cost):
+            best[i] = look
+    return best
 
 
-def _nearest(obs: Observation, orbit: NetOrbit) -> tuple[float, float]:
-    """Least cost over the shifts that the record allows, and that shift."""
+def _nearest(obs: Observation, orbit: NetOrbit) -> _Look:
+    """At the best of the shifts that the record allows."""
     width = max(1, len(obs.phase) // LOOK)
     phase, volts = obs.phase[::width], obs.volts[::width]
     sigma = obs.spread_of(np.abs(orbit.volts).max(axis=0)) / np.sqrt(width)
     fine = 1 if obs.aligned else 64
     costs = []
     for k in range(orbit.n * fine):
-        shown = _shown(orbit.volts, phase + k / fine)
+        shown = _interpolated(orbit.volts, phase + k / fine)
         rest = (volts - shown - (volts - shown).mean(axis=0)) / sigma
         costs.append((float((rest**2).sum()), k / fine))
-    return min(costs)
+    cost, shift = min(costs)
+    return _Look(cost, orbit, shift)

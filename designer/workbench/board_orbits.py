@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.attractors import peaks_near, shoot
@@ -27,6 +27,13 @@ class NetOrbit:
     """Its period in drive periods."""
     volts: Array
     """(n · POINTS, nets) voltages [V]."""
+    states: Array
+    """(n · POINTS, states) states at the same phases."""
+    sides: Index
+    """(n · POINTS, clearances) side of the contact there: 1 upper, -1 lower, 0 none."""
+    beyond: Array
+    """(n · POINTS, clearances, 2) how far past the upper and the lower stop [V]: positive
+    in contact; -inf where there is no stop."""
     monodromy: Array
     """(states, states) its matrix over n periods."""
 
@@ -50,27 +57,49 @@ def follow(
         return None
     if len(states) < n * POINTS:
         return None
-    return NetOrbit(found[0], n, net_volts(reduction, states, excitation, nets), found[1])
+    beyond = beyond_stops(reduction, states, excitation)
+    volts = net_volts(reduction, states, excitation, nets, sides_of(beyond))
+    return NetOrbit(found[0], n, volts, states, sides_of(beyond), beyond, found[1])
+
+
+def whole_states(states: Array, excitation: Excitation) -> Array:
+    """(k, n + 2) what rows of a circuit are over: states (k, n), ``POINTS`` of them a drive period
+    from phase 0, the generator [V] and 1."""
+    drive = excitation.drive
+    u = drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS) + drive.offset
+    return np.column_stack([states, u, np.ones(len(states))])
+
+
+def beyond_stops(reduction: Reduction, states: Array, excitation: Excitation) -> Array:
+    """(k, clearances, 2) the displacement beyond the upper and the lower stop of each clearance
+    [V] along states (k, n) as of ``whole_states``; -inf where there is no stop."""
+    whole, system = whole_states(states, excitation), reduction.system()
+    out = np.full((len(states), len(reduction.circuit.stops), 2), -np.inf)
+    for c in range(out.shape[1]):
+        for sign, row in system.contact_rows(c).items():
+            out[:, c, 0 if sign > 0 else 1] = whole @ row
+    return out
+
+
+def sides_of(beyond: Array) -> Index:
+    """(k, clearances) side of the contact, 1 or -1, of ``beyond_stops``; 0 where there is none."""
+    return np.asarray((beyond[..., 0] > 0.0).astype(np.int64) - (beyond[..., 1] > 0.0))
 
 
 def net_volts(
-    reduction: Reduction, states: Array, excitation: Excitation, nets: Sequence[str]
+    reduction: Reduction, states: Array, excitation: Excitation, nets: Sequence[str], sides: Index
 ) -> Array:
-    """(k, nets) voltages [V] along states (k, n), ``POINTS`` of them a drive period from phase 0.
+    """(k, nets) voltages [V] along states (k, n) as of ``whole_states``, in contact on ``sides``
+    (k, clearances).
 
     A net behind a dead zone changes its law where contact begins. The steps of a rectifier on the
     way there, microvolts wide, are left out.
     """
-    circuit, drive = reduction.circuit, excitation.drive
-    u = drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS) + drive.offset
-    whole = np.column_stack([states, u, np.ones(len(states))])
-    side = np.zeros((len(states), len(circuit.stops)), dtype=np.int64)
-    for c in range(len(circuit.stops)):
-        for sign, row in reduction.system().contact_rows(c).items():
-            side[whole @ row > 0.0, c] = sign
+    whole = whole_states(states, excitation)
     volts = np.empty((len(states), len(nets)))
-    for sides in np.unique(side, axis=0):
-        here = (side == sides).all(axis=1)
-        voltage = reduction.solution(circuit.in_contact(sides.tolist())).voltage
+    for each in np.unique(sides, axis=0):
+        here = (sides == each).all(axis=1)
+        key = reduction.circuit.in_contact(each.tolist())
+        voltage = reduction.solution(key).voltage
         volts[here] = whole[here] @ np.column_stack([voltage[net] for net in nets])
     return volts

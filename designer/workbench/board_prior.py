@@ -10,7 +10,6 @@ coefficient) is left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +20,6 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
-from designer.circuit.working_modes import BoardModes
 from designer.spread.board_quantities import Quantity, column, quantities, with_column
 from designer.spread.spread import Spread
 
@@ -29,8 +27,6 @@ NODES = 16
 """Values of a coordinate that its standard deviation is taken from."""
 PROBE = 0.05
 """Of a standard deviation: the step of a difference quotient."""
-FAINT = 0.02
-"""Directions that move no coefficient by more than this share of its spread are left out."""
 
 
 @dataclass(frozen=True)
@@ -111,22 +107,3 @@ class Prior:
         z = np.random.default_rng(seed).standard_normal((count, self.size))
         z[0] = 0.0
         return z
-
-    def directions(self, z: Array) -> Array:
-        """(r, K) orthonormal directions in which the boards' equations change at z (K,)."""
-        values = self._coefficients(np.vstack([z, z + PROBE * np.eye(len(z))])) / self._scatter
-        left, sizes, _ = np.linalg.svd((values[1:] - values[0]) / PROBE, full_matrices=False)
-        return np.asarray(left[:, sizes > FAINT].T)
-
-    def _coefficients(self, z: Array) -> Array:
-        """(N, coefficients) of the boards' equations, open and in every single contact."""
-        modes = BoardModes(self.boards(z)).modes
-        parts: Sequence[Array] = (modes.A, modes.B, modes.d, modes.guard)
-        return np.concatenate([part.reshape(len(z), -1) for part in parts], axis=1)
-
-    @cached_property
-    def _scatter(self) -> Array:
-        """(coefficients,) standard deviation of each over the spread; inf where it is constant."""
-        values = self._coefficients(self.draws(64))
-        sigma, size = values.std(axis=0), np.abs(values).max(axis=0)
-        return np.asarray(np.where(sigma > 1e-9 * size, sigma, np.inf))

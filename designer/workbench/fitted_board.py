@@ -80,7 +80,7 @@ def board_behind(
         reason = "no record repeats: record the board at the frequency of another response"
         return FittedBoard(name, files, reason=reason)
     near = [nearest(prediction.responses, n.motion.frequency)[:ASKED] for n in periodic]
-    starts = [[response.orbit.start for response in some] for some in near]
+    starts = [[start for response in some for start in response.starts] for some in near]
     try:
         seen = [_observation(n, some) for n, some in zip(periodic, near, strict=True)]
         fit = fit_board(prior, seen, starts)

@@ -7,7 +7,7 @@ less than ``TOLD`` of what the spread alone says.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -91,8 +91,9 @@ def board_figures(circuit: Circuit, boards: Boards) -> Mapping[str, tuple[str, A
     gain and no offset of its screen enters, and it is what a response sees. The constant force is
     the generator's DC voltage that acts like everything that does not oscillate: offsets, bias
     currents, unequal limits. Resonance frequencies [Hz] and damping ratios are those of free motion
-    with every clearance open, and in each contact.
+    with every clearance open, and in each contact. The op-amps' lag is left out.
     """
+    boards = replace(boards, bandwidth=False)
     nominal = _Gaps(BoardModes(Boards.of(circuit, [nominal_board(circuit)])), circuit)
     modes = BoardModes(boards)
     gaps = _Gaps(modes, circuit)

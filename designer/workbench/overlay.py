@@ -93,8 +93,7 @@ def _orbits(
 
 def _images(table: Array, prediction: BoardPrediction) -> Sequence[Array]:
     """The waves (k, nets), and those of the mirror twin where there are stops on both sides."""
-    twins = all(len(stop.ends) == 2 for stop in prediction.stops)
-    return [table, -np.roll(table, POINTS // 2, axis=0)] if twins else [table]
+    return [table, -np.roll(table, POINTS // 2, axis=0)] if prediction.twins else [table]
 
 
 def _in_phase(recorded: Array, wave: Array) -> Array:

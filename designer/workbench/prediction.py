@@ -68,6 +68,9 @@ class PredictedResponse:
     waves: Mapping[str, Array]
     """(n · POINTS,) voltage of each net [V], from drive phase 0 on, where the generator's voltage
     falls through its mean."""
+    starts: tuple[Array, ...]
+    """(states,) from where a board may come to it: its own start, and that of its mirror twin where
+    every clearance has stops on both sides."""
 
 
 class BoardPrediction:
@@ -106,8 +109,20 @@ class BoardPrediction:
             orbit = on_circuit(system, self.synthesis.design, response)
             if orbit.n:
                 waves = self.waves(orbit, setting)
-                shown.append(PredictedResponse(response.spec, setting, orbit, waves))
+                starts = self._starts(orbit, waves)
+                shown.append(PredictedResponse(response.spec, setting, orbit, waves, starts))
         return tuple(shown)
+
+    @property
+    def twins(self) -> bool:
+        """Whether every clearance has stops on both sides, so that orbits have mirror twins."""
+        return all(len(stop.ends) == 2 for stop in self.stops)
+
+    def _starts(self, orbit: Orbit, waves: Mapping[str, Array]) -> tuple[Array, ...]:
+        if not self.twins:
+            return (orbit.start,)
+        later = np.array([waves[net][POINTS // 2] for net in self.circuit.state_nets])
+        return orbit.start, -later
 
     def waves(self, orbit: Orbit, setting: GeneratorSetting) -> dict[str, Array]:
         """(n · POINTS,) voltage of each net [V] along an orbit of the nominal board."""
