@@ -142,6 +142,7 @@ from .page import (
     Columns as Columns,
     Gallery as Gallery,
     Items as Items,
+    Lead as Lead,
     Page as Page,
     PageSection as PageSection,
     Picture as Picture,

@@ -6,20 +6,30 @@ Text is plain and is escaped. ``Markup`` is Markdown already: pages that are nev
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, TypeVar
 
 from markupsafe import Markup
 
 T = TypeVar("T")
 
+FOLD = 6
+"""Rows that say the same from which on a table may fold them into a sentence."""
 PHRASE = 60
 """Characters of a cell that may stand in lines of a few words each."""
 
 
 class SmallPrint(str):
     """A paragraph of small print."""
+
+    __slots__ = ()
+
+
+class Lead(str):
+    """The line that a section comes to, before the sentences that it rests on."""
 
     __slots__ = ()
 
@@ -34,12 +44,45 @@ class Table:
     """Cells, row by row."""
     numeric: tuple[int, ...] = ()
     """Indices of the columns that are set flush right."""
+    names: int = 0
+    """How many first columns name a row, in a table whose equal rows fold; 0: none folds."""
+
+    @cached_property
+    def folded(self) -> FoldedTable | None:
+        """The table with the rows that say the same, but for their names, as one sentence; None
+        where fewer than ``FOLD`` do, or not most of them."""
+        said = Counter(row[self.names :] for row in self.rows)
+        cells, count = said.most_common(1)[0] if self.names and self.rows else ((), 0)
+        if count < FOLD or 2 * count <= len(self.rows):
+            return None
+        rest = tuple(row for row in self.rows if row[self.names :] != cells)
+        same = tuple(row for row in self.rows if row[self.names :] == cells)
+        who = f"All {count}" if not rest else f"{count} of {len(self.rows)}"
+        if len(set(cells)) == 1:
+            text = cells[0]
+        else:
+            pairs = zip(self.columns[self.names :], cells, strict=True)
+            text = ", ".join(f"{column} {cell}" for column, cell in pairs if cell)
+        shown = replace(self, rows=rest, names=0) if rest else None
+        return FoldedTable(shown, replace(self, rows=same, names=0), f"{who} agree: {text}.")
 
     @property
     def broad(self) -> bool:
         """Whether it needs more than a phone's width: many columns, or long text."""
         longest = max((len(cell) for row in self.rows for cell in row), default=0)
         return len(self.columns) > 3 or longest > PHRASE
+
+
+@dataclass(frozen=True)
+class FoldedTable:
+    """A table of which most rows say the same."""
+
+    shown: Table | None
+    """The other rows; None where there are none."""
+    hidden: Table
+    """The rows that say the same."""
+    sentence: str
+    """What they say."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +121,7 @@ class Items:
 
     items: tuple[tuple[str, str], ...]
     """(head, text); a head may be ""."""
-    kind: Literal["bullets", "tiles", "warnings", "terms"] = "bullets"
+    kind: Literal["bullets", "terms"] = "bullets"
     """How HTML sets it."""
 
 
@@ -133,14 +176,17 @@ def bullets(texts: Iterable[str]) -> Items:
 
 
 def table(
-    columns: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[int] = ()
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numeric: Sequence[int] = (),
+    names: int = 0,
 ) -> Table | None:
     """A table, or None where there are no rows. A last column that says nothing is left out."""
     cells = [tuple(row) for row in rows]
     if not cells:
         return None
     end = len(columns) if any(row[-1] for row in cells) else len(columns) - 1
-    return Table(tuple(columns[:end]), tuple(row[:end] for row in cells), tuple(numeric))
+    return Table(tuple(columns[:end]), tuple(row[:end] for row in cells), tuple(numeric), names)
 
 
 def table_of(
@@ -165,6 +211,9 @@ def _block(block: Block, level: int) -> list[str]:
     match block:
         case str():
             return [str(plain(block))]
+        case Table(folded=FoldedTable() as folded):
+            rest = [] if folded.shown is None else [_table(folded.shown)]
+            return [*rest, str(plain(folded.sentence))]
         case Table():
             return [_table(block)]
         case Picture():

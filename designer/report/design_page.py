@@ -28,8 +28,9 @@ from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
 from designer.model.system_equations import equations_of, hertz_notes, number_of
-from designer.report import design_tables, response_tables, summary, tolerance_tables, words
+from designer.report import design_tables, response_tables, tolerance_tables, words
 from designer.report.data import ReportData
+from designer.report.four_answers import answers
 from designer.report.spread_words import words_of
 from designer.spread.part_grades import better_grades_text
 from designer.yields.blame_analysis import Blame
@@ -80,18 +81,16 @@ GLOSSARY = (
 
 def design_page(data: ReportData, pictures: Pictures) -> Page:
     """The page of a run. pictures : those of ``pictures.pictures``; none for Markdown."""
-    problems = [words.problem(c) for c in data.checked]
-    if data.result.equations is not None:
-        problems.append(data.result.equations.problem)
-    head: list[Block] = [
-        *summary.summary(data),
-        Items(tuple(summary.tiles(data)), "tiles"),
-        Items(tuple(("Attention", text) for text in problems if text), "warnings"),
-    ]
+    head: list[Block] = [_purpose(data)]
     sections = [
-        _model(data, pictures.get("model")),
+        answers(data),
         PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
         _responses(data),
+        _model(data, pictures.get("model")),
+        PageSection("Schematic", [pictures.get("schematic")], "schematic"),
+        PageSection("The board", [pictures.get("board")], "board"),
+        _parts(data),
+        _errors(data, pictures.get("errors")),
         _yields(data, pictures),
         _blame(data, pictures),
         PageSection(
@@ -99,8 +98,6 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
             [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
             "maps",
         ),
-        _parts(data, pictures.get("schematic"), pictures.get("board")),
-        _errors(data, pictures.get("errors")),
         _scales(data),
         _provenance(data),
         PageSection("Words", [Items(GLOSSARY, "terms")], "words"),
@@ -108,6 +105,15 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
     if not pictures:
         head.append(Markup("The pictures stand in `report.html`."))
     return Page(data.result.modelfile.title, head, [s for s in sections if any(s.blocks)])
+
+
+def _purpose(data: ReportData) -> str:
+    number = len(data.checked)
+    title = data.result.modelfile.title
+    purpose = f"Asked for: an op-amp circuit that behaves like the model “{title}”"
+    if not number:
+        return f"{purpose}; no response is named."
+    return f"{purpose} and shows {words.plural(number, 'response')} of it."
 
 
 def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:
@@ -279,15 +285,11 @@ def _blame_note(blame: Blame, *, lost: bool) -> str:
     )
 
 
-def _parts(
-    data: ReportData, schematic: Picture | Gallery | None, board: Picture | Gallery | None
-) -> PageSection:
+def _parts(data: ReportData) -> PageSection:
     blocks: list[Block] = [
         _parts_note(data),
         PageSection("To buy", [design_tables.bom_table(data.bom)]),
         *_cost(data.board_cost),
-        _one("Schematic", schematic),
-        _one("The board", board),
         Columns(
             (
                 PageSection("Values by role", [design_tables.part_table(data.design.circuit)]),

@@ -137,7 +137,7 @@ def error_table(design: Design) -> Table | None:
         (words.coefficient(name, spring), _wanted(design, name), words.error(error))
         for name, error in design.errors.errors.items()
     ]
-    return table(("coefficient", "wanted", "ln(realised/wanted)"), rows, (1, 2))
+    return table(("coefficient", "wanted", "ln(realised/wanted)"), rows, (1, 2), names=2)
 
 
 def spring_of(model: MechanicalModel) -> str:

@@ -172,7 +172,7 @@ def ngspice_table(data: ReportData) -> Table | None:
         "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
         "exact circuit but ngspice (boards); why without answer",
     )  # fmt: skip
-    return table(columns, rows, range(2, 7))
+    return table(columns, rows, range(2, 7), names=2)
 
 
 def _ngspice_cells(answers: Sequence[Answer], checks: Sequence[CrossCheck]) -> tuple[str, ...]:

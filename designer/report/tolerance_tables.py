@@ -35,7 +35,8 @@ def boards(data: ReportData) -> Table | None:
         (b["board"], *(cell or words.NONE for cell in b["cells"]), b["all"] or words.NONE)
         for b in measured_boards(data.plan, answers)
     ]
-    return table(("board", *(words.name(c) for c in data.checked), "all of them"), rows)
+    columns = ("board", *(words.name(c) for c in data.checked), "all of them")
+    return table(columns, rows, names=1)
 
 
 def kinds(data: ReportData) -> Table | None:
@@ -114,7 +115,7 @@ def differences(data: ReportData) -> Table | None:
         "another n-p-q in ngspice, of the random boards",
         "boards, and where ngspice started",
     )
-    return table(columns, rows)
+    return table(columns, rows, names=1)
 
 
 def recipes(data: ReportData) -> Table | None:

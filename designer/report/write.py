@@ -7,7 +7,10 @@ results and command lines.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
+from importlib import resources
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -19,6 +22,8 @@ from designer.report.data import ReportData
 from designer.report.design_page import FORMAT, design_page
 from designer.report.pictures import pictures
 
+SCRIPTS = ("tables.js",)
+"""What a page runs; each is its own file beside the templates."""
 _NPQ = r"(?:\d+-\d+-\d+|n-p-q|n-q-p)"
 _WHOLE = re.compile(rf"ω = [\d.]+(?: \({_NPQ}\))?|(?<![\w-]){_NPQ}(?![\w-])")
 
@@ -49,8 +54,21 @@ def render_page(page: Page) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates.filters["text"] = _unbroken
-    return templates.get_template("page.html.j2").render(page=page, format=FORMAT)
+    templates.filters |= {"text": _unbroken, "digest": _digest}
+    template = templates.get_template("page.html.j2")
+    return template.render(page=page, format=FORMAT, scripts=[_script(name) for name in SCRIPTS])
+
+
+def _script(name: str) -> Markup:
+    """A script of the package, as it stands in a page."""
+    file = resources.files("designer.report") / "templates" / name
+    return Markup(file.read_text("utf-8"))
+
+
+def _digest(script: str) -> str:
+    """What a page's policy allows a script by: nothing else runs, whatever a text holds."""
+    digest = hashlib.sha256(script.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
 def render_markdown(data: ReportData) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from designer.base.page import Table
-from designer.check import checked_design
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.design_tables import condition_table
@@ -25,17 +24,14 @@ from designer.report.tolerance_tables import (
     recipes,
 )
 from designer.report.write import render_html, render_markdown
-from designer.verdicts.exact_rung import block
 from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Prediction
-from designer.yields.study import RunResult, Study, plan_study
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.report.test_write import Page
-from tests.shared.paper_cases import synthesised
-from tests.shared.report_data import changed
+from tests.shared.report_data import changed, plain_report
 
 HOSTILE = "<b>x</b> | `y`"
 
@@ -83,15 +79,7 @@ class Recipe:
 
 @pytest.fixture(scope="module")
 def plain() -> ReportData:
-    """Two responses, three boards, no layers."""
-    made = synthesised()
-    design, found = made.design, made.model_responses[0:3:2]
-    modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
-    checked = checked_design.check(design, found, None)
-    plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
-    answers = tuple(block(plan, range(3), 2))
-    study = Study(checked, plan, (0, 1), {}, answers)
-    return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
+    return plain_report()
 
 
 def blamed(question: int, lost: int) -> ResponseBlame:

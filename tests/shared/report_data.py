@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from functools import cache
 from typing import Any
 
+from designer.check import checked_design
 from designer.report.data import ReportData
-from designer.yields.study import Study
+from designer.verdicts.exact_rung import block
+from designer.yields.study import RunResult, Study, plan_study
+from tests.shared.paper_cases import synthesised
+
+
+@cache
+def plain_report() -> ReportData:
+    """Two responses of the paper's case, three boards, no layers."""
+    made = synthesised()
+    design, found = made.design, made.model_responses[0:3:2]
+    modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
+    checked = checked_design.check(design, found, None)
+    plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
+    study = Study(checked, plan, (0, 1), {}, tuple(block(plan, range(3), 2)))
+    return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
 
 
 def changed(data: ReportData, **changes: Any) -> ReportData:

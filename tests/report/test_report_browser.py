@@ -1,0 +1,142 @@
+"""The report in a real browser: without a complaint, for keyboard, phone, dark and paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from designer.base.page import Page as ReportPage, PageSection, table
+from designer.report.write import render_html, render_page
+from tests.shared.report_data import changed, plain_report
+
+pytestmark = pytest.mark.browser
+HOSTILE = "</script><script>document.body.dataset.bad = 1</script><img src=x onerror=alert(1)>"
+
+
+@dataclass
+class Loaded:
+    """A page, and what it complained of."""
+
+    page: Page
+    """The page in the browser."""
+    complaints: list[str] = field(default_factory=list)
+    """Errors and warnings of the console, and requests that leave the page."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
+        )
+        yield started
+        started.close()
+
+
+def loaded(browser: Browser, html: str, file: Path) -> Loaded:
+    file.write_text(html, encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1200, "height": 900}, color_scheme="light")
+    out = Loaded(page)
+    page.on("console", lambda message: out.complaints.append(message.text))
+    page.on("pageerror", lambda error: out.complaints.append(str(error)))
+    page.on(
+        "request",
+        lambda request: (
+            out.complaints.append(request.url) if request.url.startswith(("http", "ws")) else None
+        ),
+    )
+    page.goto(file.as_uri())
+    return out
+
+
+@pytest.fixture(scope="module")
+def report(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
+    """A small report whose title is hostile."""
+    data = plain_report()
+    data = changed(data, modelfile=replace(data.result.modelfile, title=HOSTILE))
+    return loaded(browser, render_html(data), tmp_path_factory.mktemp("report") / "report.html")
+
+
+@pytest.fixture(scope="module")
+def tables(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
+    """A page of two tables, one of which folds."""
+    parts = [("R1", "10 kΩ"), ("R2", "4.7 kΩ"), ("C1", "1.2 nF"), ("R10", "137 kΩ"),
+             ("C2", "15 nF"), ("R3", "1 MΩ"), ('R"4', "5 Ω, 1 %")]  # fmt: skip
+    alike = [(f"board {k}", "ok") for k in range(7)]
+    sections = [
+        PageSection("To buy", [table(("part", "value"), parts)], "buy"),
+        PageSection("Boards", [table(("board", "A"), alike, names=1)], "boards"),
+    ]
+    html = render_page(ReportPage("Tables", ["Two."], sections))
+    return loaded(browser, html, tmp_path_factory.mktemp("tables") / "page.html")
+
+
+def column(page: Page, number: int) -> list[str]:
+    cells = page.locator(f"#buy tbody tr:visible td:nth-child({number + 1})")
+    return cells.all_inner_texts()
+
+
+def test_tables_sort_by_the_keyboard(tables: Loaded) -> None:
+    page = tables.page
+    before = column(page, 1)
+    button = page.locator("#buy th button").nth(1)
+    button.focus()
+    head = page.locator("#buy th").nth(1)
+    page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") == "ascending"
+    rising = ["1.2 nF", "15 nF", "5 Ω, 1 %", "4.7 kΩ", "10 kΩ", "137 kΩ", "1 MΩ"]
+    assert column(page, 1) == rising
+    page.keyboard.press("Enter")
+    assert column(page, 1) == rising[::-1]
+    page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") is None
+    assert column(page, 1) == before
+
+
+def test_tables_filter_and_copy_what_is_shown(tables: Loaded) -> None:
+    page = tables.page
+    search = page.get_by_label("Filter the rows of: To buy")
+    search.fill("r k")
+    assert {*column(page, 0)} == {"R1", "R2", "R10"}
+    assert page.locator("#buy [role=status]").inner_text() == "3 of 7 rows"
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    search.fill('r"')
+    page.get_by_label("Copy as CSV: To buy").click()
+    page.get_by_text("Copied.").wait_for()
+    text = page.evaluate("navigator.clipboard.readText()")
+    assert text == 'part,value\n"R""4","5 Ω, 1 %"\n'
+    search.fill("")
+    assert len(column(page, 0)) == 7
+
+
+def test_what_folds_opens(tables: Loaded) -> None:
+    page = tables.page
+    summary = page.get_by_text("All 7 agree: ok.")
+    assert page.locator("#boards tbody tr:visible").count() == 0
+    summary.focus()
+    page.keyboard.press("Enter")
+    assert page.locator("#boards tbody tr:visible").count() == 7
+
+
+def test_nothing_is_complained_of(report: Loaded, tables: Loaded) -> None:
+    assert report.complaints == tables.complaints == []
+    assert report.page.evaluate("document.body.dataset.bad") is None
+    assert report.page.title() == HOSTILE
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_rules_of_accessibility_hold(report: Loaded, scheme: str) -> None:
+    report.page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+    found = Axe().run(report.page).response["violations"]
+    assert [(v["id"], v["nodes"][0]["html"]) for v in found] == []
+
+
+def test_the_page_is_as_wide_as_a_phone(report: Loaded) -> None:
+    report.page.set_viewport_size({"width": 390, "height": 800})
+    assert report.page.evaluate("document.documentElement.scrollWidth") == 390
+    report.page.set_viewport_size({"width": 1200, "height": 900})
