@@ -1,4 +1,4 @@
-"""Tracks and pours on the board of a design folder, for the verb ``export``."""
+"""Tracks and pours on the board of a design folder, for the verbs ``export`` and ``run``."""
 
 from __future__ import annotations
 
@@ -53,6 +53,23 @@ def route_in_folder(
     else:
         _replace(folder / name, routed.text)
     return _answer(name, routed)
+
+
+def route_own_board(folder: Folder, synthesis: Synthesis, progress: Progress) -> None:
+    """Route the folder's board where it is as it was written and nothing is routed yet.
+
+    What stands in the way is a note: everything else of the folder goes without tracks.
+    """
+    board = kicad_files.own_board(folder)
+    if board is None or board.copper:
+        return
+    try:
+        open_ = route_in_folder(folder, synthesis, progress)["open"]
+    except InputError as error:
+        progress.note(f"the board is not routed: {error}")
+        return
+    if open_:
+        progress.note(f"the board is routed but for {', '.join(open_)}")
 
 
 def write_design(

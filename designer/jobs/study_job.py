@@ -18,6 +18,7 @@ from designer.check import synthesis_result
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import design_files, folder_numbers, kicad_files, rung_choice, search_stage
+from designer.jobs.board_routing import route_own_board
 from designer.jobs.design_source import bills_are_of_old, design_inputs, source
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.json_answers import run_json
@@ -172,7 +173,7 @@ def _study(
     path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
     place = None if out is None else Path(out)
     command = partial(Options.command, verb=verb, model=path, out=place)
-    return run_into(modelfile, folder, options, progress, command, shown)
+    return run_into(modelfile, folder, options, progress, command, shown, routed=verb == "run")
 
 
 def _in_memory(
@@ -206,10 +207,13 @@ def run_into(
     progress: Progress,
     command: Callable[[Options], str],
     shown: Shown = lambda _: None,
+    *,
+    routed: bool = False,
 ) -> JobOutcome:
     """Design, check, study and report in the folder ``out``.
 
-    command : the command line as the report states it (``Options.command``).
+    command : the command line as the report states it (``Options.command``). routed : with tracks
+    on the board, where there are none.
 
     Raises
     ------
@@ -236,6 +240,8 @@ def run_into(
         synthesis = runner.design()
         if bills_are_of_old(runner.design_inputs, design_now):
             design_files.renew_bills(folder, synthesis)
+        if routed:
+            route_own_board(folder, synthesis, progress)
         stage = StudyStage(folder, RANDOM, synthesis, options, command(options), progress, shown)
 
         def checked(first: CheckedResponse) -> None:

@@ -2,12 +2,15 @@
 
 Each net takes its cheapest way, at first over others too. Where two meet, the place becomes dearer
 from round to round, until every place has one net: negotiated congestion (McMurchie, Ebeling 1995).
+What is left are ways round places that have become free since: in the end each net is laid anew
+among the others as they lie, and has the cheaper of both ways.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import shapely
@@ -16,9 +19,12 @@ from numpy.typing import NDArray
 from designer.base.progress import doing
 from designer.routing.board_copper import NO_NET, BoardCopper, Copper
 from designer.routing.kernel_router import (
+    BEND,
     BREAK,
+    DIAGONAL,
     FREE,
     HISTORY,
+    STRAIGHT,
     UNIT,
     Tariff,
     conflicts,
@@ -34,6 +40,8 @@ ROUNDS = 100
 """Most rounds of negotiation."""
 PRESSURE, GROWTH, MOST_PRESSURE = 8, 1.4, 4000
 """Of the first round, from round to round, at most; in units of UNIT."""
+TIDYINGS = 2
+"""How often each net is laid anew among the others in the end."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +152,9 @@ class _Negotiation:
                 self._count(net, -1)
                 self.open[net.net] = len(net.starts) - 2
                 self.paths[net.net] = np.zeros(0, dtype=np.int32)
+        self.grid.arrays.history[:] = 0
+        for _, net in product(range(TIDYINGS), self.nets):
+            self._tidy(net)
         paths = {net: _runs(nodes) for net, nodes in self.paths.items()}
         for net in self.nets:
             if self.kinds[net.kind].name == GROUND_KIND:
@@ -172,6 +183,30 @@ class _Negotiation:
         size, left = route(arrays, tariff, self.grid.work, net.starts, net.nodes, self.out)
         self.paths[net.net], self.open[net.net] = self.out[:size].copy(), left
         self._count(net, 1)
+
+    def _tidy(self, net: Terminals) -> None:
+        """Lay a net anew among the others as they lie; the old way stays where it is as good."""
+        before, left = self.paths[net.net], self.open[net.net]
+        self._route(net, MOST_PRESSURE)
+        better = (self.open[net.net], self._cost(net)) < (left, self._cost(net, before))
+        if not better or self._conflicts(net, 0):
+            self._count(net, -1)
+            self.paths[net.net], self.open[net.net] = before, left
+            self._count(net, 1)
+
+    def _cost(self, net: Terminals, nodes: Nodes | None = None) -> int:
+        """What a net's paths cost where nothing is in the way."""
+        nodes = self.paths[net.net] if nodes is None else nodes
+        kind, arrays = self.kinds[net.kind], self.grid.arrays
+        inside = (nodes[:-1] != BREAK) & (nodes[1:] != BREAK)
+        moves = np.where(inside, nodes[1:] - nodes[:-1], 0)
+        via = np.abs(moves) == arrays.places
+        factor = np.where(nodes[:-1] < arrays.places, kind.front, kind.back)
+        straight = np.isin(np.abs(moves), (1, arrays.width))
+        steps = np.where(straight, STRAIGHT, DIAGONAL) * factor // UNIT
+        bends = (moves[1:] != moves[:-1]) & inside[1:] & inside[:-1] & ~via[1:]
+        costs = np.where(via, kind.via, steps)[inside]
+        return int(costs.sum() + BEND * bends.sum())
 
     def _count(self, net: Terminals, sign: int) -> None:
         self.mark += 1

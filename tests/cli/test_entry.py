@@ -186,6 +186,8 @@ def test_folder_holds_what_the_contract_says(
     wanted = {*names.split(), *board.split(), "report.html", "report.md"}
     assert wanted <= set(manifest["files"])
     assert (out / "model.toml").read_text() == SMALL + COARSE_CIRCUIT
+    (placed,) = (out / "kicad").glob("*.kicad_pcb")
+    assert "\t(segment" in placed.read_text("utf-8"), "a run routes its board"
     for name in ("design.json", "tolerance.json"):
         value = _strict((out / name).read_text())
         assert value["format"] == 1
