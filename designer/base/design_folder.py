@@ -40,6 +40,8 @@ DESIGN = "design.json"
 TOLERANCE = "tolerance.json"
 REPORTS = ("report.html", "report.md")
 COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
+MADE_WITH = frozenset({"version", "catalogue"})
+"""Inputs that nobody asks for: what the tool was when a stage was made."""
 BLOCKS = "block-*.parquet"
 """Files of a folder of blocks; others in it are not ours."""
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
@@ -346,12 +348,12 @@ class Folder:
         differ = sorted(k for k in {*stored, *inputs} if stored.get(k) != inputs.get(k))
         stored_text = ", ".join(f"{k} {_short(stored.get(k))}" for k in differ)
         wanted = ", ".join(f"{k} {_short(inputs.get(k))}" for k in differ)
-        raise InputError(
-            self / MANIFEST,
-            f"stages.{stage}.inputs",
-            stored_text,
-            f"{wanted}; or another folder, or --overwrite to replace what manifest.json lists",
+        way = (
+            ": --overwrite makes it anew with what is here now"
+            if MADE_WITH.issuperset(differ)
+            else "; or another folder, or --overwrite to replace what manifest.json lists"
         )
+        raise InputError(self / MANIFEST, f"stages.{stage}.inputs", stored_text, wanted + way)
 
 
 def is_design_folder(path: Path) -> bool:

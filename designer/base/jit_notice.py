@@ -18,13 +18,14 @@ from typing import Any
 
 CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
-    "kernel_completions": "search for parts",
-    "kernel_linear": "search for parts",
-    "kernel_terms": "search for parts",
+    "kernel_completions": "the choice of parts",
+    "kernel_linear": "the choice of parts",
+    "kernel_terms": "the choice of parts",
     "kernel_nodal": "equations of boards",
     "kernel_boards": "circuits",
     "kernel_propagators": "circuits, and models of any size",
     "kernel_sweep": "sweeps",
+    "kernel_router": "tracks of boards",
 }
 """What a kernel's module is for; all others are for ``MOTION``."""
 MOTION = "motion between the stops"

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes
 from designer.base.seal import sha256
+from designer.base.version import __version__
 
 FORMAT = 1
 MANIFEST = "manifest.json"
@@ -157,8 +158,18 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError(path, "the file", type(value).__name__, "a JSON object")
     if value.get("format") != FORMAT:
-        raise InputError(path, "format", value.get("format", MISSING), f"{FORMAT}")
+        raise InputError(path, "format", value.get("format", MISSING), _known(value.get("format")))
     return value
+
+
+def _known(found: object) -> str:
+    """The format that this version reads, and what to do about a newer one."""
+    newer = isinstance(found, int) and found > FORMAT
+    return f"{FORMAT}" + (
+        f": a newer version of designer wrote it, this is {__version__}; install that version"
+        if newer
+        else ""
+    )
 
 
 def read_manifest(path: Path) -> Manifest | None:

@@ -8,11 +8,10 @@ milliseconds a board (``circuit.nodal_bandwidth``), where ngspice takes seconds.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import Stand, Stretched
-from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement
+from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement, agreements
 from designer.verdicts.verdict import Verdict, judge
 
 BANDWIDTH = "bandwidth"
@@ -31,17 +30,8 @@ class LaggingBoards:
         stands: Sequence[Stand | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
-        """For each response; where the nominal board does not show it there is nothing to ask."""
-        out = []
-        for stand in stands:
-            agreement = Agreement(0, 0)
-            if stand is not None:
-                query = [BANDWIDTH, bench.query(stand, range(LISTENED), (STRETCH,))]
-                (counts,) = self._memory.get_all([query], partial(_counted, bench, stand))
-                agreement = Agreement(*counts)
-            out.append(agreement)
-            progress()
-        return tuple(out)
+        """Agreement of each response with the exact circuit; see `ngspice_check.agreements`."""
+        return agreements(self._memory, bench, stands, (BANDWIDTH,), _counted, progress)
 
 
 def _counted(bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:

@@ -66,6 +66,36 @@ Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple
 """Of the boards of a design and its responses' stands; the last is called once a response."""
 
 
+Count = Callable[[Stretched, Stand, Sequence[int]], list[tuple[int, ...]]]
+"""The figures of an `Agreement` for the boards of one response."""
+
+
+def agreements(
+    memory: AnswerCache,
+    bench: Stretched,
+    stands: Sequence[Stand | None],
+    question: Sequence[object],
+    count: Count,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[Agreement, ...]:
+    """What boards with op-amps that take time answer for each response, once for each question.
+
+    stands : of the responses; None where the nominal board does not show one, which leaves nothing
+    to ask. question : plain data that names it, beside the boards. progress : called once a
+    response.
+    """
+    out = []
+    for stand in stands:
+        agreement = Agreement(0, 0)
+        if stand is not None:
+            query = [*question, bench.query(stand, range(LISTENED), (STRETCH,))]
+            (counts,) = memory.get_all([query], partial(count, bench, stand))
+            agreement = Agreement(*counts)
+        out.append(agreement)
+        progress()
+    return tuple(out)
+
+
 class Listener:
     """Asks ngspice, and remembers. pool : where it runs. memory : of the search."""
 
@@ -78,22 +108,9 @@ class Listener:
         stands: Sequence[Stand | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
-        """For each response; where the nominal board does not show it there is nothing to ask."""
-        out = []
-        for stand in stands:
-            agreement = Agreement(0, 0)
-            if stand is not None:
-                query = [
-                    RUNG,
-                    REFINEMENTS,
-                    LONGEST,
-                    bench.query(stand, range(LISTENED), (STRETCH,)),
-                ]
-                (counts,) = self._memory.get_all([query], partial(self._ask, bench, stand))
-                agreement = Agreement(*counts)
-            out.append(agreement)
-            progress()
-        return tuple(out)
+        """Agreement of each response with ngspice; see `agreements`."""
+        question = (RUNG, REFINEMENTS, LONGEST)
+        return agreements(self._memory, bench, stands, question, self._ask, progress)
 
     def _ask(self, bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
         there = bench.subjects(stand, range(LISTENED), STRETCH)

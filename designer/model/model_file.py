@@ -195,7 +195,9 @@ def _check_expected(
     raise InputError(file, field, str(expect), f"p-q for each clearance, as in {shape}{named}")
 
 
-_FORMAT = whole_number("1 or 2, the formats that this version reads", 1, 2)
+_FORMAT = whole_number(
+    "1 or 2, the formats that this version reads; a newer version of designer may know more", 1, 2
+)
 _RULES = such(
     "tables [rules.<id>]",
     lambda value: isinstance(value, dict),

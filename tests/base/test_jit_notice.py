@@ -8,6 +8,7 @@ from numba.core import event
 
 from designer.base.jit_notice import MOTION, PARTS, announced
 from designer.dynamics import kernel_general, kernel_modal, kernel_propagators
+from tests.shared.house import HOUSE
 
 
 def _dispatcher(module: object) -> object:
@@ -40,3 +41,9 @@ def test_each_part_is_announced_once_and_by_name() -> None:
     assert MOTION in said[0]
     assert PARTS["kernel_propagators"] in said[1]
     assert all("first use of this part" in line and "busy machine" in line for line in said)
+
+
+def test_every_kernel_that_is_not_of_motion_is_named() -> None:
+    """What stands outside ``dynamics`` is no motion between the stops."""
+    kernels = [path for path in HOUSE.glob("*/kernel_*.py") if path.parent.name != "dynamics"]
+    assert {path.stem for path in kernels} <= PARTS.keys()

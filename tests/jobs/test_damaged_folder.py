@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,10 @@ import pytest
 
 from designer.base.design_folder import Folder
 from designer.base.seal import BLANK, MARK
-from designer.check import simulation
 from designer.cli import entry as cli
-from designer.jobs import bifurcation_job, cure_job, design_files, rules_job, study_stage
-from designer.jobs.design_source import read_design
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
+from tests.shared.stopped_work import work_stopped
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
@@ -71,21 +68,7 @@ def copied(finished: Finished, tmp_path: Path) -> Path:
 @pytest.fixture
 def work_begins(finished: Finished) -> Iterator[None]:
     """What comes after everything was read stops at once, as by Ctrl-C."""
-
-    def stop(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    made = read_design(finished.path)
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(design_files, "find", lambda *_: made.model_responses)
-        patched.setattr(study_stage, "SpicePool", lambda *_, **__: nullcontext())
-        patched.setattr(study_stage, "require_ngspice", lambda _: None)
-        patched.setattr(study_stage, "checks", stop)
-        patched.setattr(rules_job, "checked", stop)
-        patched.setattr(simulation, "simulate", stop)
-        patched.setattr(bifurcation_job, "_make", stop)
-        patched.setattr(cure_job, "find_cure", stop)
-        patched.setattr("designer.jobs.export_job.kicad_files.texts", stop)
+    with work_stopped(finished.path):
         yield
 
 
