@@ -1,4 +1,5 @@
 from . import (
+    basin_shares as basin_shares,
     basins as basins,
     border_curves as border_curves,
     captions as captions,
@@ -9,8 +10,15 @@ from . import (
     titles as titles,
     window_ends as window_ends,
 )
-from .basins import (
+from .attractor_list import (
     SAME as SAME,
+)
+from .basin_shares import (
+    AttractorShare as AttractorShare,
+    BasinShares as BasinShares,
+    SharePlan as SharePlan,
+)
+from .basins import (
     BasinPlan as BasinPlan,
     Basins as Basins,
 )
@@ -55,6 +63,10 @@ from .points import (
 )
 from .response_region import (
     ResponseRegion as ResponseRegion,
+)
+from .share_store import (
+    ShareBlocks as ShareBlocks,
+    shares_csv as shares_csv,
 )
 from .store import (
     GridStore as GridStore,

@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from designer.base.arrays import Array, Mask
+from designer.base.arrays import Array
 from designer.base.threads import parallel
+from designer.bifurcations.attractor_list import AttractorList
 from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of
 from designer.bifurcations.subject import Subject
-from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course, DrivenSystem
-
-SAME = 1e-5
-"""Of the largest state: strobes of one orbit, from different starts, lie nearer than this."""
 
 
 @dataclass(frozen=True)
@@ -117,35 +113,19 @@ def run(
 
 def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basins:
     """Number the attractors: one orbit, whichever of its strobes a start came to."""
-    flow, weights = setting.flow(), plan.subject.weights
-    distinct: list[tuple[str, bool | None, Array]] = []
-    numbers = np.empty(len(cells), dtype=int)
-    for k, cell in enumerate(cells):
-        x = np.array(cell.strobe)
-        label = (cell.response, cell.symmetric)
-        for number, (response, symmetric, laps) in enumerate(distinct):
-            if (response, symmetric) != label:
-                continue
-            near = _near(laps, x, weights)
-            if cell.status is not OrbitStatus.PERIODIC or near.any():
-                numbers[k] = number
-                break
-        else:
-            periodic = cell.status is OrbitStatus.PERIODIC
-            laps = flow.run(x, cell.n).strobes[:-1] if periodic else x[None]
-            numbers[k] = len(distinct)
-            distinct.append((*label, laps))
+    met = AttractorList(setting.flow(), plan.subject.weights)
+    numbers = np.array([met.number(c, c.symmetric, np.array(c.strobe)) for c in cells])
+    distinct = met.met
     counted = np.bincount(numbers, minlength=len(distinct))
     order = np.argsort(-counted, kind="stable")
     rank = np.empty(len(distinct), dtype=int)
     rank[order] = np.arange(len(distinct))
-    twins = {int(rank[k]): _twin(flow, distinct, k, weights) for k in range(len(distinct))}
+    twins = {int(rank[k]): met.twin(k) for k in range(len(distinct))}
     attractors = tuple(
         Attractor(
             number,
-            distinct[k][0],
-            distinct[k][1],
-            tuple(float(v) for v in distinct[k][2][0]),
+            *distinct[k].label,
+            tuple(float(v) for v in distinct[k].strobes[0]),
             None if twins[number] is None else int(rank[twins[number]]),
             float(counted[k] / len(cells)),
         )
@@ -155,24 +135,3 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
         replace(cell, attractor=int(rank[k])) for cell, k in zip(cells, numbers, strict=True)
     )
     return Basins(plan, named, attractors)
-
-
-def _near(laps: Array, x: Array, weights: Array) -> Mask:
-    """(n,) which strobes of an orbit a state is. weights : as ``Subject`` has them."""
-    away = np.abs(weights * (laps - x)).max(axis=1)
-    return np.asarray(away <= SAME * np.abs(weights * laps).max())
-
-
-def _twin(
-    flow: Flow, distinct: list[tuple[str, bool | None, Array]], k: int, weights: Array
-) -> int | None:
-    """Index of the mirror twin of attractor k among those that are known."""
-    _, symmetric, laps = distinct[k]
-    if flow.system.mirror is None or symmetric is not False:
-        return None
-    n = len(laps)
-    image = flow.run(laps[0], n, points=2).strobes[1:-1:2] @ flow.system.mirror.T
-    for other, (_, _, strobes) in enumerate(distinct):
-        if len(strobes) == n and other != k and _near(strobes, image[0], weights).any():
-            return other
-    return None

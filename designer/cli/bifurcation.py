@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from designer.cli.app import Out, Output, Session, Source, option, verb
+from designer.base.defaults import SEED
+from designer.base.errors import InputError
+from designer.cli.app import Out, Output, Seed, Session, Source, option, verb
 
 
 @verb(
@@ -80,6 +82,15 @@ def bifurcation(
     points: Annotated[
         bool, option("--points/--no-points", None, "Locate the bifurcation points.")
     ] = True,
+    shares: Annotated[
+        int | None,
+        option("--shares", "K", "Count on which attractor K random starts end at every value."),
+    ] = None,
+    box: Annotated[
+        list[str] | None,
+        option("--box", "STATE=A:B", "Draw a state of these starts from A to B; may be repeated."),
+    ] = None,
+    seed: Seed = SEED,
     out: Out = None,
     **shared: Any,
 ) -> Output:
@@ -106,8 +117,25 @@ def bifurcation(
         basins=basins,
         circuit=circuit,
         points=points,
+        shares=shares,
+        box=[_limits(text) for text in box or ()],
+        seed=seed,
         out=out,
         progress=session.progress,
         **shared,
     )
     return Output(result.answer, lambda: bifurcation_tables.show(result.answer, out, result.reused))
+
+
+def _limits(text: str) -> tuple[str, str, str]:
+    """State, least and greatest value of an option such as "x1=-0.5:0.5".
+
+    Raises
+    ------
+    InputError : it has no "=" or no ":".
+    """
+    state, equals, limits = text.partition("=")
+    low, colon, high = limits.partition(":")
+    if not equals or not colon:
+        raise InputError(None, "--box", text, "STATE=A:B, such as x1=-0.5:0.5")
+    return state.strip(), low.strip(), high.strip()

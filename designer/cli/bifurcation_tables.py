@@ -50,11 +50,37 @@ def _sweep(answer: Mapping[str, Any]) -> None:
         say("\nBifurcation points")
         for text in _points(answer["points"][:LONGEST], si):
             say(text)
+    if "shares" in answer:
+        _shares(answer)
     if "curves" in answer:
         _curves(answer)
     if "region" in answer:
         for text in _region(answer):
             say(text)
+
+
+def _shares(answer: Mapping[str, Any]) -> None:
+    """Every attractor that random starts ended on, the largest share of all starts first."""
+    shares, steps = answer["shares"], answer["steps"]
+    attractors = sorted(shares["attractors"], key=lambda a: -sum(s["count"] for s in a["steps"]))
+    largest = [max(a["steps"], key=lambda s: s["count"]) for a in attractors]
+    table(
+        f"Attractors of {shares['starts']} starts at each value",
+        (
+            {
+                "number": str(a["number"]),
+                "responses": ", ".join(dict.fromkeys(s["response"] for s in a["steps"])),
+                "from": f"{a['steps'][0]['value']:.6g}",
+                "to": f"{a['steps'][-1]['value']:.6g}",
+                "share of all": f"{sum(s['share'] for s in a['steps']) / steps:.2%}",
+                "largest share": f"{top['share']:.1%} ({top['low']:.1%} to {top['high']:.1%})",
+                "at": f"{top['value']:.6g}",
+            }
+            for a, top in zip(attractors[:LONGEST], largest, strict=False)
+        ),
+    )
+    if len(attractors) > LONGEST:
+        say(f"and {len(attractors) - LONGEST} rarer ones (--json has them all)")
 
 
 def _curves(answer: Mapping[str, Any]) -> None:

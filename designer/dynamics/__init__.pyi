@@ -94,6 +94,7 @@ from .steady_state import (
     Course as Course,
     DrivenSystem as DrivenSystem,
     Steady as Steady,
+    stopped as stopped,
 )
 from .step_budget import (
     Budget as Budget,

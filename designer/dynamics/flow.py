@@ -209,6 +209,23 @@ class Flow:
                 return result
         return self._run_general(x, stretches, points, key, phi, max_events, room, measure=measure)
 
+    def to_strobe(self, x: Array, phase: float, *, measure: bool = False) -> FlowResult:
+        """Start in state x (n,) at drive phase ``phase`` [rad] and run to the next strobe; by the
+        general kernel. Times of impacts count from the strobe before.
+
+        Raises
+        ------
+        InputError, KeyboardInterrupt : as ``run``; ArithmeticError : no mode holds at the start.
+        """
+        x = np.array(x, dtype=float)
+        _check(x, self.system.size, 1, 1)
+        u = self.drive.offset + self.drive.amplitude * np.sin(phase)
+        key, room = self.system.mode_at(x, u), 24 if measure else 0
+        nothing = np.zeros((0, 0))
+        return self._run_general(
+            x, 1, 1, key, nothing, MAX_EVENTS, room, measure=measure, phase=phase % (2.0 * np.pi)
+        )
+
     def _run_general(
         self,
         x: Array,
@@ -220,10 +237,12 @@ class Flow:
         room: int,
         *,
         measure: bool,
+        phase: float = 0.0,
     ) -> FlowResult:
-        """The same by the general kernel, which builds modes as it meets them."""
-        z, before = np.concatenate([x, [0.0, 1.0, 1.0]]), phi.copy()
-        clock, budget = np.zeros(3), self._budget or Budget()
+        """The same by the general kernel, which builds modes as it meets them. phase : of the drive
+        at the start."""
+        z, before = np.concatenate([x, [np.sin(phase), np.cos(phase), 1.0]]), phi.copy()
+        clock, budget = np.array([phase / self.drive.omega, 0.0, 0.0]), self._budget or Budget()
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
         log = self._log(x, stretches, room)
         # A contact that was already running has an unknown deepest point so far.
@@ -257,7 +276,7 @@ class Flow:
         met = int(clock[1])
         if measure and met > room:  # more impacts than room: again, with room for all
             return self._run_general(
-                x, stretches, points, key, before, max_events, met, measure=True
+                x, stretches, points, key, before, max_events, met, measure=True, phase=phase
             )
         return self._result(code, log, int(cursor[0]), met, self._keys[int(cursor[1])], phi)
 

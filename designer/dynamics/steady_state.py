@@ -144,7 +144,7 @@ def by_flow(flow: Flow, x: Array, course: Course, stops: Stops = UPPER) -> Stead
     if free:
         run = flow.run(state, free)
         if run.status is not FlowStatus.DONE:
-            return _stopped(run.status, state, spent)
+            return stopped(run.status, state, spent)
         state = run.strobes[-1]
     if course.tangents:
         growth = lyapunov(flow, state, None, course.tangents)
@@ -154,7 +154,7 @@ def by_flow(flow: Flow, x: Array, course: Course, stops: Stops = UPPER) -> Stead
     for _ in range(course.keep):
         run = flow.run(strobes[-1], 1, measure=True)
         if run.status is not FlowStatus.DONE:
-            return _stopped(run.status, strobes[-1], spent)
+            return stopped(run.status, strobes[-1], spent)
         strobes.append(run.strobes[-1])
         minima.append(float((run.spans if len(run.spans) else run.extremes)[0, 0]))
         for met, (clearance, side) in zip(velocities, stops, strict=True):
@@ -220,7 +220,8 @@ def _repeats(flow: Flow, strobes: list[Array]) -> bool:
     return any(bool((np.abs(s - strobes[-1]) <= WORTH * peak).all()) for s in earlier)
 
 
-def _stopped(status: FlowStatus, x: Array, spent: int) -> Steady:
+def stopped(status: FlowStatus, x: Array, spent: int) -> Steady:
+    """What a run that came to no end leads to: left at x (states,) after ``spent`` periods."""
     diverged = status is FlowStatus.DIVERGED
     return _nothing(OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED, x, spent)
 

@@ -3,69 +3,38 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from designer.base.arrays import Array
+from designer.base.defaults import SEED
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
-from designer.base.si_unit import Unit
 from designer.base.version import __version__
-from designer.bifurcations import (
-    basins,
-    border_curves,
-    captions,
-    parameter_map,
-    point_captions,
-    response_region,
-    sweep,
-    titles,
-    window_ends,
-)
+from designer.bifurcations import basins, parameter_map
 from designer.bifurcations.basins import BasinPlan
-from designer.bifurcations.border_curves import BorderCurve, CurvePlan
-from designer.bifurcations.curve_store import CurveBlocks, curves_csv
 from designer.bifurcations.parameter_map import MapPlan
-from designer.bifurcations.points import Bifurcation
-from designer.bifurcations.response_region import ResponseRegion
-from designer.bifurcations.store import GridStore, SweepStore, work_hash
+from designer.bifurcations.store import GridStore
 from designer.bifurcations.subject import Subject
-from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
-from designer.dynamics.attractors import settle
-from designer.dynamics.orbit import OrbitStatus
-from designer.jobs.bifurcation_request import (
-    Plan,
-    Request,
-    Swept,
-    curve_plan,
-    plan_of,
-    region_at,
-)
+from designer.jobs.bifurcation_request import Request, Swept, plan_of
+from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
 from designer.jobs.design_source import read_design, source
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
+from designer.jobs.sweep_answer import sweep_answer, sweep_files
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.swept_model import ModelSubject
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Files = dict[str, str | bytes]
-"""Contents of files by name."""
-_Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
-"""What is in the JSON object, what it cost, and what makes the pictures and tables."""
-CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
-"""Tables and pictures of bifurcation curves."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +53,12 @@ class BifurcationResult:
     def curves(self) -> pd.DataFrame:
         """The curves over two parameters, a row each; empty where none were asked for."""
         return frame(self.answer.get("curves", ()))
+
+    def shares(self) -> pd.DataFrame:
+        """The counted basins of a sweep, a row for each attractor at each value; empty where none
+        were asked for."""
+        attractors = self.answer.get("shares", {}).get("attractors", ())
+        return frame([{"attractor": a["number"], **s} for a in attractors for s in a["steps"]])
 
     def points(self) -> pd.DataFrame:
         """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
@@ -121,6 +96,9 @@ def bifurcation(
     basins: bool = False,
     circuit: bool = False,
     points: bool = True,
+    shares: int | None = None,
+    box: Iterable[tuple[str, float | str, float | str]] = (),
+    seed: int = SEED,
     out: Path | str | None = None,
     jobs: int | None = None,
     overwrite: bool = False,
@@ -132,9 +110,11 @@ def bifurcation(
     model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
     texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. ``and_`` : (name,
     from, to) of a second parameter, over which the sweep's points are continued as curves. region :
-    a value of the swept parameter: the region in both parameters of the response there. out : a
-    folder to write into; without one nothing is written. The other words are those of the command
-    line (docs/bifurcations.md).
+    a value of the swept parameter: the region in both parameters of the response there. shares :
+    random starts at each value, of which it is counted on which attractor they end; box : (state,
+    least, greatest) of where they are drawn from; seed : of the draw. out : a folder to write into;
+    without one nothing is written. The other words are those of the command line
+    (docs/bifurcations.md).
 
     Raises
     ------
@@ -158,6 +138,9 @@ def bifurcation(
         basins=basins,
         circuit=circuit,
         points=points,
+        shares=shares,
+        box=tuple(box),
+        seed=seed,
     )
     options = Options(jobs=jobs, overwrite=overwrite, resume=resume)
     options.check()
@@ -176,7 +159,7 @@ def _answer(
     began = time.perf_counter()
     modelfile, subject = _subject(model, request, progress)
     plan = plan_of(request, subject, modelfile)
-    work = _Work(request, plan, modelfile, options.workers, progress)
+    work = BifurcationWork(request, plan, modelfile, options.workers, progress)
     if out is None:
         answer, _ = _make(work, None)
         answer["cost"]["seconds"] = time.perf_counter() - began
@@ -224,165 +207,37 @@ def _subject(
     return modelfile, ModelSubject(modelfile.model, scales=modelfile.si)
 
 
-class _Work:
-    """What is to be computed, and what decides it."""
-
-    def __init__(
-        self, request: Request, plan: Plan, modelfile: ModelFile, jobs: int, progress: Progress
-    ) -> None:
-        self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
-        self.title = modelfile.title
-        self.curves: CurvePlan | None = None
-        self.region: float | None = None
-        more: dict[str, Any] = {}
-        if isinstance(plan, SweepPlan):
-            self.curves = curve_plan(request, plan, modelfile)
-            more = {"points": request.points}
-            more |= {} if self.curves is None else {"and": self.curves.as_dict()}
-            self.region = region_at(request, plan, modelfile)
-            more |= {} if self.region is None else {"region": self.region}
-        decides = {"kind": request.kind, **plan.as_dict(), **more}
-        self.hash = work_hash(decides)
-        self.provenance = provenance(
-            modelfile,
-            load_catalog().hash,
-            seed=0 if request.starts is not None else None,
-            settings={"bifurcation": decides},
-        )
-
-
-def _names(kind: StageName, work: _Work) -> list[str]:
+def _names(kind: StageName, work: BifurcationWork) -> list[str]:
     """Files of a stage."""
     plan = work.plan
     if isinstance(plan, SweepPlan):
-        blocks = [
-            SweepStore.name(track, k)
-            for track in plan.tracks
-            for k in range(len(plan.blocks(track)))
-        ]
+        blocks = sweep_files(work, plan)
     else:
         blocks = [GridStore.name(kind, row) for row in range(len(plan.ys))]
-    if work.curves is not None:
-        blocks += [*CurveBlocks.names(), *CURVE_FILES]
     return [*blocks, f"{kind}.json", f"{kind}.png", f"{kind}.svg"]
 
 
-def _make(work: _Work, folder: Folder | None) -> tuple[dict[str, Any], Callable[[], Files]]:
+def _make(
+    work: BifurcationWork, folder: Folder | None
+) -> tuple[dict[str, Any], Callable[[], Files]]:
     """The JSON object, and what makes the pictures and tables."""
     plan = work.plan
     if isinstance(plan, SweepPlan):
-        body, cost, draw = _sweep(work, plan, folder)
+        body, cost, draw = sweep_answer(work, plan, folder)
     else:
         body, cost, draw = _grid(work, plan, folder)
     head = {"format": 1, "kind": work.request.kind}
     return plain({**head, **body, "provenance": work.provenance, "cost": cost}), draw
 
 
-def _sweep(work: _Work, plan: SweepPlan, folder: Folder | None) -> _Made:
-    from designer.report import bifurcation_plots, curve_plots
-
-    progress, jobs, name = work.progress, work.jobs, plan.parameter
-    store = None
-    if folder is not None:
-        store = SweepStore(
-            folder.path, name, work.hash, work.provenance, progress.note, folder.vouches
-        )
-    blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-    swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
-    points = []
-    if work.request.points:
-        step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
-        points = window_ends.locate(swept, jobs, step)
-    si, unit = plan.subject.si.get(name), plan.subject.units.get(name, "")
-    symbol = titles.NAMES.get(name, name)
-    body = {
-        "parameter": name,
-        "unit": unit,
-        **({} if si is None else {"si_unit": si.name}),
-        "tracks": list(plan.tracks),
-        "steps": len(plan.values),
-        "windows": [_with_si(w.as_dict(), si) for w in swept.windows],
-        "points": [
-            {
-                **_with_si(p.as_dict(), si),
-                "caption": point_captions.caption(p, symbol, unit),
-                "changes": [c.as_dict() for c in captions.changes(swept, p)],
-            }
-            for p in points
-        ],
-    }
-    marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
-    cost = {"periods": swept.periods}
-
-    def files() -> Files:
-        return _image_files("sweep", bifurcation_plots.diagram(swept, marks, work.title))
-
-    if work.curves is None:
-        return body, cost, files
-    curves = _curves(work, work.curves, points, folder)
-    body["and"] = _with_si(
-        {**work.curves.as_dict(), "at": work.curves.at},
-        plan.subject.si.get(work.curves.second),
-    )
-    body["curves"] = [curve.as_dict() for curve in curves]
-    region = _region(work, work.curves, swept)
-    if region is not None:
-        body["region"] = region.as_dict()
-    labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
-
-    def all_files() -> Files:
-        assert work.curves is not None
-        picture = curve_plots.curves(curves, work.curves, work.title, labels, region)
-        table = curves_csv(curves, work.curves.first, work.curves.second)
-        return {**files(), "curves.csv": table, **_image_files("curves", picture)}
-
-    return body, cost, all_files
-
-
-def _region(work: _Work, plan: CurvePlan, swept: Sweep) -> ResponseRegion | None:
-    """The region of the response at the value that was asked for, if one was.
-
-    Raises
-    ------
-    InputError : the sweep shows no periodic response there.
-    """
-    if work.region is None:
-        return None
-    k = int(np.argmin(np.abs(swept.plan.values - work.region)))
-    at = (work.region, plan.at)
-    flows = plan.subject.plane(plan.first, plan.second)
-    orbit = settle(flows.build(*at), next(iter(swept.steps.values()))[k].start)
-    if orbit.status is not OrbitStatus.PERIODIC:
-        expected = f"a value with a periodic response ({orbit.response} there)"
-        raise InputError(None, "--region", work.region, expected)
-    step = work.progress.stage(f"region of {orbit.response}", response_region.RAYS)
-    return response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
-
-
-def _curves(
-    work: _Work, plan: CurvePlan, points: Sequence[Bifurcation], folder: Folder | None
-) -> list[BorderCurve]:
-    """The curves through the sweep's points, or what of them the folder has not."""
-    store = None
-    if folder is not None:
-        store = CurveBlocks(
-            folder.path, work.hash, work.provenance, work.progress.note, folder.vouches
-        )
-    over = f"bifurcation curves over {plan.first} and {plan.second}"
-    step = work.progress.stage(over, border_curves.BLOCKS)
-    return border_curves.run(plan, points, work.jobs, store, step)
-
-
-def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Made:
+def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan, folder: Folder | None) -> Made:
     from designer.report import bifurcation_plots
 
     kind, progress, jobs = work.request.kind, work.progress, work.jobs
     store = None
     if folder is not None:
         axes = (kind, plan.x, plan.xs, plan.y, plan.ys)
-        store = GridStore(
-            folder.path, *axes, work.hash, work.provenance, progress.note, folder.vouches
-        )
+        store = GridStore(folder.path, *axes, *work.keeping(folder))
     step = progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
     body: dict[str, Any] = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),
@@ -394,7 +249,7 @@ def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Mad
         return (
             body,
             {},
-            lambda: _image_files(kind, bifurcation_plots.parameter_map(mapped, work.title)),
+            lambda: image_files(kind, bifurcation_plots.parameter_map(mapped, work.title)),
         )
     plane = basins.run(plan, jobs, store, step)
     body |= {
@@ -402,23 +257,9 @@ def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Mad
         "attractors": [dict(a.__dict__) for a in plane.attractors],
         "cells": [c.attractor for c in plane.cells],
     }
-    return body, {}, lambda: _image_files(kind, bifurcation_plots.basins(plane, work.title))
+    return body, {}, lambda: image_files(kind, bifurcation_plots.basins(plane, work.title))
 
 
 def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:
     axis = {"name": name, "from": values[0], "to": values[-1], "steps": len(values)}
-    return _with_si(axis, subject.si.get(name))
-
-
-def _with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
-    """The row, and the values of the swept quantity in its SI unit too, if it has one."""
-    if unit is None:
-        return row
-    keys = [key for key in ("from", "to", "value") if key in row]
-    return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
-
-
-def _image_files(kind: str, figure: Any) -> Files:
-    from designer.base.figure_style import to_png, to_svg
-
-    return {f"{kind}.png": to_png(figure, 200.0), f"{kind}.svg": to_svg(figure)}
+    return with_si(axis, subject.si.get(name))

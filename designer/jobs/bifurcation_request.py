@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import at_least
+from designer.base.defaults import SEED, at_least
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.schema import one_of
 from designer.bifurcations import parameter_map, sweep
+from designer.bifurcations.basin_shares import SharePlan
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan
@@ -24,6 +25,7 @@ from designer.model.mechanics import check_omega
 from designer.model.model_file import ModelFile
 from designer.model.si_units import Reader
 from designer.model.swept_model import ModelSubject
+from designer.spread import random_streams
 
 MOST_STEPS, MOST_STARTS, MOST_PERIODS = 100_000, 64, 1_000_000
 MOST_CELLS = 4_000_000
@@ -74,6 +76,13 @@ class Request:
     """Whether the circuit is swept, and not the model."""
     points: bool = True
     """Whether bifurcation points are sought."""
+    shares: int | None = None
+    """Number of random starts at each value whose attractors are counted; None for none."""
+    box: tuple[tuple[str, float | str, float | str], ...] = ()
+    """(state, least, greatest) of the box that these starts are drawn from, where it is not the
+    usual one."""
+    seed: int = SEED
+    """Seed of these starts."""
 
     @property
     def kind(self) -> StageName:
@@ -171,6 +180,38 @@ def region_at(request: Request, plan: SweepPlan, modelfile: ModelFile) -> float 
     return value
 
 
+def share_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> SharePlan | None:
+    """The starts that a request counts along its sweep, if any: of a model drawn from the box of
+    ``from_starts``, of a board switched on with discharged capacitors, at any phase of the drive.
+
+    Raises
+    ------
+    InputError : too many of them, a state that is none, or a box without a width below 0.
+    """
+    if request.shares is None:
+        return None
+    subject = plan.subject
+    assert isinstance(subject, ModelSubject | BoardSubject)
+    at_least("--shares", request.shares, 1)
+    if request.shares * len(plan.values) > MOST_CELLS:
+        text = f"{request.shares} starts at {len(plan.values)} values"
+        raise InputError(None, "--shares", text, f"at most {MOST_CELLS} starts in all")
+    ends = [{plan.parameter: float(plan.values[k])} for k in (0, -1)]
+    scale = subject.scale(ends) * (0.0 if isinstance(subject, BoardSubject) else 1.0)
+    box = np.stack([-scale, scale], axis=1)
+    read = _reader(subject, modelfile)
+    for state, *limits in request.box:
+        if state not in subject.states:
+            raise InputError(None, "--box", state, one_of(state, subject.states))
+        low, high = (read.value("--box", state, limit) for limit in limits)
+        if not -np.inf < low <= high < np.inf:
+            raise InputError(None, "--box", f"{state} from {low:g} to {high:g}", "two finite ends")
+        box[subject.states.index(state)] = low, high
+    names = [f"start {name}" for name in (*subject.states, "phase")]
+    numbers = random_streams.cube(request.seed, names, range(request.shares))
+    return SharePlan(subject, plan.parameter, plan.values, box, numbers, request.seed)
+
+
 # ---------------------------------------------------------------------------------------------
 
 
@@ -211,6 +252,10 @@ def _check_options(request: Request) -> None:
     if request.and_ is not None and (request.kind != "sweep" or not request.points):
         expected = "a sweep with its points: none of --map, --basins and --no-points"
         raise InputError(None, "--and", request.and_[0], expected)
+    if request.shares is not None and request.kind != "sweep":
+        raise InputError(None, "--shares", request.shares, "a sweep: none of --map and --basins")
+    if request.box and request.shares is None:
+        raise InputError(None, "--box", request.box[0][0], "a number of starts too: --shares")
     if request.region is not None and request.and_ is None:
         raise InputError(None, "--region", request.region, "a second parameter too: --and")
     if request.periods is not None:

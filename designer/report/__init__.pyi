@@ -10,9 +10,7 @@ from . import (
     system_drawing as system_drawing,
 )
 from .bifurcation_plots import (
-    BLACK as BLACK,
     MARKS as MARKS,
-    RED as RED,
 )
 from .comparison import (
     compare as compare,
@@ -31,6 +29,10 @@ from .record_page import (
 )
 from .record_plots import (
     record_figure as record_figure,
+)
+from .response_colours import (
+    BLACK as BLACK,
+    RED as RED,
 )
 from .write import (
     write_report as write_report,

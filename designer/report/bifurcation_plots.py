@@ -14,7 +14,9 @@ from matplotlib.patches import Patch
 
 from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.bifurcations.basins import SAME, BasinPlan, Basins
+from designer.bifurcations.attractor_list import SAME
+from designer.bifurcations.basin_shares import BasinShares
+from designer.bifurcations.basins import BasinPlan, Basins
 from designer.bifurcations.parameter_map import MapCell, MapPlan, ParameterMap
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
@@ -23,17 +25,19 @@ from designer.bifurcations.titles import NAMES, title
 from designer.dynamics.counts import Counts, read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
+from designer.report.response_colours import (
+    BLACK,
+    CHAOS,
+    DOTS,
+    OPEN,
+    OTHERS,
+    RED,
+    REST,
+    SHADES,
+)
+from designer.report.share_band import share_band
 from designer.report.si_axes import si_x, si_y
 
-BLACK, RED = "#000000", "#d40000"
-OTHERS = (
-    "#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#8c564b", "#f0e442", "#7f3fbf",
-    "#17becf", "#b3de69", "#1f3a5f", "#ff9896", "#8a8d0f", "#c5b0d5",
-)  # fmt: skip
-DOTS = tuple(c for c in OTHERS if c not in ("#f0e442", "#b3de69", "#c5b0d5", "#ff9896"))
-"""Those that are dark enough for small dots."""
-CHAOS, REST, OPEN = "#3a3a3a", "#c9c9c9", "#ffffff"
-"""Of aperiodic motions, of responses too rare for a colour, and of what is not settled."""
 NAMED = 12
 """Responses that get a colour of their own in a map."""
 WIDE = 0.012
@@ -49,10 +53,10 @@ MARKS = {
 }
 Coloured = tuple[str, Array, list[Steady]]
 """Colour, values of the parameter, and the motions there."""
+SHARE_BAND = 1.6
+"""Height of the band of counted basins [inch]."""
 STOP_PANEL = 1.8
 """Height of the panel of each stop past the first [inch]."""
-SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
-"""Of windows of symmetric responses and of others."""
 STRIPS = {DOWN: "↓", UP: "↑"}
 
 
@@ -62,26 +66,35 @@ def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Bifurc
 
 
 @styled
-def diagram(sweep: Sweep, points: Sequence[Bifurcation] = (), name: str = "") -> Figure:
+def diagram(
+    sweep: Sweep,
+    points: Sequence[Bifurcation] = (),
+    name: str = "",
+    shares: BasinShares | None = None,
+) -> Figure:
     """The paper's Fig. 2: least displacement of each period, impact velocity on each stop that the
     subject shows, largest Lyapunov exponent, over the swept parameter; windows named above.
 
-    points : to be marked. name : the model's title.
+    points : to be marked. name : the model's title. shares : counted basins, as a band below.
     """
     plan = sweep.plan
     strips = list(plan.tracks) if plan.followed else ["starts"]
     more = len(plan.subject.stops) - 1
-    figure = new_figure(9.6, 7.6 + 0.24 * len(strips) + STOP_PANEL * more)
-    heights = [0.24] * len(strips) + [2.4, 2.4, *[STOP_PANEL] * more, 1.6]
+    band = [] if shares is None else [SHARE_BAND]
+    figure = new_figure(9.6, 7.6 + 0.24 * len(strips) + STOP_PANEL * more + sum(band))
+    heights = [0.24] * len(strips) + [2.4, 2.4, *[STOP_PANEL] * more, 1.6, *band]
     _head(figure, title(name, plan, 120))
     rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     for axes, track in zip(rows, strips, strict=False):
         track_windows = [w for w in sweep.windows if w.track == track or not plan.followed]
         _strip(axes, track_windows, plan.values, track if len(strips) > 1 else "")
     coloured = _coloured(sweep)
-    panels = rows[len(strips) :]
+    panels = rows[len(strips) : len(rows) - len(band)]
     _clouds(panels, sweep, coloured)
     _diagram_axes(panels, plan)
+    if shares is not None:
+        share_band(rows[-1], shares)
+    _swept_axis(rows[-1], plan)
     handles = _key(sweep, coloured) + _marked(panels, points)
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
     return figure
@@ -125,11 +138,15 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
     for axes in panels:
         axes.grid(True, color=GRID, lw=0.5)
-    span = float(plan.values[-1] - plan.values[0])
-    growth.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
-    growth.set_xlabel(_axis(plan.subject, plan.parameter))
-    si_x(growth, si.get(plan.parameter), below=SECOND_AXIS)
     si_y(least, si.get("x1"))
+
+
+def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
+    """The axis of the swept parameter, below the lowest panel."""
+    span = float(plan.values[-1] - plan.values[0])
+    lowest.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
+    lowest.set_xlabel(_axis(plan.subject, plan.parameter))
+    si_x(lowest, plan.subject.si.get(plan.parameter), below=SECOND_AXIS)
 
 
 def _met(step: Steady, stop: int) -> Array:

@@ -18,6 +18,7 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.cli import entry
 from designer.dynamics import attractors
+from designer.jobs.bifurcation_job import bifurcation
 from designer.jobs.design_files import load
 from designer.model.model_file import read_model_file
 from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
@@ -369,4 +370,55 @@ def test_bad_second_parameter(
     assert entry.status(["bifurcation", str(model), *SWEEP, *words]) == 2
     text = capfd.readouterr().err
     assert "--and" in text or "--region" in text
+    assert part in text
+
+
+def test_counted_basins(model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """In JSON, in a table with limits, in the picture; of starts in a box that was asked for."""
+    out = tmp_path / "out"
+    words = ("--from", "1.45", "--to", "1.55", "--steps", "3", "--no-points")
+    options = ("--shares", "8", "--seed", "5", "--box", "x1=-0.1:0.1", "--out", out)
+    answer = _asked(capfd, model, *words, *options)["shares"]
+    assert (answer["starts"], answer["seed"], answer["box"]["x1"]) == (8, 5, [-0.1, 0.1])
+    rows = [step for a in answer["attractors"] for step in a["steps"]]
+    by_value = [sum(r["count"] for r in rows if r["value"] == v) for v in (1.45, 1.5, 1.55)]
+    assert by_value == [8, 8, 8]
+    assert all(r["low"] <= r["share"] <= r["high"] for r in rows)
+    header, *lines = (out / "shares.csv").read_text().splitlines()
+    assert header.startswith("omega,attractor,response,symmetric,twin,count,starts,share,low,high,")
+    assert len(lines) == len(rows)
+    assert "shares.csv" in json.loads((out / "manifest.json").read_text())["files"]
+    assert len(bifurcation(model, from_=1.5, to=1.55, steps=2, points=False, shares=4).shares()) > 1
+
+
+def test_boards_are_switched_on_at_any_phase(
+    design: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    modelfile = read_model_file(design / "model.toml")
+    scales = load(Folder(design), modelfile, load_catalog()).design.errors.scales
+    ends = ["--from", repr(scales.frequency(0.84)), "--to", repr(scales.frequency(0.86))]
+    words = [*ends, "--steps", "2", "--periods", "100", "--no-points", "--shares", "3"]
+    answer = _asked(capfd, design, "--circuit", *words)["shares"]
+    assert all(limits == [0.0, 0.0] for limits in answer["box"].values())
+    assert sum(step["count"] for a in answer["attractors"] for step in a["steps"]) == 6
+    assert answer["attractors"][0]["steps"][0]["response"] == "1-2-2"
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("--shares", "0"), ">= 1"),
+        (("--shares", "9", "--basins"), "a sweep"),
+        (("--box", "x1=0:1"), "--shares"),
+        (("--shares", "9", "--box", "x1=1"), "STATE=A:B"),
+        (("--shares", "9", "--box", "x9=0:1"), "x1"),
+        (("--shares", "9", "--box", "x1=1:0"), "two finite ends"),
+    ],
+)
+def test_bad_starts(
+    model: Path, capfd: pytest.CaptureFixture[str], words: tuple[str, ...], part: str
+) -> None:
+    assert entry.status(["bifurcation", str(model), *SWEEP, *words]) == 2
+    text = capfd.readouterr().err
+    assert "--shares" in text or "--box" in text
     assert part in text

@@ -1,0 +1,173 @@
+"""A sweep of the verb ``bifurcation``: its points, counted basins, curves and regions, as JSON,
+tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from designer.base.design_folder import Folder
+from designer.base.errors import InputError
+from designer.bifurcations import (
+    basin_shares,
+    border_curves,
+    captions,
+    point_captions,
+    response_region,
+    sweep,
+    titles,
+    window_ends,
+)
+from designer.bifurcations.basin_shares import BasinShares
+from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.curve_store import CurveBlocks, curves_csv
+from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.response_region import ResponseRegion
+from designer.bifurcations.share_store import ShareBlocks, shares_csv
+from designer.bifurcations.store import SweepStore
+from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import OrbitStatus
+from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
+
+CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
+"""Tables and pictures of bifurcation curves."""
+
+
+def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
+    """Names of the files beside ``sweep.json`` and its pictures."""
+    names = [
+        SweepStore.name(track, k) for track in plan.tracks for k in range(len(plan.blocks(track)))
+    ]
+    if work.shares is not None:
+        names += [*ShareBlocks.names(work.shares), "shares.csv"]
+    if work.curves is not None:
+        names += [*CurveBlocks.names(), *CURVE_FILES]
+    return names
+
+
+def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) -> Made:
+    """The sweep, its points, and what else was asked for along it."""
+    progress, jobs, name = work.progress, work.jobs, plan.parameter
+    store = None
+    if folder is not None:
+        store = SweepStore(folder.path, name, *work.keeping(folder))
+    blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
+    swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
+    points = []
+    if work.request.points:
+        step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
+        points = window_ends.locate(swept, jobs, step)
+    si, unit = plan.subject.si.get(name), plan.subject.units.get(name, "")
+    symbol = titles.NAMES.get(name, name)
+    body = {
+        "parameter": name,
+        "unit": unit,
+        **({} if si is None else {"si_unit": si.name}),
+        "tracks": list(plan.tracks),
+        "steps": len(plan.values),
+        "windows": [with_si(w.as_dict(), si) for w in swept.windows],
+        "points": [
+            {
+                **with_si(p.as_dict(), si),
+                "caption": point_captions.caption(p, symbol, unit),
+                "changes": [c.as_dict() for c in captions.changes(swept, p)],
+            }
+            for p in points
+        ],
+    }
+    shares = _shares(work, folder)
+    pictures: list[Callable[[], Files]] = [lambda: _diagram(work, swept, points, shares)]
+    if shares is not None:
+        body["shares"] = shares.as_dict()
+        pictures.append(lambda: {"shares.csv": shares_csv(shares)})
+    if work.curves is not None:
+        curves = _curves(work, work.curves, points, folder)
+        body["and"] = with_si(
+            {**work.curves.as_dict(), "at": work.curves.at},
+            plan.subject.si.get(work.curves.second),
+        )
+        body["curves"] = [curve.as_dict() for curve in curves]
+        region = _region(work, work.curves, swept)
+        if region is not None:
+            body["region"] = region.as_dict()
+        pictures.append(lambda: _curve_files(work, swept, curves, region))
+
+    def files() -> Files:
+        return {name: content for each in pictures for name, content in each().items()}
+
+    return body, {"periods": swept.periods}, files
+
+
+def _diagram(
+    work: BifurcationWork,
+    swept: Sweep,
+    points: Sequence[Bifurcation],
+    shares: BasinShares | None,
+) -> Files:
+    """Pictures of the sweep."""
+    from designer.report import bifurcation_plots
+
+    values = swept.plan.values
+    marks = bifurcation_plots.marks(points, float(values[0]), float(values[-1]))
+    return image_files("sweep", bifurcation_plots.diagram(swept, marks, work.title, shares))
+
+
+def _curve_files(
+    work: BifurcationWork,
+    swept: Sweep,
+    curves: Sequence[BorderCurve],
+    region: ResponseRegion | None,
+) -> Files:
+    """Table and pictures of the curves."""
+    from designer.report import curve_plots
+
+    assert work.curves is not None
+    labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
+    picture = curve_plots.curves(curves, work.curves, work.title, labels, region)
+    table = curves_csv(curves, work.curves.first, work.curves.second)
+    return {"curves.csv": table, **image_files("curves", picture)}
+
+
+def _shares(work: BifurcationWork, folder: Folder | None) -> BasinShares | None:
+    """The counted basins along the sweep, if they were asked for."""
+    plan, store = work.shares, None
+    if plan is None:
+        return None
+    if folder is not None:
+        store = ShareBlocks(folder.path, plan.parameter, *work.keeping(folder))
+    step = work.progress.stage(f"{len(plan.numbers)} starts at each value", len(plan.values))
+    return basin_shares.run(plan, work.jobs, store, step)
+
+
+def _region(work: BifurcationWork, plan: CurvePlan, swept: Sweep) -> ResponseRegion | None:
+    """The region of the response at the value that was asked for, if one was.
+
+    Raises
+    ------
+    InputError : the sweep shows no periodic response there.
+    """
+    if work.region is None:
+        return None
+    k = int(np.argmin(np.abs(swept.plan.values - work.region)))
+    at = (work.region, plan.at)
+    flows = plan.subject.plane(plan.first, plan.second)
+    orbit = settle(flows.build(*at), next(iter(swept.steps.values()))[k].start)
+    if orbit.status is not OrbitStatus.PERIODIC:
+        expected = f"a value with a periodic response ({orbit.response} there)"
+        raise InputError(None, "--region", work.region, expected)
+    step = work.progress.stage(f"region of {orbit.response}", response_region.RAYS)
+    return response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
+
+
+def _curves(
+    work: BifurcationWork, plan: CurvePlan, points: Sequence[Bifurcation], folder: Folder | None
+) -> list[BorderCurve]:
+    """The curves through the sweep's points, or what of them the folder has not."""
+    store = None
+    if folder is not None:
+        store = CurveBlocks(folder.path, *work.keeping(folder))
+    over = f"bifurcation curves over {plan.first} and {plan.second}"
+    step = work.progress.stage(over, border_curves.BLOCKS)
+    return border_curves.run(plan, points, work.jobs, store, step)
