@@ -63,6 +63,10 @@ from .kernel_orbit import (
     CHAOS as CHAOS,
     FOUND as FOUND,
 )
+from .kernel_sweep import (
+    ALIGN as ALIGN,
+    SPAN as SPAN,
+)
 from .modal_tables import (
     WORST_RESONANCE as WORST_RESONANCE,
     Oscillators as Oscillators,
