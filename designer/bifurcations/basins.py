@@ -124,7 +124,8 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
     attractors = tuple(
         Attractor(
             number,
-            *distinct[k].label,
+            distinct[k].motion.response,
+            distinct[k].symmetric,
             tuple(float(v) for v in distinct[k].strobes[0]),
             None if twins[number] is None else int(rank[twins[number]]),
             float(counted[k] / len(cells)),

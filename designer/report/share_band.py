@@ -90,7 +90,8 @@ def _colours(shares: BasinShares) -> dict[int, str]:
 
 
 def _pale(colour: str) -> str:
-    return to_hex([c + PALE * (1.0 - c) for c in to_rgb(colour)])
+    red, green, blue = (c + PALE * (1.0 - c) for c in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 def _names(

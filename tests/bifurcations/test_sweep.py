@@ -25,7 +25,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course, Steady, by_flow
 from designer.model.swept_model import ModelSubject
-from designer.report import bifurcation_plots
+from designer.report import bifurcation_plots, response_colours
 from tests.dynamics.test_modal_tables import PAPER
 
 SHORT, QUICK = Course(200, 20, 2000), Course(40, 16, 400)
@@ -142,11 +142,11 @@ def test_only_a_mirror_image_is_red() -> None:
     first, second = steps([o.start for o in orbits]), steps([t.start for t in twins if t])
     made = Sweep(plan, {"start 0": first, "start 1": second})
     colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
-    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.RED}
+    assert colours == {response_colours.BLACK, response_colours.RED}
     other = tuple(replace(s, start=1.01 * s.start, minima=1.01 * s.minima) for s in first)
     made = Sweep(plan, {"start 0": first, "start 1": other})
     colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
-    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.DOTS[0]}
+    assert colours == {response_colours.BLACK, response_colours.DOTS[0]}
 
 
 def test_starts_show_what_coexists() -> None:
