@@ -5,7 +5,8 @@ Newton's method on the n-period map and accept only what converged, is stable, l
 settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800,
 4000 periods in all). Newton at once would be faster and wrong: it also lands on unstable orbits and
 on other attractors. What has neither a short period nor chaos after 800 periods is looked at for
-longer periods, and after 4000 for whether it has settled at all.
+longer periods, and after 4000 for whether it has settled at all: if not, once more after the many
+periods over which a small growth is measured.
 """
 
 from __future__ import annotations
@@ -101,6 +102,12 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         spent += BLOCK * len(growth.rates)
         if growth.value > SURE * growth.error:
             return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
+        run = flow.run(growth.start, STAGES[-1], mode=growth.mode)
+        found, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
+        spent += len(run.strobes) - 1 + cost
+        if found is not None:
+            return replace(found, periods=spent)
+        still = run.status is FlowStatus.DONE and is_stationary(run.strobes)
     why = "quasi-periodic, or of a longer period" if still else "very slow"
     return _unperiodic(
         OrbitStatus.APERIODIC if still else OrbitStatus.NOT_SETTLED,

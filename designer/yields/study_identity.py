@@ -15,7 +15,7 @@ from designer.verdicts import cross_check, ngspice_runs
 from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
-    "samples": 2,
+    "samples": 3,
     "ngspice": 4,
     "tuned": 3,
     "reached": 3,

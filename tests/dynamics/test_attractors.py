@@ -145,6 +145,18 @@ def test_an_undamped_motion_has_settled_without_a_period() -> None:
     assert (slow.status, slow.reason.endswith("very slow")) == (OrbitStatus.NOT_SETTLED, True)
 
 
+@pytest.mark.slow
+def test_a_period_beyond_all_that_are_looked_for_has_settled_however_slowly() -> None:
+    """Between period 96 and 192 of a cascade: 4000 periods do not settle it, 20 000 more do."""
+    omega = 0.43496306152343756
+    orbit = settle(flow_at(omega), REST)
+    assert (orbit.status, "longer period" in orbit.reason) == (OrbitStatus.APERIODIC, True)
+    strobes = flow_at(omega).run(orbit.start, 2000, mode=orbit.mode).strobes
+    off = [np.abs(strobes[n:] - strobes[:-n]).max() for n in range(1, 193)]
+    assert off[-1] < 1e-8
+    assert min(off[:LONG_PERIOD]) > 1e-5
+
+
 @given(
     turn=st.floats(0.01, 0.49), radius=st.sampled_from([1.0, 0.9995, 0.999]), seed=st.integers(0, 9)
 )
