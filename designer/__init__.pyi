@@ -17,6 +17,9 @@ from .check.simulation import (
 from .check.synthesis_result import (
     Synthesis as Synthesis,
 )
+from .explorer.server import (
+    explore as explore,
+)
 from .jobs.bench_job import (
     BenchAnswer as BenchAnswer,
     bench as bench,

@@ -84,6 +84,7 @@ from .sweep import (
     Sweep as Sweep,
     SweepPlan as SweepPlan,
     Window as Window,
+    next_start as next_start,
 )
 from .titles import (
     NAMES as NAMES,

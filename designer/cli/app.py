@@ -22,7 +22,7 @@ from designer.base.version import __version__
 
 VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules bench "
-    "reproduce catalog new".split()
+    "explore reproduce catalog new".split()
 )
 GROUPS = ("Design", "Study", "Explore", "Make")
 """The headings of the verbs in the help, in their order."""

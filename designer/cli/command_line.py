@@ -10,10 +10,10 @@ import typer.core
 import typer.main
 
 from designer.base.errors import InputError
-from designer.cli import bifurcation, tools, verbs
+from designer.cli import bifurcation, explore, tools, verbs
 from designer.cli.app import VERBS, app
 
-REGISTERED = (verbs, bifurcation, tools)
+REGISTERED = (verbs, bifurcation, explore, tools)
 """The modules of the verbs: importing one registers what it has."""
 
 

@@ -9,6 +9,7 @@ from . import (
     working_modes as working_modes,
 )
 from .attractors import (
+    ENGINE_ERROR as ENGINE_ERROR,
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     coexisting as coexisting,
     describe as describe,

@@ -14,6 +14,9 @@ from . import (
 from .design_files import (
     load as load,
 )
+from .design_source import (
+    source as source,
+)
 from .export_job import (
     export as export,
 )

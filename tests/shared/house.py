@@ -33,6 +33,7 @@ ORDER = (
     "workbench",
     "report",
     "jobs",
+    "explorer",
     "paper",
     "examples",
     "cli",

@@ -1,0 +1,6 @@
+from . import (
+    server as server,
+)
+from .server import (
+    explore as explore,
+)

@@ -1,0 +1,208 @@
+"""What the page shows of one place: the attractor, drawn, and its figures in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.dynamics.attractors import ENGINE_ERROR, settle
+from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.step_budget import Budget
+from designer.explorer.place import SHOWN, ModelPlace, start_text, words_of
+from designer.explorer.wire import Message, columns
+from designer.model.driven import model_flow
+from designer.model.mechanics import SecondOrderSystem
+from designer.model.relative_motion import (
+    RelativeMotion,
+    relative_motions,
+    state_labels,
+    subscripted,
+)
+
+STEPS = 4_000_000
+"""Steps that one picture may take, a fifth of ``step_budget.SETTLING``: under a second."""
+POINTS, FEWEST, MOST = 2048, 96, 768
+"""Points of a whole trace, and the fewest and the most in a drive period."""
+LONG, STROBES = 24, 160
+"""Drive periods that are drawn, and strobes, of a motion without a period."""
+
+
+@dataclass(frozen=True)
+class ShownMotion:
+    """A displacement that can be drawn: that in a clearance, or that of a mass."""
+
+    motion: RelativeMotion
+    """Its row and its stops."""
+    clearance: int | None
+    """Index of the clearance; None of a mass."""
+
+    @property
+    def label(self) -> str:
+        """What the list of displacements calls it."""
+        return self.motion.label
+
+
+def shown_motions(system: SecondOrderSystem) -> tuple[ShownMotion, ...]:
+    """Those in the clearances in their order, then the absolute ones of all masses."""
+    gaps = [
+        ShownMotion(motion, k if system.clearances else None)
+        for k, motion in enumerate(relative_motions(system))
+    ]
+    rows = [each.motion.row.tolist() for each in gaps if not system.base]
+    masses = [
+        ShownMotion(_of_mass(system, mass), None)
+        for mass in range(system.size)
+        if np.eye(system.size)[mass].tolist() not in rows
+    ]
+    return (*gaps, *masses)
+
+
+def _of_mass(system: SecondOrderSystem, mass: int) -> RelativeMotion:
+    name = system.names[mass] if system.names else ""
+    row = np.eye(system.size)[mass]
+    return RelativeMotion(subscripted(f"x{mass + 1}"), name, row, system.base, ())
+
+
+@dataclass(frozen=True)
+class ResponseView:
+    """The attractor at a place, with what is drawn of it."""
+
+    place: ModelPlace
+    """The place."""
+    orbit: Orbit
+    """The attractor that its start leads to."""
+    motion: ShownMotion
+    """What is drawn."""
+    time: Array
+    """(k,) drive periods since the start of what is drawn."""
+    displacement: Array
+    """(k,) displacement that is drawn."""
+    velocity: Array
+    """(k,) its velocity."""
+    strobes: Array
+    """(j, 2) displacement and velocity at drive phase 0."""
+    impacts: Array
+    """(i, 3) of the impacts in the clearance that is drawn: drive periods, displacement,
+    velocity."""
+
+    def message(self) -> Message:
+        """What the page draws and writes."""
+        t, x, v = self.impacts.T
+        return {
+            "kind": "view",
+            "words": words_of(self.place),
+            "start": start_text(tuple(self.orbit.start.tolist())),
+            "response": self.orbit.response,
+            "period": self.orbit.n,
+            "summary": summary(self.orbit),
+            "facts": facts(self.orbit, self.place),
+            "axes": {"x": self.motion.motion.symbol, "v": self.motion.motion.rate},
+            "stops": list(self.motion.motion.gaps),
+            "data": {
+                "trace": columns({"t": self.time, "x": self.displacement, "v": self.velocity}),
+                "strobes": columns({"x": self.strobes[:, 0], "v": self.strobes[:, 1]}),
+                "impacts": columns({"t": t, "x": x, "v": v}),
+            },
+        }
+
+
+def respond(place: ModelPlace) -> ResponseView:
+    """The attractor that the start of a place leads to.
+
+    Raises
+    ------
+    InputError : there is no such displacement to be shown.
+    """
+    system = place.model.second_order()
+    motions = shown_motions(system)
+    if place.shown >= len(motions):
+        raise InputError(None, SHOWN, place.shown, f"a whole number from 0 to {len(motions) - 1}")
+    flow = model_flow(place.model, place.omega)
+    orbit = settle(flow, place.state, budget=Budget(STEPS))
+    return view_of(place, flow, orbit, motions[place.shown])
+
+
+def view_of(place: ModelPlace, flow: Flow, orbit: Orbit, shown: ShownMotion) -> ResponseView:
+    """What is drawn of an orbit that is known."""
+    periods = max(orbit.n, 2) if orbit.n else LONG
+    points = int(np.clip(POINTS // periods, FEWEST, MOST))
+    time, states = _trace(flow, orbit, periods, points)
+    drawn = shown.motion.of(time * flow.drive.period, states, place.omega)
+    laps = orbit.n or STROBES
+    at, where = _trace(flow, orbit, laps, 1)
+    strobes = shown.motion.of(at * flow.drive.period, where, place.omega)[: max(laps, 1)]
+    impacts = _impacts(flow, orbit, shown)
+    return ResponseView(place, orbit, shown, time, drawn[:, 0], drawn[:, 1], strobes, impacts)
+
+
+def _trace(flow: Flow, orbit: Orbit, periods: int, points: int) -> tuple[Array, Array]:
+    """Drive periods (k,) and states (k, states) from the orbit's start; empty where it has none."""
+    if not len(orbit.start):
+        return np.zeros(0), np.zeros((0, flow.system.size))
+    with flow.within(Budget(STEPS)):
+        run = flow.run(orbit.start, periods, mode=orbit.mode or None, points=points)
+    if run.status is not FlowStatus.DONE:
+        return np.zeros(0), np.zeros((0, flow.system.size))
+    return np.arange(len(run.strobes)) / points, run.strobes
+
+
+def _impacts(flow: Flow, orbit: Orbit, shown: ShownMotion) -> Array:
+    """Those of one clearance over n periods; none of a motion without a period."""
+    here = orbit.impact_clearances == shown.clearance
+    places = dict(shown.motion.stops)
+    sides = [places.get(int(side), np.nan) for side in orbit.impact_sides[here]]
+    times = orbit.impact_times[here] / flow.drive.period
+    return np.stack([times, np.array(sides), orbit.impact_velocities[here]], axis=1)
+
+
+def summary(orbit: Orbit) -> str:
+    """The response in words, for the head of the page and for who listens to it."""
+    if orbit.status is not OrbitStatus.PERIODIC:
+        return f"{orbit.response}: {orbit.reason}" if orbit.reason else orbit.response
+    words = {True: "symmetric", False: "asymmetric", None: "symmetry not known"}
+    return f"{orbit.response}, {words[orbit.symmetric]}"
+
+
+def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
+    """Figures of an orbit, each with its name."""
+    rows = [("response", orbit.response)]
+    if orbit.n:
+        symmetric = {True: "yes", False: "no", None: "not known"}[orbit.symmetric]
+        rows += [("period", f"{orbit.n} of the drive"), ("symmetric", symmetric)]
+        rows.append(("multipliers", multipliers_text(orbit.multipliers)))
+        rows.append(("largest |μ|", f"{orbit.radius:.4g}"))
+    rows.append(("λ max", exponent_text(orbit)))
+    if len(orbit.extremes):
+        names = state_labels(place.model.second_order())[0::2]
+        for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):
+            rows.append((name, f"{low:.4g} … {high:.4g}"))
+    if np.isfinite(orbit.penetration):
+        rows.append(("shallowest contact", f"{orbit.penetration:.3g}"))
+    if np.isfinite(orbit.miss):
+        rows.append(("nearest miss", f"{orbit.miss:.3g}"))
+    return rows
+
+
+def multipliers_text(multipliers: Sequence[complex] | np.ndarray) -> str:
+    """Floquet multipliers, the largest first; a conjugate pair once, with ±."""
+    kept = [mu for mu in sorted(multipliers, key=lambda mu: (-abs(mu), -mu.imag)) if mu.imag >= 0.0]
+    return ", ".join(_multiplier(complex(mu)) for mu in kept) or "none"
+
+
+def _multiplier(mu: complex) -> str:
+    if abs(mu.imag) <= ENGINE_ERROR * abs(mu):
+        return f"{mu.real:.3g}"
+    return f"{mu.real:.3g} ± {mu.imag:.3g}i"
+
+
+def exponent_text(orbit: Orbit) -> str:
+    """The largest Lyapunov exponent, with its error where it was measured."""
+    if not np.isfinite(orbit.lyapunov):
+        return "not known"
+    error = orbit.lyapunov_error
+    return f"{orbit.lyapunov:.3g}" + (f" ± {error:.1g}" if np.isfinite(error) else "")

@@ -1,0 +1,286 @@
+"""The server of the page, and the verb ``explore``."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import json
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
+from tornado.netutil import bind_sockets
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.explorer.omega_strip import strip
+from designer.explorer.page import ASSETS, asset, page
+from designer.explorer.place import read_place
+from designer.explorer.response_view import respond
+from designer.explorer.wire import Message, text_of
+from designer.explorer.work_queue import DEFECT, WorkQueue
+from designer.jobs.design_source import source
+from designer.model.model_file import ModelFile, read_model_file
+
+PORT = 8610
+"""Port where none is asked for; another one where it is taken."""
+LOOPBACK = "127.0.0.1"
+LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
+"""Addresses that no other machine reaches, and names by which a browser may call them."""
+LARGEST = 65_536
+"""Bytes of one message from a page."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+TYPES = {"css": "text/css", "js": "text/javascript", "html": "text/html"}
+
+
+@dataclass(frozen=True)
+class Explorer:
+    """What all pages of one server share."""
+
+    modelfile: ModelFile
+    """The model that is looked at."""
+    queue: WorkQueue
+    """The thread that computes."""
+    root: Path
+    """The folder below which it writes."""
+    host: str
+    """Address that the server is bound to."""
+    token: str
+    """What a page has to know; "" where any page on this machine may ask."""
+
+    @property
+    def local(self) -> bool:
+        """Whether only this machine reaches the server."""
+        return self.host in LOCAL
+
+
+def explore(
+    model: Path | str | ModelFile,
+    *,
+    port: int | None = None,
+    host: str = LOOPBACK,
+    token: str | None = None,
+    browser: bool = True,
+    progress: Progress | None = None,
+    ready: Callable[[str], None] = lambda _: None,
+) -> None:
+    """The verb ``explore``: serve a page on which sliders move the model's parameters, until
+    Ctrl-C.
+
+    model : a model file or a design folder. port : ``PORT``, or any free one where that is taken.
+    host : the address to listen at. token : what a page from another machine has to know; without
+    one it is drawn. browser : open the page. ready : is given the page's address. What a page asks
+    to be written goes below the folder that this was started in.
+
+    Raises
+    ------
+    InputError : a model that cannot be read, a port that is taken, an address that is none here.
+    """
+    progress = Progress() if progress is None else progress
+    modelfile = _model(model)
+    if token is None:
+        token = "" if host in LOCAL else secrets.token_urlsafe(16)
+    sockets = _sockets(host, port)
+    number = sockets[0].getsockname()[1]
+    address = _address(host, number, token)
+
+    def report(error: BaseException) -> None:
+        progress.note(f"a page's question failed: {type(error).__name__}: {error}")
+
+    explorer = Explorer(modelfile, WorkQueue(report), Path.cwd(), host, token)
+
+    def started() -> None:
+        progress.note(f"{address} shows {modelfile.title}; Ctrl-C ends it")
+        if browser:
+            webbrowser.open(address)
+        ready(address)
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(_serve(explorer, sockets, started))
+    explorer.queue.close()
+
+
+def application(explorer: Explorer) -> Application:
+    """The pages and the socket of a server."""
+    with_explorer = {"explorer": explorer}
+    names = "|".join(name.replace(".", r"\.") for name in ASSETS)
+    return Application(
+        [
+            ("/", _Page, with_explorer),
+            (f"/({names})", _Asset, with_explorer),
+            ("/socket", _Socket, with_explorer),
+        ],
+        websocket_max_message_size=LARGEST,
+        websocket_ping_interval=20,
+        log_function=lambda _: None,
+    )
+
+
+def _model(model: Path | str | ModelFile) -> ModelFile:
+    if isinstance(model, ModelFile):
+        return model
+    path = Path(model)
+    return source(path, path)[0] if path.is_dir() else read_model_file(path)
+
+
+def _sockets(host: str, port: int | None) -> list[socket.socket]:
+    """Listening sockets; any free port where none is asked for and the usual one is taken."""
+    for number in (PORT, 0) if port is None else (port,):
+        try:
+            return bind_sockets(number, host)
+        except OSError as error:
+            reason = error.strerror or str(error)
+        except OverflowError:
+            raise InputError(None, "--port", port, "a number from 0 to 65535") from None
+    where = f"{host} port {PORT if port is None else port} ({reason})"
+    raise InputError(None, "--host, --port", where, "an address of this machine and a free port")
+
+
+def _address(host: str, port: int, token: str) -> str:
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+
+
+async def _serve(
+    explorer: Explorer, sockets: list[socket.socket], started: Callable[[], None]
+) -> None:
+    server = HTTPServer(application(explorer), max_body_size=LARGEST)
+    server.add_sockets(sockets)
+    started()
+    try:
+        await asyncio.Event().wait()
+    finally:
+        server.stop()
+
+
+class _Guarded(RequestHandler):
+    """A request that is answered only where it may be."""
+
+    open_to_all = False
+
+    def initialize(self, explorer: Explorer) -> None:
+        self.explorer = explorer
+
+    def prepare(self) -> None:
+        """Refuse a name that another site gave this machine, and a page without the token."""
+        name = self.request.host_name
+        if self.explorer.local and name not in LOCAL:
+            raise HTTPError(403, "this server is asked under another name than it has")
+        if not self.open_to_all and not self._knows():
+            raise HTTPError(403, "the address needs ?token=… as the terminal shows it")
+
+    def _knows(self) -> bool:
+        token = self.explorer.token
+        if not token:
+            return True
+        given = self.get_query_argument("token", "") or self.get_cookie(self._cookie, "") or ""
+        return hmac.compare_digest(given.encode("utf-8"), token.encode("utf-8"))
+
+    @property
+    def _cookie(self) -> str:
+        """Cookies are one for all ports of a host."""
+        return f"explore_{self.request.connection.stream.socket.getsockname()[1]}"  # type: ignore[union-attr]
+
+    def set_default_headers(self) -> None:
+        self.set_header("Content-Security-Policy", POLICY)
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("Cache-Control", "no-cache")
+        self.clear_header("Server")
+
+    def write_error(self, status_code: int, **words: Any) -> None:
+        """One line of text; never a traceback."""
+        error = words.get("exc_info", (None, None, None))[1]
+        reason = error.log_message if isinstance(error, HTTPError) and error.log_message else None
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(reason or (DEFECT if status_code >= 500 else "there is nothing here"))
+
+
+class _Page(_Guarded):
+    def get(self) -> None:
+        if self.explorer.token:
+            self.set_cookie(
+                self._cookie, self.explorer.token, httponly=True, samesite="Strict", path="/"
+            )
+        self.write(page(self.explorer.modelfile))
+
+
+class _Asset(_Guarded):
+    open_to_all = True
+
+    def get(self, name: str) -> None:
+        self.set_header("Content-Type", f"{TYPES[name.rsplit('.')[-1]]}; charset=utf-8")
+        self.write(asset(name))
+
+
+class _Socket(WebSocketHandler, _Guarded):
+    """One open page."""
+
+    def open(self, *_: str) -> None:
+        self.set_nodelay(True)
+        self._loop = IOLoop.current()
+
+    def on_message(self, message: str | bytes) -> None:
+        asked = read_question(message)
+        if asked is None:
+            self.close(1003, "a question of another kind")
+            return
+        number, words = asked
+        modelfile = self.explorer.modelfile
+
+        def answer() -> Iterator[Message]:
+            return answers(modelfile, words)
+
+        self.explorer.queue.ask(self, number, answer, self._send)
+
+    def on_close(self) -> None:
+        self.explorer.queue.forget(self)
+
+    def _send(self, message: Message) -> None:
+        """From the queue's thread."""
+        self._loop.add_callback(self._write, text_of(message))
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(WebSocketClosedError):
+            self.write_message(text)
+
+
+def read_question(text: str | bytes) -> tuple[int, dict[str, object]] | None:
+    """The number and the words of a page's question; None where it is none."""
+    try:
+        asked = json.loads(text)
+    except ValueError:
+        return None
+    if not isinstance(asked, dict) or asked.get("kind") != "view":
+        return None
+    number, words = asked.get("id"), asked.get("words")
+    if not isinstance(number, int) or not isinstance(words, dict):
+        return None
+    return number, words
+
+
+def answers(modelfile: ModelFile, words: dict[str, object]) -> Iterator[Message]:
+    """The messages about the place that these words give: its view, then pieces of the strip.
+
+    Raises
+    ------
+    InputError : words that give no place.
+    """
+    place = read_place(modelfile, words)
+    view = respond(place)
+    yield view.message()
+    if len(view.orbit.start):
+        yield from strip(place, view.orbit.start)

@@ -1,0 +1,277 @@
+"use strict";
+// The page of `designer explore`. What it asks goes through a `line`: a socket to the server, or
+// the recording that a saved page carries.
+(() => {
+  const PERIODS = ["#888888", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
+    "#a06a00", "#7a5ccf"];
+  const OPEN = "#bbbbbb";
+  const STEPS = 2000;
+  const page = JSON.parse(document.getElementById("page").textContent);
+  const by = (id) => document.getElementById(id);
+  const root = document.documentElement;
+
+  // --- controls -------------------------------------------------------------------------------
+  const controls = [...document.querySelectorAll(".control")].map((box) => {
+    const d = box.dataset;
+    const c = { name: d.name, low: +d.low, high: +d.high, own: d.value, log: d.log === "1",
+      unit: d.unit, field: box.querySelector(".number"), slider: box.querySelector(".slider") };
+    c.at = (place) => {
+      const part = place / STEPS;
+      return c.log ? c.low * (c.high / c.low) ** part : c.low + (c.high - c.low) * part;
+    };
+    c.place = (value) => {
+      const part = c.log ? Math.log(value / c.low) / Math.log(c.high / c.low)
+        : (value - c.low) / (c.high - c.low);
+      return Math.round(STEPS * Math.min(1, Math.max(0, part)));
+    };
+    c.show = (text) => {
+      c.text = text;
+      if (document.activeElement !== c.field) c.field.value = short(text);
+      const value = Number(text);
+      if (Number.isFinite(value)) c.slider.value = c.place(value);
+      c.slider.setAttribute("aria-valuetext", `${short(text)} ${c.unit}`.trim());
+      c.field.removeAttribute("aria-invalid");
+    };
+    c.slider.addEventListener("input", () => {
+      const text = String(Number(c.at(+c.slider.value).toPrecision(6)));
+      c.field.value = text;
+      c.show(text);
+      want();
+    });
+    c.field.addEventListener("change", () => { c.text = c.field.value.trim(); c.asked = true; want(); });
+    return c;
+  });
+  const named = Object.fromEntries(controls.map((c) => [c.name, c]));
+  const short = (text) => {
+    const value = Number(text);
+    return Number.isFinite(value) && text.length > 9 ? String(Number(value.toPrecision(7))) : text;
+  };
+
+  // --- the state, which the address holds -----------------------------------------------------
+  let start = "";
+  const words = () => {
+    const out = {};
+    for (const c of controls) if (c.text !== c.own) out[c.name] = c.text;
+    if (by("shown").value !== "0") out.shown = by("shown").value;
+    if (by("follow").checked && start) out.start = start;
+    return out;
+  };
+  const address = () => {
+    const query = new URLSearchParams(words());
+    if (by("follow").checked) query.set("follow", "1");
+    const text = query.toString();
+    return text ? `?${text}` : location.pathname;
+  };
+  const readAddress = () => {
+    const query = new URLSearchParams(location.search);
+    for (const c of controls) c.show(query.get(c.name) ?? c.own);
+    by("shown").value = query.get("shown") ?? "0";
+    by("follow").checked = query.has("follow");
+    start = query.get("start") ?? "";
+  };
+
+  // --- asking: one question is under way; of those behind it only the newest is kept ------------
+  let number = 0, underWay = 0, wanted = false, asked = 0;
+  const want = () => { asked = performance.now(); wanted = true; pump(); };
+  const pump = () => {
+    if (!wanted || underWay || !line.open) return;
+    wanted = false;
+    underWay = ++number;
+    line.ask({ kind: "view", id: number, words: words() });
+  };
+  const notice = (text) => { by("notice").textContent = text; by("notice").hidden = !text; };
+
+  const heard = (message) => {
+    if (message.id !== undefined && message.id < number) return;
+    (handlers[message.kind] ?? (() => {}))(message);
+    if (message.id === underWay && message.first) {
+      underWay = 0;
+      // Bokeh paints in the next frame; what is put behind that frame comes after the picture.
+      requestAnimationFrame(() => setTimeout(() => {
+        root.dataset.drawn = message.id;
+        root.dataset.latency = (performance.now() - asked).toFixed(1);
+        pump();
+      }));
+    }
+  };
+  const handlers = {
+    view(message) {
+      notice("");
+      start = message.start;
+      const typing = document.activeElement;
+      for (const [name, text] of Object.entries(message.words)) {
+        const c = named[name];
+        if (c && (c.asked || Number(c.text) !== Number(text))) {
+          c.asked = false;
+          c.text = text;
+          c.show(text);
+          if (typing === c.field) c.field.value = short(text);
+        }
+      }
+      for (const c of controls) c.field.removeAttribute("aria-invalid");
+      by("summary").textContent = message.summary;
+      const list = document.querySelector("#facts dl");
+      list.replaceChildren(...message.facts.flatMap(([name, text]) => {
+        const pair = [document.createElement("dt"), document.createElement("dd")];
+        pair[0].textContent = name;
+        pair[1].textContent = text;
+        return pair;
+      }));
+      for (const name of ["portrait", "trace"]) {
+        by(name).setAttribute("aria-label", `${name}: ${message.summary}`);
+      }
+      draw(message);
+      history.replaceState(null, "", address());
+    },
+    strip(message) {
+      if (stripOf !== message.id) stripData = empty();
+      stripOf = message.id;
+      const data = unpacked(message.data);
+      const colours = [...data.period].map((n) => (n < 0 ? OPEN : PERIODS[n] ?? PERIODS[0]));
+      stripData = { omega: joined(stripData.omega, data.omega), x: joined(stripData.x, data.x),
+        colour: stripData.colour.concat(colours) };
+      later();
+    },
+    error(message) {
+      notice(message.text);
+      const name = controls.find((c) => message.text.startsWith(`${c.name}:`)
+        || message.text.startsWith(`model.${c.name}:`));
+      if (name) name.field.setAttribute("aria-invalid", "true");
+    },
+  };
+  const settled = () => { wanted = true; pump(); };
+
+  // --- plots ----------------------------------------------------------------------------------
+  const unpacked = (data) => Object.fromEntries(Object.entries(data).map(([name, packed]) => {
+    const bytes = Uint8Array.from(atob(packed.f4), (c) => c.charCodeAt(0));
+    return [name, new Float32Array(bytes.buffer)];
+  }));
+  const joined = (a, b) => {
+    const out = new Float32Array(a.length + b.length);
+    out.set(a);
+    out.set(b, a.length);
+    return out;
+  };
+  const empty = () => ({ omega: new Float32Array(0), x: new Float32Array(0), colour: [] });
+  let stripData = empty(), stripOf = 0, timer = 0;
+  const later = () => { // a piece comes every few milliseconds; nobody sees so many pictures
+    timer ||= setTimeout(() => { timer = 0; fill("strip", stripData); }, 120);
+  };
+  let views = {};
+  const model = (name) => {
+    for (const view of Object.values(views)) {
+      const found = view.model.document?.get_model_by_name(name);
+      if (found) return found;
+    }
+    return null;
+  };
+  const fill = (name, data) => {
+    for (const view of Object.values(views)) {
+      const source = view.model.document.get_model_by_name(name);
+      if (source) source.data = data;
+    }
+  };
+  const draw = (message) => {
+    for (const [name, data] of Object.entries(message.data)) fill(name, unpacked(data));
+    fill("stops", { at: message.stops });
+    const omega = Number(message.words.omega);
+    fill("now", { at: [omega] });
+    const range = views.strip.model.x_range;
+    range.setv({ start: omega * 0.84, end: omega * 1.16 });
+    const label = (plot, place, text) => {
+      const axis = plot[place][0];
+      if (axis.axis_label !== text) axis.axis_label = text;
+    };
+    label(views.portrait.model, "below", message.axes.x);
+    label(views.portrait.model, "left", message.axes.v);
+    label(views.trace.model, "left", message.axes.x);
+  };
+  const colour = () => {
+    const style = getComputedStyle(root);
+    const [ink, edge, muted] = ["--ink", "--edge", "--muted"].map((v) => style.getPropertyValue(v).trim());
+    for (const view of Object.values(views)) {
+      for (const each of view.model.document._all_models.values()) {
+        if (each.type.endsWith("Axis")) {
+          each.setv({ axis_label_text_color: ink, major_label_text_color: muted,
+            axis_line_color: muted, major_tick_line_color: muted, minor_tick_line_color: edge });
+        }
+        if (each.type === "Grid") each.setv({ grid_line_color: edge, grid_line_alpha: 0.5 });
+        if (each.type === "Figure") each.setv({ outline_line_color: edge });
+      }
+    }
+  };
+  const goThere = (view, name, event) => {
+    const area = view.el.getBoundingClientRect();
+    const x = view.frame.x_scale.invert(event.clientX - area.left);
+    if (!Number.isFinite(x) || x <= 0) return;
+    named[name].show(String(Number(x.toPrecision(6))));
+    want();
+  };
+  const embed = async () => {
+    Bokeh.set_log_level("error");
+    for (const [name, item] of Object.entries(page.plots)) {
+      const made = await Bokeh.embed.embed_item(item, name);
+      views[name] = made.get_by_id?.(item.root_id) ?? [...made][0];
+    }
+    const place = by("strip");
+    let down = null;
+    place.addEventListener("pointerdown", (e) => { down = [e.clientX, e.clientY]; }, true);
+    place.addEventListener("pointerup", (e) => {
+      const still = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 4;
+      if (still) goThere(views.strip, "omega", e);
+    }, true);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", colour);
+    colour();
+    by("palette").replaceChildren(...[1, 2, 3, 4, 5, 6, 7, 8, 0].map((n) => {
+      const item = document.createElement("span");
+      const dot = document.createElement("span");
+      dot.className = "dot";
+      dot.style.background = PERIODS[n];
+      item.append(dot, n ? String(n) : "none");
+      return item;
+    }));
+  };
+
+  // --- the line to the server -----------------------------------------------------------------
+  const socket = () => {
+    let wire = null, wait = 300;
+    const line = {
+      open: false,
+      ask: (message) => wire.send(JSON.stringify(message)),
+    };
+    const connect = () => {
+      wire = new WebSocket(location.href.replace(/^http/, "ws").replace(/[?#].*$/, "") + "socket");
+      wire.onopen = () => {
+        line.open = true;
+        wait = 300;
+        underWay = 0;
+        notice("");
+        root.dataset.line = "open";
+        settled();
+      };
+      wire.onmessage = (event) => heard(JSON.parse(event.data));
+      wire.onclose = () => {
+        line.open = false;
+        root.dataset.line = "closed";
+        notice("The server does not answer. The page goes on by itself when it is there again.");
+        setTimeout(connect, wait);
+        wait = Math.min(2 * wait, 4000);
+      };
+    };
+    line.connect = connect;
+    return line;
+  };
+  const line = socket();
+
+  by("shown").addEventListener("change", want);
+  by("follow").addEventListener("change", want);
+  by("reset").addEventListener("click", () => {
+    start = "";
+    by("follow").checked = false;
+    for (const c of controls) c.show(c.own);
+    want();
+  });
+  window.addEventListener("popstate", () => { readAddress(); want(); });
+  readAddress();
+  embed().then(() => line.connect());
+})();

@@ -1,0 +1,175 @@
+"""The page in a real browser: sliders, address, reload, reconnection, and who can use it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.explorer.served import EXAMPLES, served
+
+pytestmark = pytest.mark.browser
+WAIT = 60_000.0
+"""Milliseconds that a picture may take on a machine that is busy with all other tests."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
+        )
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("explore")
+    with served(EXAMPLES / "paper.toml", folder, "--port", "0") as place:
+        yield place
+    assert list(folder.iterdir()) == []
+
+
+def opened(browser: Browser, address: str, **options: object) -> Page:
+    """A page whose first picture is drawn, and which has no error."""
+    page = browser.new_page(**options)  # type: ignore[arg-type]
+    page.set_default_timeout(WAIT)
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
+    page.goto(address)
+    page.wait_for_selector("html[data-drawn]")
+    return page
+
+
+def summary(page: Page, text: str) -> None:
+    page.wait_for_function(
+        "text => document.getElementById('summary').textContent.startsWith(text)", arg=text
+    )
+
+
+def query(page: Page) -> dict[str, list[str]]:
+    return parse_qs(urlsplit(page.url).query)
+
+
+def drawn(page: Page, source: str, column: str) -> int:
+    """How many points of a column the plots have."""
+    return int(
+        page.evaluate(
+            """([source, column]) => Math.max(...Bokeh.documents.map((d) =>
+              d.get_model_by_name(source)?.data[column].length ?? 0))""",
+            [source, column],
+        )
+    )
+
+
+def test_a_slider_moves_the_picture_and_the_address_keeps_it(
+    browser: Browser, address: str
+) -> None:
+    page = opened(browser, address)
+    summary(page, "1-1-1, symmetric")
+    page.fill("[data-name=omega] .number", "0.85")
+    page.press("[data-name=omega] .number", "Enter")
+    summary(page, "1-2-2")
+    assert drawn(page, "trace", "x") > 500
+    page.wait_for_function(
+        "() => Bokeh.documents.some((d) => d.get_model_by_name('strip')?.data.x.length > 1000)"
+    )
+    page.focus("[data-name=zeta] .slider")
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function("() => new URLSearchParams(location.search).has('zeta')")
+    zeta = query(page)["zeta"]
+    assert query(page)["omega"] == ["0.85"]
+    assert 0.1 < float(zeta[0]) < 0.101
+    page.reload()
+    summary(page, "1-2-2")
+    assert float(page.input_value("[data-name=zeta] .number")) == float(zeta[0])
+    page.click("#reset")
+    summary(page, "1-1-1")
+    page.wait_for_function("() => location.search === ''")
+    page.close()
+
+
+def test_what_is_typed_wrong_is_named_and_the_picture_stays(browser: Browser, address: str) -> None:
+    page = opened(browser, address)
+    page.fill("[data-name=k0] .number", "<b>1.5")
+    page.press("[data-name=k0] .number", "Enter")
+    page.wait_for_selector("#notice:not([hidden])")
+    assert "k0" in page.inner_text("#notice")
+    assert page.get_attribute("[data-name=k0] .number", "aria-invalid") == "true"
+    summary(page, "1-1-1")
+    page.fill("[data-name=k0] .number", "0.9")
+    page.press("[data-name=k0] .number", "Enter")
+    page.wait_for_selector("#notice", state="hidden")
+    page.close()
+
+
+def test_the_motion_is_followed_into_hysteresis(browser: Browser, address: str) -> None:
+    """At ω = 0.62 from rest there is chaos; a start that is in the address is kept by a reload."""
+    page = opened(browser, address)
+    page.check("#follow")
+    page.wait_for_function("() => new URLSearchParams(location.search).has('start')")
+    start = query(page)["start"]
+    page.reload()
+    summary(page, "1-1-1")
+    kept = [float(x) for x in query(page)["start"][0].split(",")]
+    assert kept == pytest.approx([float(x) for x in start[0].split(",")], abs=1e-9)
+    page.close()
+
+
+def test_two_tabs_do_not_disturb_each_other(browser: Browser, address: str) -> None:
+    one, two = opened(browser, address), opened(browser, f"{address}?omega=0.85")
+    summary(two, "1-2-2")
+    one.fill("[data-name=omega] .number", "0.54")
+    one.press("[data-name=omega] .number", "Enter")
+    summary(one, "1-3-3")
+    summary(two, "1-2-2")
+    one.close()
+    two.close()
+
+
+def test_a_click_on_the_diagram_goes_there(browser: Browser, address: str) -> None:
+    page = opened(browser, address)
+    page.locator("#strip").click(position={"x": 250.0, "y": 80.0})
+    page.wait_for_function("() => new URLSearchParams(location.search).has('omega')")
+    assert 1.3 < float(query(page)["omega"][0]) < 1.5
+    page.close()
+
+
+def test_the_page_goes_on_when_the_server_is_there_again(browser: Browser, tmp_path: Path) -> None:
+    model = EXAMPLES / "three-masses.toml"
+    with served(model, tmp_path, "--port", "0") as address:
+        page = opened(browser, f"{address}?omega=0.8")
+        summary(page, "1-2-2;1-0")
+        port = str(urlsplit(address).port)
+    page.wait_for_selector("html[data-line=closed]")
+    assert "does not answer" in page.inner_text("#notice")
+    page.fill("[data-name=omega] .number", "1.2")
+    page.press("[data-name=omega] .number", "Enter")
+    with served(model, tmp_path, "--port", port):
+        summary(page, "1-1-1;1-0")
+        page.wait_for_selector("#notice", state="hidden")
+        assert page.locator(".control").count() == 22
+        page.select_option("#shown", index=1)
+        page.wait_for_function("() => new URLSearchParams(location.search).get('shown') === '1'")
+        page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1300])
+def test_everybody_can_use_it(browser: Browser, address: str, scheme: str, width: int) -> None:
+    """No rule of accessibility is broken, nothing is wider than the page, plots follow the dark."""
+    size = {"width": width, "height": 844}
+    page = opened(browser, address, viewport=size, color_scheme=scheme)
+    results = Axe().run(page)
+    assert results.violations_count == 0, results.generate_report()
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    ink = page.evaluate(
+        """() => { for (const m of Bokeh.documents[0]._all_models.values())
+             if (m.type === 'LinearAxis') return m.axis_label_text_color; }"""
+    )
+    assert (ink == "#1a1a1a") == (scheme == "light")
+    page.close()

@@ -1,0 +1,98 @@
+"""The words of the page's address: what they mean, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, strategies as st
+
+from designer import InputError, ModelFile, parse_model_file, read_model_file
+from designer.explorer.controls import controls
+from designer.explorer.place import first_place, read_place, words_of
+from tests.shared.model_text import PAPER_TABLE
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FILES = ("paper", "three-masses", "hammer-base", "backlash", "aberdeen")
+
+
+def file(name: str) -> ModelFile:
+    return read_model_file(EXAMPLES / f"{name}.toml")
+
+
+PAPER = file("paper")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_words_of_a_place_give_it_again(name: str) -> None:
+    modelfile = file(name)
+    place = first_place(modelfile)
+    changes: dict[str, Any] = {each: 1.01 * place.model.parameter(each) for each in ("b",)}
+    size = 2 * place.model.second_order().size
+    changes |= {"omega": "0.9", "start": ",".join(["0.125"] * size), "shown": 1}
+    if name in ("hammer-base",):
+        changes["omega"] = "90"
+    moved = read_place(modelfile, changes)
+    assert read_place(modelfile, words_of(moved)) == moved
+    assert moved.omega == float(changes["omega"])
+    assert moved.state.tolist() == [0.125] * size
+    assert read_place(modelfile, {}) == place
+
+
+@given(omega=st.floats(0.01, 100.0), zeta=st.floats(1e-3, 10.0))
+def test_no_digit_is_lost(omega: float, zeta: float) -> None:
+    place = read_place(PAPER, {"omega": repr(omega), "zeta": zeta})
+    assert (place.omega, place.model.parameter("zeta")) == (omega, zeta)
+    assert read_place(PAPER, words_of(place)) == place
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        ({"k0": "1.5"}, "k0"),
+        ({"omega": "nan"}, "omega"),
+        ({"omega": "-1"}, "omega"),
+        ({"omega": "1e9"}, "omega"),
+        ({"zeta": "inf"}, "zeta"),
+        ({"zeta": "0.1; rm -rf /"}, "zeta"),
+        ({"zeta": ["0.1"]}, "zeta"),
+        ({"zeta": True}, "zeta"),
+        ({"../../etc/passwd": "1"}, "address"),
+        ({"omega": "10 Hz"}, "omega"),
+        ({"start": "1,2,3"}, "start"),
+        ({"start": "1,2,3,nan"}, "start"),
+        ({"start": "1,2,3,1e300"}, "start"),
+        ({"shown": "-1"}, "shown"),
+        ({"shown": "1e1"}, "shown"),
+    ],
+)
+def test_what_is_no_place_is_refused(words: dict[str, object], field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_place(PAPER, words)
+    assert caught.value.field.removeprefix("model.") == field
+
+
+def test_a_value_may_carry_its_unit() -> None:
+    place = read_place(file("hammer-base"), {"omega": "12 Hz"})
+    assert place.omega == pytest.approx(75.398, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_parameter_has_a_slider_and_both_its_ends_can_be_had(name: str) -> None:
+    modelfile = file(name)
+    each = controls(modelfile)
+    place = first_place(modelfile)
+    assert sorted(c.name for c in each) == sorted(["omega", *place.model.parameters])
+    assert each[0].name == "omega"
+    for control in each:
+        assert control.low <= control.value <= control.high, control.name
+        assert not control.logarithmic or control.low > 0.0
+        if not control.name.endswith((".damping", ".upper", ".lower")):  # one alone may not do
+            for value in (control.low, control.high):
+                read_place(modelfile, {control.name: value})
+
+
+def test_a_file_that_wants_nothing_is_looked_at_where_the_model_resonates() -> None:
+    modelfile = parse_model_file(f"format = 1\n{PAPER_TABLE}")
+    assert first_place(modelfile).omega == 1.0
