@@ -17,6 +17,11 @@ from .deck_runs import (
     response_runs as response_runs,
     simulator_notes as simulator_notes,
 )
+from .motion_record import (
+    PowerSpectrum as PowerSpectrum,
+    power_spectrum as power_spectrum,
+    section as section,
+)
 from .simulation import (
     Engine as Engine,
     Simulated as Simulated,

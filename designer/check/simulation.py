@@ -25,7 +25,7 @@ from designer.check.synthesis_result import Synthesis, synthesise
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.netlist import Excitation
-from designer.circuit.nominal import Trace, circuit_flow, trace_of
+from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import coexisting, settle, starts as sobol_starts
 from designer.dynamics.counts import MAX_PERIOD
@@ -88,6 +88,8 @@ class Simulated:
     """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()
     """Where asked, the orbit and its twin over their periods, each from its start."""
+    record: Trace | None = None
+    """Where traces are asked, the orbit over many periods if it has none; not of ngspice."""
     trust: Trust = field(default_factory=Trust)
     """What is known of the orbit's error."""
     coexistence: Coexistence | None = None
@@ -239,7 +241,8 @@ def _on_model(
         tuple(twins),
         r.b,
         settings=_exact_settings(flow, orbits[0], 1.0),
-        traces=_traces(flow, (orbits[0], twins[0]), units, 1.0) if traces else (),
+        traces=traces_of(flow, (orbits[0], twins[0]), units, 1.0) if traces else (),
+        record=record_of(flow, orbits[0], units, 1.0) if traces else None,
         trust=trust.of_orbit(flow, orbits[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model)) for o in orbits),
@@ -290,17 +293,6 @@ def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
     return {"kernel": flow.kernel, "undecided_below": attractors.ENGINE_ERROR * peak / unit}
 
 
-def _traces(
-    flow: Flow, orbits: Sequence[Orbit | None], volts: Array, seconds: float
-) -> tuple[Trace, ...]:
-    """Traces of the orbits in model units; none of what has no start."""
-    return tuple(
-        trace_of(flow, orbit, volts, seconds)
-        for orbit in orbits
-        if orbit is not None and len(orbit.start)
-    )
-
-
 def _circuit_orbits(
     synthesis: Synthesis, spec: Response, scan: bool
 ) -> tuple[ModelResponse, Flow, list[Orbit]]:
@@ -345,7 +337,8 @@ def _on_circuit(
         tuple(None if t is None else design.in_model_units(t, volts) for t in twins.values()),
         r.b,
         settings=_exact_settings(flow, measured[0], float(volts[design.moving])),
-        traces=_traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+        traces=traces_of(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+        record=record_of(flow, measured[0], volts, seconds) if traces else None,
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),

@@ -81,8 +81,10 @@ from .nominal import (
     nominal_reduction as nominal_reduction,
     on_circuit as on_circuit,
     reached as reached,
+    record_of as record_of,
     response_flow as response_flow,
     trace_of as trace_of,
+    traces_of as traces_of,
 )
 from .packing import (
     QUAD as QUAD,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,8 @@ TRACE_POINTS = 1024
 
 SHOWN_PERIODS = 30
 """Drive periods of a trace of a response without a period."""
+RECORD_PERIODS, RECORD_POINTS = 2048, 64
+"""Drive periods of a record of one, and points in each of them."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,32 @@ def response_flow(design: Design, response: ModelResponse) -> Flow:
 def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
     """An orbit over its n periods in model units; from rest where it has no start."""
     periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
+    return _trace(flow, orbit, volts, seconds, periods, TRACE_POINTS)
+
+
+def traces_of(
+    flow: Flow, orbits: Iterable[Orbit | None], volts: Array, seconds: float
+) -> tuple[Trace, ...]:
+    """Traces of orbits; none of what has no start."""
+    return tuple(
+        trace_of(flow, orbit, volts, seconds)
+        for orbit in orbits
+        if orbit is not None and len(orbit.start)
+    )
+
+
+def record_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace | None:
+    """A motion without a period over ``RECORD_PERIODS``, for its section and its spectrum; None of
+    any other."""
+    if orbit.status is not OrbitStatus.APERIODIC or not len(orbit.start):
+        return None
+    return _trace(flow, orbit, volts, seconds, RECORD_PERIODS, RECORD_POINTS)
+
+
+def _trace(
+    flow: Flow, orbit: Orbit, volts: Array, seconds: float, periods: int, points: int
+) -> Trace:
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
-    run = flow.run(start, periods, mode=orbit.mode or None, points=TRACE_POINTS)
-    time = np.arange(len(run.strobes)) * flow.drive.period / TRACE_POINTS
+    run = flow.run(start, periods, mode=orbit.mode or None, points=points)
+    time = np.arange(len(run.strobes)) * flow.drive.period / points
     return Trace(time / seconds, run.strobes / volts)

@@ -1,4 +1,5 @@
-"""Pictures of ``simulate --plots``: phase portrait and time trace of each response.
+"""Pictures of ``simulate --plots``: phase portrait, time trace, Poincaré section and power spectrum
+of each response, the last two as tables too.
 
 Each has a panel for the displacement in each clearance. Black is the orbit that was found, red its
 mirror twin where it is not its own; shaded is contact with a stop. The names are fixed by the
@@ -38,13 +39,19 @@ from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.relative_motion import RelativeMotion
 from designer.model.si_units import NO_UNITS
+from designer.report.response_colours import BLACK, RED
+from designer.report.section_plots import (
+    section_csv,
+    section_figure,
+    spectrum_csv,
+    spectrum_figure,
+)
 from designer.report.si_axes import si_x, si_y
 
 DIGITS = 12
 """Of a frequency in a file's name, at most."""
 FORMATS = ("png", "svg")
 FOLDER = "a directory that can be written"
-BLACK, RED = "#000000", "#d40000"
 LEAST_PERIODS = 2
 """A time trace shows at least so many drive periods."""
 MOST_PERIODS = 8
@@ -82,7 +89,8 @@ def check(folder: Path, stems: Sequence[str], overwrite: bool) -> None:
         raise InputError(above, "--plots", "a file", FOLDER)
     if not os.access(above, os.W_OK | os.X_OK):
         raise InputError(above, "--plots", "no right to write", FOLDER)
-    for name in (_file(s, k, f) for s in stems for k in KINDS for f in FORMATS):
+    kinds = [(k, f) for k in KINDS for f in FORMATS] + [(k, "csv") for k in TABLES]
+    for name in (_file(s, *kind) for s in stems for kind in kinds):
         path = folder / name
         if path.is_dir() and not path.is_symlink():
             raise InputError(path, "--plots", "a directory", "a name that is free")
@@ -114,6 +122,10 @@ def write(
                 names.append(_file(stem, kind, form))
                 with appearing(folder / names[-1], "--plots", FOLDER) as partial:
                     partial.write_bytes(picture(figure, form, 200.0))
+        for kind, table in TABLES.items() if response.traces else ():
+            names.append(_file(stem, kind, "csv"))
+            with appearing(folder / names[-1], "--plots", FOLDER) as partial:
+                partial.write_text(table(response), encoding="utf-8")
     return names
 
 
@@ -211,7 +223,10 @@ def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str
 KINDS: dict[str, Callable[[Simulated, Mapping[str, Unit]], Figure]] = {
     "phase": portrait,
     "time": time_trace,
+    "section": section_figure,
+    "spectrum": spectrum_figure,
 }
+TABLES: dict[str, Callable[[Simulated], str]] = {"section": section_csv, "spectrum": spectrum_csv}
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLACK, "zorder": 3, "ls": "-"},
     {"color": RED, "zorder": 2, "ls": "-"},

@@ -121,7 +121,7 @@ def test_without_stops(tmp_path: Path, capfd: Captured) -> None:
     out = tmp_path / "p"
     (r,) = _answer(["simulate", model, "--omega", "1", "--plots", str(out)], capfd)["responses"]
     assert (r["response"], r["impacts"], r["miss"]) == ("1-0-0", [], None)
-    assert len(list(out.iterdir())) == 4
+    assert len(list(out.iterdir())) == 10
 
 
 def test_chattering_ends_with_a_status(
@@ -156,14 +156,14 @@ def test_pictures(tmp_path: Path, capfd: Captured) -> None:
     wanted = {
         f"omega-{w}-{kind}.{form}"
         for w in ("1.43", "0.85")
-        for kind in ("phase", "time")
+        for kind in ("phase", "time", "section", "spectrum")
         for form in ("png", "svg")
-    }
+    } | {f"omega-{w}-{k}.csv" for w in ("1.43", "0.85") for k in ("section", "spectrum")}
     assert set(files) == wanted == {p.name for p in out.iterdir()}
     for path in out.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
     # Black and red where there are twins, black alone where there are none.
-    for kind in ("phase", "time"):
+    for kind in ("phase", "time", "section"):
         assert "#d40000" in (out / f"omega-1.43-{kind}.svg").read_text()
         plain = (out / f"omega-0.85-{kind}.svg").read_text()
         assert "#d40000" not in plain

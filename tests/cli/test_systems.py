@@ -99,7 +99,7 @@ def test_several_masses_and_clearances(file: str, capfd: Captured, tmp_path: Pat
         assert head in table
     assert "twin)" not in table  # unequal stops have no mirror
     assert sorted(path.name for path in plots.glob("*.svg")) == [
-        "omega-2-phase.svg", "omega-2-time.svg",
+        "omega-2-phase.svg", "omega-2-section.svg", "omega-2-spectrum.svg", "omega-2-time.svg",
     ]  # fmt: skip
     assert len((plots / "omega-2-phase.svg").read_text("utf-8")) > 1000
     (r,) = answer_of(capfd, "simulate", file, "--starts", "2")["responses"]
