@@ -322,6 +322,7 @@ def rules(answer: Mapping[str, Any]) -> None:
                 "limit": r["limit"] + (" (model file)" if r["reason"] else ""),
             }
             for r in rows
+            if r["status"] != NOT_RUN
         ),
     )
     for r in rows:
@@ -332,9 +333,14 @@ def rules(answer: Mapping[str, Any]) -> None:
             say(f"{r['id']} fails: {r['do']}")
     count = answer["counts"]
     say(f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")
-    idle = [r["id"] for r in rows if r["status"] == NOT_RUN]
+    idle: dict[str, list[str]] = defaultdict(list)
+    for r in rows:
+        if r["status"] == NOT_RUN:
+            idle[r["found"]].append(r["id"])
     if idle:
-        say(f"Not run is no pass. Rules that were not looked at: {', '.join(idle)}")
+        say("Not run is no pass. Rules that were not looked at:")
+    for why, ids in idle.items():
+        say(f"  {why}: {', '.join(ids)}")
 
 
 def benched(answer: Mapping[str, Any]) -> None:
@@ -420,14 +426,14 @@ def exported(folder: Path, reused: bool, refused: Sequence[str], answer: Mapping
     """Where the files are and how a board was routed, or why an order is refused."""
     if refused:
         say("\n".join(["No order is written, since the board is not finished:", *refused]))
-    else:
+    elif "routing" not in answer:
         files(folder, reused)
     if "dsn" in answer:
         say(f"{answer['dsn']}: the board for another router")
     if (routing := answer.get("routing")) is not None:
         say(
-            f"{routing['board']}: {routing['length_mm']:.0f} mm of track, {routing['vias']} vias "
-            "in this run"
+            f"{folder / routing['board']}: {routing['length_mm']:.0f} mm of track and "
+            f"{routing['vias']} vias laid"
         )
         for net, count in routing["open"].items():
             say(f"no way was found on {net}: {count} connections stay open")

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, cast
 import typer
 
 from designer.base.errors import InputError
+from designer.cli import next_steps
 from designer.cli.app import Output, Session, option, verb
 
 
@@ -66,7 +67,12 @@ def new(
     write_model_file(path, from_, format=cast("Literal[1, 2] | None", format_))
     files = [str(path), *([] if from_ else [str(path.with_name(SCHEMA))])]
     answer = {"format": 1, "files": files}
-    return Output(answer, lambda: print(f"written: {', '.join(files)}", file=sys.stderr))
+
+    def show() -> None:
+        print(f"written: {', '.join(files)}", file=sys.stderr)
+        next_steps.show(next_steps.after_model(path))
+
+    return Output(answer, show)
 
 
 @verb("Study", "designer reproduce dynamics --out out/paper-dynamics", "jobs", "resume", json=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,6 +13,7 @@ import typer
 from designer.base.defaults import DRAWN_STARTS, SEARCH_SAMPLES, SEED, TRADE_BOARDS, cores
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.version import __version__
+from designer.cli import next_steps
 from designer.cli.app import (
     Out,
     Output,
@@ -128,7 +129,7 @@ def run(
         shown=session.early(tables.run, tables.tolerance),
         **shared,
     )
-    return _output(outcome, outcome.answer, tables.run)
+    return _output(outcome, outcome.answer, tables.run, next_steps.after_study)
 
 
 @verb("Design", "designer synthesise model.toml --out out/model", "jobs", "overwrite", "resume")
@@ -149,7 +150,7 @@ def synthesise(
     outcome = synthesise_job.synthesise(
         model, out, compare=compare, seed=seed, progress=session.progress, **shared
     )
-    return _output(outcome, outcome.answer, tables.synthesised)
+    return _output(outcome, outcome.answer, tables.synthesised, next_steps.after_design)
 
 
 app.command(
@@ -227,11 +228,18 @@ def tolerance(
         **shared,
     )
     answer = {k: outcome.answer[k] for k in STUDY_KEYS if k in outcome.answer}
-    return _output(outcome, {**answer, "cost": outcome.answer["cost"]["study"]}, tables.tolerance)
+    answer["cost"] = outcome.answer["cost"]["study"]
+    return _output(outcome, answer, tables.tolerance, next_steps.after_study)
 
 
-def _output(outcome: JobOutcome, answer: Mapping[str, Any], table: Any) -> Output:
-    """What a verb that writes a design folder has to say. table : shows its answer."""
+def _output(
+    outcome: JobOutcome,
+    answer: Mapping[str, Any],
+    table: Any,
+    after: Callable[[Path, Mapping[str, Any]], Iterable[next_steps.Step]],
+) -> Output:
+    """What a verb that writes a design folder has to say. table : shows its answer. after : what
+    may be done next."""
     from designer.cli import tables
 
     def show() -> None:
@@ -243,6 +251,7 @@ def _output(outcome: JobOutcome, answer: Mapping[str, Any], table: Any) -> Outpu
             tables.compared(answer["comparison"])
         if outcome.folder is not None:
             tables.files(outcome.folder, outcome.reused)
+            next_steps.show(after(outcome.folder, answer))
 
     return Output(answer, show, outcome.satisfied)
 
@@ -305,6 +314,7 @@ def simulate(
         tables.simulated(result.answer)
         if plots is not None:
             tables.pictures(plots, result.answer["files"])
+        next_steps.show(next_steps.after_response(model, result.answer["responses"]))
 
     return Output(result.answer, show, result.satisfied)
 
@@ -359,7 +369,7 @@ def search(
     from designer.jobs import search_job
 
     outcome = search_job.search(model, out, samples=samples, rung=rung or "auto", **shared)
-    return _output(outcome, outcome.answer, tables.searched)
+    return _output(outcome, outcome.answer, tables.searched, next_steps.after_study)
 
 
 def _refuse(options: Mapping[str, object], expected: str) -> None:
@@ -479,11 +489,13 @@ def export(
         **shared,
     )
     refused = result.answer.get("refused", [])
-    return Output(
-        result.answer,
-        lambda: tables.exported(result.folder, result.reused, refused, result.answer),
-        result.passed,
-    )
+
+    def show() -> None:
+        tables.exported(result.folder, result.reused, refused, result.answer)
+        if routed and result.passed:
+            next_steps.show(next_steps.after_board(result.folder))
+
+    return Output(result.answer, show, result.passed)
 
 
 @verb("Make", "designer rules out/model --board out/model/kicad/model.kicad_pcb")
@@ -501,7 +513,12 @@ def rules(
     from designer.jobs import rules_job
 
     result = rules_job.rules(folder, board=board, junit=junit, progress=session.progress, **shared)
-    return Output(result.answer, lambda: tables.rules(result.answer), result.passed)
+
+    def show() -> None:
+        tables.rules(result.answer)
+        next_steps.show(next_steps.after_rules(folder, result.answer))
+
+    return Output(result.answer, show, result.passed)
 
 
 @verb("Make", "designer bench out/model --record scope.csv --out out/board-1", "overwrite")

@@ -50,7 +50,8 @@ def source(model: Path | str | ModelFile, out: Path | str | None) -> tuple[Model
     if isinstance(model, ModelFile) or not Path(model).is_dir():
         modelfile = model if isinstance(model, ModelFile) else model_file(Path(model))
         if place is None:
-            expected = "a folder to write into: this verb writes a design folder"
+            stem = "model" if isinstance(model, ModelFile) else Path(model).stem
+            expected = f"a folder to write the design into, such as --out out/{stem}"
             raise InputError(None, "--out", MISSING, expected)
         return modelfile, place
     path = Path(model)

@@ -20,6 +20,10 @@ RESERVED = (GROUND, "base")
 """Names that mean something else."""
 MOST_MASSES = 12
 """Beyond it nothing was tried."""
+DRIFTS = (
+    ": nothing holds the place of a mass inside its gap, in a circuit no more than in the model; "
+    "a soft spring, of a hundredth of the stops' stiffness, changes little"
+)
 UNDAMPED = 1e-12
 """Least damping ratio of a mode: below it no steady response is reached."""
 
@@ -107,9 +111,10 @@ def _check_grounded(system: Elements) -> None:
     sprung = {name for spring in system.springs for name in spring.between}
     for name in system.names:
         if name not in sprung:
-            _refuse(
-                "spring.between", f"no spring on {name}", f"a [[spring]] between {name} and another"
-            )
+            expected = f"a [[spring]] between {name} and another"
+            if any(name in gap.between for gap in system.gaps):
+                expected += DRIFTS
+            _refuse("spring.between", f"no spring on {name}", expected)
     grounded = _reached({GROUND}, [spring.between for spring in system.springs])
     floating = [name for name in system.names if name not in grounded]
     if floating:

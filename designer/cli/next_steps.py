@@ -1,0 +1,86 @@
+"""What a user may do next: command lines to copy, below what a verb has to say."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from designer.cli.console import say
+
+Step = tuple[str, str]
+"""A command line, and what it is for."""
+GOOD = 0.95
+"""A response of a lower yield is one to mend."""
+AROUND = 0.3
+"""Half-width of the sweep about a frequency whose response was not found, as a share of it."""
+WIDE = 72
+"""Characters of a command line that the purposes of others are kept in line with."""
+
+
+def show(steps: Iterable[Step]) -> None:
+    """Print them, one a line."""
+    rows = list(steps)
+    if not rows:
+        return
+    width = max((len(command) for command, _ in rows if len(command) <= WIDE), default=0)
+    say("\n".join(["", "Next", *(f"  {command:{width}}  {purpose}" for command, purpose in rows)]))
+
+
+def after_model(model: Path) -> Iterator[Step]:
+    """With a model file."""
+    yield _step("what the model does", "simulate", model)
+    yield _step("the whole job", "run", model, "--out", Path("out") / model.stem)
+
+
+def after_design(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+    """With a design that nothing was counted of. answer : of ``synthesise``."""
+    yield from after_response(folder, answer["knobs"])
+    yield _step("how many boards will work", "tolerance", folder)
+    yield _step("circuit against design rules", "rules", folder)
+
+
+def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+    """With a study. answer : of ``tolerance`` or ``run``."""
+    responses = answer["responses"]
+    yield f"open {shlex.quote(str(folder / 'report.html'))}", "the report"
+    yield from after_response(folder, responses)
+    if any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses):
+        yield _step("the cheapest cure", "search", folder, "--yield", GOOD)
+    if _board(folder) is None:
+        yield _step("the KiCad project, its board routed", "export", folder, "--routed")
+    yield from after_board(folder)
+
+
+def after_board(folder: Path) -> Iterator[Step]:
+    """With a board in the folder's KiCad project, if there is one."""
+    board = _board(folder)
+    if board is not None:
+        yield _step("circuit and board against design rules", "rules", folder, "--board", board)
+        yield _step("files to order the board", "export", folder, "--fab", "jlcpcb")
+
+
+def after_rules(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+    """With rules that no board was given for. answer : of ``rules``."""
+    board = _board(folder)
+    if answer["board"] is None and board is not None:
+        yield _step("the rules of the board too", "rules", folder, "--board", board)
+
+
+def after_response(place: Path, responses: Iterable[Mapping[str, Any]]) -> Iterator[Step]:
+    """With a wanted response that was not found. place : model file or design folder."""
+    for row in responses:
+        if not row["found"]:
+            low, high = (f"{row['omega'] * (1.0 + side * AROUND):.4g}" for side in (-1.0, 1.0))
+            sweep = ("--from", low, "--to", high, "--steps", 61, "--up", "--down")
+            yield _step(f"where {row['expected']} lives", "bifurcation", place, *sweep)
+            return
+
+
+def _board(folder: Path) -> Path | None:
+    return next(iter(sorted((folder / "kicad").glob("*.kicad_pcb"))), None)
+
+
+def _step(purpose: str, *words: object) -> Step:
+    return shlex.join(["designer", *(str(word) for word in words)]), purpose

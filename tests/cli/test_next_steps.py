@@ -1,0 +1,68 @@
+"""What is proposed after a verb: command lines that the parser takes, where there is cause."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from designer.cli import command_line, next_steps
+from designer.cli.next_steps import Step
+
+
+def response(found: bool = True, rate: float = 1.0) -> dict[str, Any]:
+    return {"omega": 10.0, "expected": "1-1-1", "found": found, "rate": rate, "yield": {}}
+
+
+def verbs(steps: Iterable[Step]) -> list[str]:
+    """The verbs of command lines, each of which is parsed."""
+    found = []
+    for command, _ in steps:
+        program, *words = shlex.split(command)
+        if program == "designer":
+            verb = command_line.application().commands[words[0]]
+            verb.make_context(words[0], words[1:])
+            found.append(words[0])
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a space in its name, and a board."""
+    place = tmp_path / "my rig"
+    (place / "kicad").mkdir(parents=True)
+    (place / "kicad" / "rig.kicad_pcb").touch()
+    return place
+
+
+def test_after_a_study_what_has_cause_is_proposed(folder: Path) -> None:
+    good = {"responses": [response()]}
+    assert verbs(next_steps.after_study(folder, good)) == ["rules", "export"]
+    poor = {"responses": [response(rate=0.5)]}
+    assert verbs(next_steps.after_study(folder, poor))[0] == "search"
+    left_out = {"responses": [response(found=False) | {"yield": None, "rate": None}]}
+    assert verbs(next_steps.after_study(folder, left_out))[0] == "bifurcation"
+    (folder / "kicad" / "rig.kicad_pcb").unlink()
+    assert verbs(next_steps.after_study(folder, good)) == ["export"]
+
+
+def test_the_board_s_rules_are_proposed_once(folder: Path) -> None:
+    assert verbs(next_steps.after_rules(folder, {"board": None})) == ["rules"]
+    assert verbs(next_steps.after_rules(folder, {"board": "rig.kicad_pcb"})) == []
+
+
+def test_a_sweep_goes_around_the_frequency_that_was_wanted(tmp_path: Path) -> None:
+    ((command, purpose),) = next_steps.after_response(tmp_path, [response(found=False)])
+    assert "--from 7 --to 13" in command
+    assert "1-1-1" in purpose
+
+
+def test_a_design_or_a_model_leads_on(tmp_path: Path) -> None:
+    assert verbs(next_steps.after_design(tmp_path, {"knobs": [response()]})) == [
+        "tolerance",
+        "rules",
+    ]
+    assert verbs(next_steps.after_model(tmp_path / "my.toml")) == ["simulate", "run"]
