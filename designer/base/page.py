@@ -101,6 +101,8 @@ class Picture:
     """Verbatim of characters that show the same in Markdown."""
     warning: str = ""
     """What is wrong with what it shows, or ""."""
+    plot: str = ""
+    """Name of the plot that HTML draws in its place where scripts run, or ""."""
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,25 @@ from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import Numbers, components, pin_numbers, to_buy
 from designer.board.kicad_reader import BoardFile
-from designer.check.checked_design import CheckedResponse
+from designer.check.checked_design import CheckedResponse, traces
+from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
+from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import OrbitStatus
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
+from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
+from designer.workbench.prediction import BoardPrediction, PredictedStop
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.study import RunResult, Study
 from designer.yields.yield_count import Yield
+
+ALL = "all on one board"
+"""Name of the yield of every response on the same board."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,26 @@ class ReportData:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out of the study."""
         return self.study.yields
+
+    @property
+    def rated(self) -> tuple[list[str], list[Yield | None]]:
+        """What has a yield, by the names of pictures, with it: every response, and all of them on
+        one board where that was counted."""
+        names, yields = [words.label(c) for c in self.checked], list(self.yields)
+        joint = self.study.all_on_one_board
+        return (names, yields) if joint is None else ([*names, ALL], [*yields, joint])
+
+    @cached_property
+    def traces(self) -> tuple[Mapping[str, Trace], ...]:
+        """For each response: its orbit by engine, in model units (``checked_design.traces``)."""
+        return tuple(traces(self.design, c) for c in self.checked)
+
+    @cached_property
+    def stops(self) -> tuple[PredictedStop, ...]:
+        """The dead zones of the nominal board, one for each clearance."""
+        result = self.result
+        nominal = Synthesis(result.modelfile, result.catalog, result.model_responses, result.design)
+        return BoardPrediction(nominal).stops
 
     @cached_property
     def bom(self) -> list[Mapping[str, str]]:

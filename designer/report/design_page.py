@@ -87,6 +87,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
         _responses(data),
         _model(data, pictures.get("model")),
+        _dead_zones(data, pictures),
         PageSection("Schematic", [pictures.get("schematic")], "schematic"),
         PageSection("The board", [pictures.get("board")], "board"),
         _parts(data),
@@ -203,6 +204,17 @@ def _settings_note(data: ReportData) -> str:
             "the peak."
         )
     return text
+
+
+def _dead_zones(data: ReportData, pictures: Pictures) -> PageSection:
+    """The stops as the circuit has them."""
+    note = (
+        "Output of the stage that makes the stops over the displacement, on the nominal board by "
+        "nodal analysis: a slow ramp at the input draws the same on a scope set to XY."
+    )
+    drawn = [p for name, p in pictures.items() if name.startswith("stop ")]
+    curves: list[Block] = [SmallPrint(note), *drawn, design_tables.stop_table(data.stops)]
+    return PageSection("DC curve of the dead zone", curves if data.stops else [], "dc")
 
 
 def _yields(data: ReportData, pictures: Pictures) -> PageSection:

@@ -20,6 +20,7 @@ from designer.model.relative_motion import relative_motions, subscripted
 from designer.model.si_units import MECHANICAL_UNITS
 from designer.model.system_equations import element_rows
 from designer.report import words
+from designer.workbench.prediction import PredictedStop
 
 _PARAMETERS = {
     "m": "mass ratio M2/(M1 + M2)",
@@ -156,6 +157,37 @@ def _wanted(design: Design, name: str) -> str:
     if name.endswith("stop slope"):
         return words.number(system.relative_stiffness(system.clearances[0]))
     return words.NONE
+
+
+def stop_table(stops: Sequence[PredictedStop]) -> Table | None:
+    """Where contact begins in each dead zone of the nominal board, and how steep its output is."""
+    rows = [
+        (
+            stop.clearance,
+            "upper" if side > 0 else "lower",
+            moved_nets(stop),
+            words.quantity(end, "V").replace("-", "−"),
+            stop.output,
+            words.number(stop.inside[1]),
+            words.number(stop.inside[1] + stop.gains[side]),
+        )
+        for stop in stops
+        for side, end in sorted(stop.ends.items(), reverse=True)
+    ]
+    columns = (
+        "clearance", "stop", "displacement", "contact begins at", "output", "V per V inside",
+        "V per V in contact",
+    )  # fmt: skip
+    return table(columns, rows, (3, 5, 6))
+
+
+def moved_nets(stop: PredictedStop) -> str:
+    """What the displacement of a dead zone is made of, such as "v1" or "v1 − v3"."""
+    text = ""
+    for net, factor in stop.displacement.items():
+        size = "" if abs(abs(factor) - 1.0) < 0.01 else f"{abs(factor):.3g} "
+        text += f" {'−' if factor < 0.0 else '+'} {size}{net}"
+    return text.removeprefix(" + ").strip()
 
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:

@@ -41,6 +41,8 @@ _DROPPED = re.compile(
 )
 _ID = re.compile(r'\sid="([^"]*)"')
 _REFERENCE = re.compile(r'((?:xlink:)?href="#|url\(#)([^")]+)')
+_GLYPH = re.compile(r'<path id="(DejaVuSans[\w-]*)"[^>]*/>')
+"""A letter, drawn alike in every picture that has it."""
 _ROOT = re.compile(r"<svg\b([^>]*)>")
 _SIZE = re.compile(r'\s(?:width|height|style|role|aria-label)="[^"]*"')
 
@@ -50,6 +52,7 @@ class InlineSvg:
 
     def __init__(self) -> None:
         self._numbers = count(1)
+        self._glyphs: dict[str, str] = {}
 
     def element(self, svg: str, label: str) -> Markup:
         """The ``<svg>`` element of a page for the document ``svg``.
@@ -59,14 +62,22 @@ class InlineSvg:
         escaped here.
         """
         prefix = f"s{next(self._numbers)}-"
-        text = _DROPPED.sub("", svg)
+        text = _GLYPH.sub(lambda m: self._first(m, prefix), _DROPPED.sub("", svg))
         used = {match[2] for match in _REFERENCE.finditer(text)}
         text = _ID.sub(lambda m: f' id="{prefix}{m[1]}"' if m[1] in used else "", text)
-        text = _REFERENCE.sub(lambda m: f"{m[1].removeprefix('xlink:')}{prefix}{m[2]}", text)
+        text = _REFERENCE.sub(
+            lambda m: f"{m[1].removeprefix('xlink:')}{self._glyphs.get(m[2], prefix + m[2])}", text
+        )
         text = text.replace("xlink:href=", "href=")
         text = _COLOUR.sub(_variable, text)
         root = Markup('<svg role="img" aria-label="{}"').format(label)
         return Markup(_ROOT.sub(lambda m: f"{root}{_SIZE.sub('', m[1])}>", text, count=1).strip())
+
+    def _first(self, glyph: re.Match[str], prefix: str) -> str:
+        """A letter where the page has it for the first time; nothing where it has it already."""
+        known = glyph[1] in self._glyphs
+        self._glyphs.setdefault(glyph[1], prefix + glyph[1])
+        return "" if known else glyph[0]
 
 
 def _variable(match: re.Match[str]) -> str:

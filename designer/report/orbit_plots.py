@@ -99,6 +99,27 @@ def time_traces(
     return figure
 
 
+def aligned_curves(
+    checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
+) -> dict[str, Array]:
+    """(k, 3) drive periods, displacement and velocity in a clearance by engine, each begun at the
+    phase that lies closest to the model's; ngspice's as the points that are drawn."""
+    orbits, period = _orbits(checked), 2.0 * np.pi / checked.model.omega
+    drawn: dict[str, Array] = {}
+    for name, trace in _to_draw(traces, orbits).items():
+        curve = np.column_stack([trace.time / period, _moved(checked, trace, motion)])
+        curve = curve[np.isfinite(curve).all(axis=1)]
+        n = orbits[name].n
+        if "model" in drawn and n > 1 and orbits["model"].n == n:
+            at = (curve[:, 0] + _delay(curve, drawn["model"], n)) % n
+            curve[:, 1:] = np.transpose([np.interp(at, curve[:, 0], x) for x in curve[:, 1:].T])
+        if name == "ngspice":
+            shares = curve[:, 1:] / np.maximum(np.ptp(curve[:, 1:], axis=0), 1e-300)
+            curve = curve[_spaced(shares[:, 0], shares[:, 1], 0.045)]
+        drawn[name] = curve
+    return drawn
+
+
 @styled
 def legend(*, ngspice: bool = True, stops: bool = True) -> Figure:
     """The key to portraits and traces, for a page that shows many without one."""
@@ -230,6 +251,14 @@ def _shifted(cycles: Array, x: Array, wanted_at: Array, wanted: Array, n: int) -
 
     An orbit of n periods has n phases, and each engine begins at one of its own.
     """
+    curve, aim = np.column_stack([cycles, x]), np.column_stack([wanted_at, wanted])
+    return np.interp((cycles + _delay(curve, aim, n)) % n, cycles, x)
+
+
+def _delay(curve: Array, wanted: Array, n: int) -> int:
+    """The whole number of periods after which a curve (k, 2 or 3) of periods and displacement lies
+    closest to ``wanted``."""
+    cycles, x = curve[:, 0], curve[:, 1]
+    aim = np.interp(cycles, wanted[:, 0], wanted[:, 1])
     moved = [np.interp((cycles + k) % n, cycles, x) for k in range(n)]
-    aim = np.interp(cycles, wanted_at, wanted)
-    return moved[int(np.argmin([float(np.abs(m - aim).sum()) for m in moved]))]
+    return int(np.argmin([float(np.abs(m - aim).sum()) for m in moved]))

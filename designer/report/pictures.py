@@ -11,7 +11,7 @@ from designer.base.figure_style import to_svg
 from designer.base.page import Gallery, Picture
 from designer.board import schematic_drawing
 from designer.board.kicad_reader import BoardFile
-from designer.check.checked_design import CheckedResponse, traces
+from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
 from designer.fabrication.board_picture import Side, board_svg
 from designer.model.lumped_system import LumpedSystem
@@ -22,6 +22,7 @@ from designer.report.data import ReportData
 from designer.report.design_page import Pictures
 from designer.report.inline_svg import InlineSvg
 from designer.report.model_drawing import model_drawing
+from designer.report.plot_names import portrait_name, stop_name
 from designer.report.system_drawing import system_drawing
 
 INTRO = (
@@ -70,6 +71,13 @@ def pictures(data: ReportData) -> Pictures:
     if data.checked:
         out["portraits"] = _portraits(data, element)
         out |= _study_pictures(data, element)
+    for number, stop in enumerate(data.stops):
+        svg = element(
+            study_plots.stop_chart(design_tables.moved_nets(stop), stop),
+            f"Output of the dead zone over the displacement in {stop.clearance}; the figures are "
+            "in the table.",
+        )
+        out[stop_name(number)] = Picture(svg=svg, plot=stop_name(number))
     for one in data.study.maps:
         label = words.label(data.checked[data.study.response_indices[one.question]], " ")
         svg = element(map_plots.map_chart(label, one), f"Yield over {one.over} of {label}.")
@@ -78,7 +86,8 @@ def pictures(data: ReportData) -> Pictures:
         unit = design_tables.spring_of(data.design.model)
         errors = {words.coefficient(k, unit): v for k, v in data.design.errors.errors.items()}
         shows = "Size of each coefficient error, as in the table."
-        out["errors"] = Picture(svg=element(study_plots.coefficient_chart(errors), shows))
+        svg = element(study_plots.coefficient_chart(errors), shows)
+        out["errors"] = Picture(svg=svg, plot="errors")
     circuit, pins = data.board
     svg = page.element(
         schematic_drawing.svg(circuit, numbers=pins),
@@ -135,7 +144,7 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
 def _card(data: ReportData, response: int, clearance: int, element: Element) -> Picture:
     """One response, seen in one clearance."""
     c = data.checked[response]
-    curves, omega = traces(data.design, c), words.number(c.model.omega)
+    curves, omega = data.traces[response], words.number(c.model.omega)
     system = data.design.model.at(c.model.b).second_order()
     motion = relative_motions(system)[clearance]
     engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
@@ -150,7 +159,8 @@ def _card(data: ReportData, response: int, clearance: int, element: Element) -> 
     shows += element(
         orbit_plots.time_traces(c, curves, motion), f"{motion.symbol} over time at ω = {omega}."
     )
-    return Picture("", caption, svg=shows, warning=words.problem(c))
+    plot = portrait_name(response, clearance)
+    return Picture("", caption, svg=shows, warning=words.problem(c), plot=plot)
 
 
 def _caption(data: ReportData, response: int, c: CheckedResponse) -> str:
@@ -170,15 +180,13 @@ def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
     """Yields, margins and blame, of what there is."""
     labels = [words.label(c) for c in data.checked]
     responses = range(len(data.checked))
-    names, yields = labels, list(data.yields)
-    if data.study.all_on_one_board is not None:
-        names, yields = [*labels, "all on one board"], [*yields, data.study.all_on_one_board]
     interval = "among all boards" if data.plan.census else "with its 95 % interval"
     shows = (
         f"Yield of each response {interval}, and counts of ok, lost, grazing, failed; the figures "
         "are in the table."
     )
-    out = {"yields": Picture(svg=element(study_plots.yield_chart(names, yields), shows))}
+    svg = element(study_plots.yield_chart(*data.rated), shows)
+    out = {"yields": Picture(svg=svg, plot="yields")}
     rows = [data.study.answers_to(i) for i in responses]
     if any(rows):
         shows = "Largest multiplier and nearest grazing of every board, by response."

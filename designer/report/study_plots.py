@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
+from designer.base.arrays import Array
 from designer.base.figure_style import (
     GRID,
     MUTED,
@@ -19,10 +20,12 @@ from designer.base.figure_style import (
     name_rows,
     new_figure,
     plain_numbers,
+    shade_stops,
     styled,
 )
 from designer.circuit.coefficients import EXACT
 from designer.verdicts.verdict import Answer, Verdict
+from designer.workbench.prediction import PredictedStop
 from designer.yields.yield_count import Yield
 
 VERDICTS = {
@@ -32,6 +35,31 @@ VERDICTS = {
     Verdict.FAILED: "#9a9a9a",
 }
 MARKERS = {v: "o" if v is Verdict.OK else "D" for v in Verdict}
+
+MOST_DOTS = 500
+"""Of a picture as lines and dots; more stand in it as an image, which does not grow with them."""
+
+
+@styled
+def stop_chart(name: str, stop: PredictedStop) -> Figure:
+    """Output of a dead zone over the displacement, with the stops shaded. name : of the latter."""
+    displacement, output = stop_curve(stop)
+    figure = new_figure(5.2, 2.6)
+    axes = figure.subplots()
+    limits = (float(displacement[0]), float(displacement[-1]))
+    shade_stops(axes, tuple(stop.ends.items()), limits)
+    axes.plot(displacement, output, color=VERDICTS[Verdict.OK], lw=1.6)
+    axes.set_xlim(*limits)
+    axes.set_xlabel(f"{name} [V]")
+    axes.set_ylabel(f"{stop.output} [V]")
+    return figure
+
+
+def stop_curve(stop: PredictedStop) -> tuple[Array, Array]:
+    """(k,) displacement and output [V] of a dead zone, from beyond one stop to beyond the other."""
+    far = 1.6 * max(map(abs, stop.ends.values()))
+    displacement = np.unique([*np.linspace(-far, far, 65), *stop.ends.values()])
+    return displacement, stop.output_of(displacement)
 
 
 @styled
@@ -134,6 +162,7 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
                     mew=0,
                     alpha=0.75,
                     color=VERDICTS[verdict],
+                    rasterized=len(answers) * len(row) > MOST_DOTS,
                 )
     for axes in (left, right):
         name_rows(axes, labels, rules=True)

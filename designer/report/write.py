@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
+import zlib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
+from bokeh.settings import settings as bokeh_settings
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
@@ -20,10 +24,10 @@ from designer.base.atomic_write import write
 from designer.base.page import Page, markdown
 from designer.report.data import ReportData
 from designer.report.design_page import FORMAT, design_page
+from designer.report.inline_svg import VARIABLES
+from designer.report.interactive_plots import plots
 from designer.report.pictures import pictures
 
-SCRIPTS = ("tables.js",)
-"""What a page runs; each is its own file beside the templates."""
 _NPQ = r"(?:\d+-\d+-\d+|n-p-q|n-q-p)"
 _WHOLE = re.compile(rf"ω = [\d.]+(?: \({_NPQ}\))?|(?<![\w-]){_NPQ}(?![\w-])")
 
@@ -41,11 +45,12 @@ def write_report(data: ReportData, html: Path, text: Path) -> None:
 
 def render_html(data: ReportData) -> str:
     """``report.html`` as text."""
-    return render_page(design_page(data, pictures(data)))
+    return render_page(design_page(data, pictures(data)), plots(data))
 
 
-def render_page(page: Page) -> str:
-    """A page as one file of HTML that loads nothing."""
+def render_page(page: Page, plots: Mapping[str, str] | None = None) -> str:
+    """A page as one file of HTML that loads nothing. plots : the documents that its pictures name
+    (``interactive_plots.plots``)."""
     templates = Environment(
         loader=PackageLoader("designer.report", "templates"),
         autoescape=True,
@@ -54,9 +59,25 @@ def render_page(page: Page) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates.filters |= {"text": _unbroken, "digest": _digest}
+    templates.filters["text"] = _unbroken
     template = templates.get_template("page.html.j2")
-    return template.render(page=page, format=FORMAT, scripts=[_script(name) for name in SCRIPTS])
+    names = ("tables.js", "plots.js") if plots else ("tables.js",)
+    scripts = [_script(name) for name in names]
+    blocks: dict[str, Markup] = {}
+    allowed = [_digest(script) for script in scripts]
+    if plots:
+        library = (Path(bokeh_settings.bokehjs_path()) / "js" / "bokeh.min.js").read_text("utf-8")
+        allowed.append(_digest(library))
+        blocks["bokeh"] = _packed(library)
+        blocks["plots"] = _packed(json.dumps({"colours": VARIABLES, "items": plots}))
+    return template.render(
+        page=page, format=FORMAT, scripts=scripts, allowed=allowed, blocks=blocks
+    )
+
+
+def _packed(text: str) -> Markup:
+    """A text as a page carries it for its scripts: zlib's form in base64. Nothing in it is HTML."""
+    return Markup(base64.b64encode(zlib.compress(text.encode("utf-8"), 9)).decode())
 
 
 def _script(name: str) -> Markup:

@@ -41,6 +41,7 @@ from .overlay import (
 )
 from .prediction import (
     BoardPrediction as BoardPrediction,
+    PredictedStop as PredictedStop,
 )
 from .record import (
     Record as Record,

@@ -42,7 +42,12 @@ def loaded(browser: Browser, html: str, file: Path) -> Loaded:
     file.write_text(html, encoding="utf-8")
     page = browser.new_page(viewport={"width": 1200, "height": 900}, color_scheme="light")
     out = Loaded(page)
-    page.on("console", lambda message: out.complaints.append(message.text))
+    page.on(
+        "console",
+        lambda message: (
+            out.complaints.append(message.text) if message.type in ("error", "warning") else None
+        ),
+    )
     page.on("pageerror", lambda error: out.complaints.append(str(error)))
     page.on(
         "request",
@@ -121,6 +126,37 @@ def test_what_folds_opens(tables: Loaded) -> None:
     summary.focus()
     page.keyboard.press("Enter")
     assert page.locator("#boards tbody tr:visible").count() == 7
+
+
+CURVES = """
+Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [...root.references()])
+  .filter((model) => model.type === "GlyphRenderer" && model.name === "model")
+  .map((model) => Math.max(...model.data_source.data.x))
+"""
+
+
+def test_plots_are_drawn_with_the_orbits_own_values(report: Loaded) -> None:
+    page, data = report.page, plain_report()
+    for name in ("portrait 0 0", "portrait 1 0", "stop 0", "yields"):
+        figure = page.locator(f'[data-plot="{name}"]')
+        figure.scroll_into_view_if_needed()
+        page.locator(f'[data-plot="{name}"].drawn canvas').first.wait_for()
+        assert figure.locator(":scope > .live").get_attribute("aria-label")
+        assert not figure.locator("svg[role=img]").first.is_visible()
+    largest = [float(c.model.orbit.extremes[0].max()) for c in data.checked]
+    assert sorted({round(x, 4) for x in page.evaluate(CURVES)}) == pytest.approx(
+        sorted(largest), rel=1e-3
+    )
+
+
+def test_paper_has_the_pictures(report: Loaded, tmp_path: Path) -> None:
+    report.page.emulate_media(media="print")
+    pictures = report.page.locator("svg[role=img]")
+    assert pictures.count() > 5
+    assert all(pictures.nth(k).is_visible() for k in range(pictures.count()))
+    assert not report.page.locator(".live").first.is_visible()
+    report.page.emulate_media(media="screen")
+    assert len(report.page.pdf()) > 50_000
 
 
 def test_nothing_is_complained_of(report: Loaded, tables: Loaded) -> None:
