@@ -1,7 +1,8 @@
 from . import (
     board_notes as board_notes,
+    kicad_sim as kicad_sim,
+    kicad_symbols as kicad_symbols,
     placement_drawing as placement_drawing,
-    schematic_drawing as schematic_drawing,
 )
 from .board_check import (
     check_board as check_board,
@@ -26,6 +27,7 @@ from .component import (
     Component as Component,
     Numbers as Numbers,
     components as components,
+    designator as designator,
     pin_numbers as pin_numbers,
     to_buy as to_buy,
 )
@@ -33,25 +35,40 @@ from .footprints import (
     footprint as footprint,
 )
 from .kicad_board import (
+    board as board,
     layers as layers,
+    revision as revision,
+)
+from .kicad_footprint import (
+    module as module,
+)
+from .kicad_items import (
+    Entry as Entry,
+    Item as Item,
+    entries as entries,
+    section_units as section_units,
 )
 from .kicad_names import (
     BOARD_VERSION as BOARD_VERSION,
     HEAD as HEAD,
     LIBRARY as LIBRARY,
+    PAPERS as PAPERS,
     POWER as POWER,
+    SHEET_VERSION as SHEET_VERSION,
     circuit_net as circuit_net,
     footprint_name as footprint_name,
     identifier as identifier,
     kicad_net as kicad_net,
     project_name as project_name,
+    safe_text as safe_text,
+    sheet_id as sheet_id,
+    symbol_id as symbol_id,
+)
+from .kicad_netlist import (
+    netlist as netlist,
 )
 from .kicad_placement import (
     place as place,
-)
-from .kicad_project import (
-    Project as Project,
-    files as files,
 )
 from .kicad_reader import (
     PART_NUMBER as PART_NUMBER,
@@ -72,12 +89,25 @@ from .kicad_rules import (
     canary as canary,
     rules_text as rules_text,
 )
+from .kicad_symbols import (
+    GRID as GRID,
+    PART_ROW as PART_ROW,
+    REACH as REACH,
+    TEXT as TEXT,
+    ShapePin as ShapePin,
+    SymbolShape as SymbolShape,
+    effects as effects,
+    library as library,
+    position as position,
+    power as power,
+)
 from .net_classes import (
     CLASSES as CLASSES,
     DEFAULT as DEFAULT,
     SUMMING as SUMMING,
     SUPPLY as SUPPLY,
     VIA as VIA,
+    net_settings as net_settings,
 )
 from .outline import (
     LAYER as LAYER,
@@ -85,5 +115,6 @@ from .outline import (
     read_outline as read_outline,
 )
 from .pins import (
+    SUPPLY_UNIT as SUPPLY_UNIT,
     Pin as Pin,
 )

@@ -8,10 +8,16 @@ from designer.base.seal import sha256
 from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.kicad_footprint import on_board
 from designer.board.kicad_items import Entry
-from designer.board.kicad_layout import PAPERS
-from designer.board.kicad_names import BOARD_VERSION, HEAD, identifier, kicad_net, safe_text
+from designer.board.kicad_names import (
+    BOARD_VERSION,
+    HEAD,
+    PAPERS,
+    identifier,
+    kicad_net,
+    safe_text,
+    symbol_id,
+)
 from designer.board.kicad_placement import SCREW, Placement
-from designer.board.kicad_sheet import symbol_id
 from designer.board.placed_component import LETTER, TEXT
 
 LAYERS = (
@@ -41,8 +47,10 @@ THICKNESS = 1.6
 """Of the board [mm]."""
 
 
-def board(project: str, title: str, entries: Sequence[Entry], placement: Placement) -> Expression:
-    """The file ``.kicad_pcb``. title : from the model file, as it is."""
+def board(
+    project: str, title: str, entries: Sequence[Entry], placement: Placement, date: str = ""
+) -> Expression:
+    """The file ``.kicad_pcb``. title : from the model file, as it is. date : of the design."""
     by_reference = {e.item.reference: e for e in entries}
     pads = {
         spot.component.reference: _pad_nets(by_reference[spot.component.reference])
@@ -58,7 +66,11 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
             **HEAD,
             general={"thickness": THICKNESS, "legacy_teardrops": False},
             paper=_paper(placement),
-            title_block={"title": safe_text(title), "rev": revision(entries)},
+            title_block={
+                "title": safe_text(title),
+                **({"date": date} if date else {}),
+                "rev": revision(entries),
+            },
             layers=layers(LAYERS),
             setup={"pad_to_mask_clearance": 0, "allow_soldermask_bridges_in_footprints": False},
         ),

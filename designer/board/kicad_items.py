@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from designer.base.views import View
 from designer.board import kicad_symbols as symbols
 from designer.board.component import Component
-from designer.board.kicad_layout import Item
 from designer.board.kicad_names import LIBRARY, POWER, footprint_name, library_name
 from designer.board.kicad_sim import Fields, fields, sources
-from designer.board.kicad_symbols import SymbolShape
+from designer.board.kicad_symbols import PART_ROW, SymbolShape
 from designer.board.pins import SUPPLY_UNIT
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
-from designer.circuit.stage_title import SUPPLY, section_stages
 
-SIMULATION = "simulation"
-"""Stage of what only the simulation has."""
+
+@dataclass(frozen=True)
+class Item:
+    """Something with a symbol."""
+
+    reference: str
+    """Its designator."""
+    value: str
+    """The value that is shown."""
+    shape: SymbolShape
+    """Symbol that it is drawn with."""
+    pins: Mapping[str, str]
+    """Net by pin number, "" where none is."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +67,13 @@ def entries(
     circuit: Circuit, components: Sequence[Component], run: FirstRun, library: str
 ) -> tuple[Entry, ...]:
     """Every component, then what the simulation needs besides. library : file of its models."""
-    stages = section_stages(circuit)
-    listed = [_entry(c, circuit, stages, library) for c in components]
+    listed = [_entry(c, circuit, library) for c in components]
     for name, net, value, simulation in sources(circuit, run):
         pins = {"1": net, "2": GROUND}
-        item = Item(name, value, symbols.source("VSOURCE"), pins, {1: SIMULATION})
+        item = Item(name, value, symbols.source("VSOURCE"), pins)
         listed.append(Entry(item, simulation))
     for net in (POSITIVE, GROUND, NEGATIVE):
-        item = Item(f"#FLG_{POWER[net]}", "PWR_FLAG", symbols.flag(), {"1": net}, {1: SIMULATION})
+        item = Item(f"#FLG_{POWER[net]}", "PWR_FLAG", symbols.flag(), {"1": net})
         listed.append(Entry(item, ()))
     return tuple(listed)
 
@@ -95,23 +104,23 @@ def shape(component: Component) -> SymbolShape:
     if kind == "trimmer":  # between the rails: the higher one above, where its symbol points
         pins.sort(key=lambda pin: ("high", "wiper", "low").index(pin[1]))
     letters = component.reference.rstrip("0123456789")
-    name = f"Header_{len(pins)}" if kind == "connector" else _named(letters, component)
-    # Power symbols at neighbouring pins need room between them.
-    return symbols.row(name, letters, pins, 3 if kind == "connector" else 4)
+    if kind == "trimmer":  # power symbols at its ends need room
+        return symbols.row(_named(letters, component), letters, pins, 4)
+    ways = [pin.net for pin in component.pins]
+    wide = any(GROUND not in pair for pair in pairwise(ways))
+    name = f"Header_{len(pins)}_wide" if wide else f"Header_{len(pins)}"
+    return symbols.row(name, letters, pins, PART_ROW if wide else PART_ROW // 2)
 
 
-def _entry(
-    component: Component, circuit: Circuit, stages: Mapping[str, str], library: str
-) -> Entry:
+def section_units(component: Component) -> dict[str, int]:
+    """The unit of the symbol, from 1, of each section of an op-amp package; last the supply's."""
+    names = [name for name in component.units if name != SUPPLY_UNIT]
+    return {name: i for i, name in enumerate([*names, SUPPLY_UNIT], start=1)}
+
+
+def _entry(component: Component, circuit: Circuit, library: str) -> Entry:
     symbol = shape(component)
-    stage_of = {1: component.stage}
-    if component.kind == "op-amp":
-        units = [name for name in component.units if name != SUPPLY_UNIT]
-        stage_of = {
-            i: stages.get(f"{component.reference}{name}", SUPPLY)
-            for i, name in enumerate(units, start=1)
-        } | {len(units) + 1: SUPPLY}
-    item = Item(component.reference, component.value, symbol, component.nets, stage_of)
+    item = Item(component.reference, component.value, symbol, component.nets)
     return Entry(item, (*_bought(component), *fields(component, circuit, library)), component)
 
 

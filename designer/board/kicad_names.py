@@ -19,6 +19,8 @@ HEAD = {"generator": LIBRARY, "generator_version": "9.0"}
 """What stands after the version in every file, as KiCad 9 writes it."""
 BOARD_VERSION, SHEET_VERSION, SYMBOLS_VERSION = 20241229, 20250114, 20241209
 """KiCad 9's versions of boards and footprints, of schematics, of symbol libraries."""
+PAPERS = {"A4": (297, 210), "A3": (420, 297), "A2": (594, 420), "A1": (841, 594), "A0": (1189, 841)}
+"""Sizes of sheets [mm], landscape."""
 LONGEST = 40
 """Characters of a project's name."""
 
@@ -51,6 +53,16 @@ def project_name(title: str) -> str:
 def identifier(*names: str) -> str:
     """A UUID that depends on the names alone, so that the same thing keeps it."""
     return str(uuid.uuid5(_SPACE, "\x1f".join(names)))
+
+
+def sheet_id(project: str) -> str:
+    """The id of the one sheet."""
+    return identifier(project, "sheet")
+
+
+def symbol_id(project: str, reference: str, unit: int = 1) -> str:
+    """The id of a unit of a symbol; the board's footprints refer to it."""
+    return identifier(project, "symbol", reference, str(unit))
 
 
 def library_name(text: str) -> str:

@@ -9,8 +9,7 @@ from designer.base.views import View
 from designer.board.component import Component, joined
 from designer.board.kicad_board import open_net
 from designer.board.kicad_items import Entry
-from designer.board.kicad_names import kicad_net
-from designer.board.kicad_sheet import symbol_id
+from designer.board.kicad_names import kicad_net, symbol_id
 
 Pads = Mapping[str, tuple[tuple[str, str], ...]]
 

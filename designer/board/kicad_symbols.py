@@ -16,6 +16,8 @@ GRID = 1.27
 """Millimetres a unit: KiCad's usual grid is two of it."""
 TEXT = 1.27
 """Height of texts [mm]."""
+PART_ROW = 8
+"""Units between rows of parts; at a connector, rows of signals with a pin of ground between."""
 REACH = 3
 """Units from the centre of a part of two pins to either pin."""
 

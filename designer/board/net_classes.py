@@ -21,6 +21,8 @@ CLASSES: Mapping[str, Mapping[str, float]] = {
 """Millimetres. The classes after the default come in the order of their priority."""
 VIA: Mapping[str, float] = {"via_diameter": 0.6, "via_drill": 0.3}
 """Millimetres, of every class."""
+SHEET: Mapping[str, int] = {"wire_width": 6, "bus_width": 12}
+"""Thousandths of an inch, of every class: without them wires are plotted with no width."""
 LAST = 2147483647
 """KiCad's priority of the default class; the others count from 0, the first one the strongest."""
 
@@ -32,7 +34,7 @@ def net_settings(summing: Iterable[str], supply: Iterable[str]) -> dict[str, Any
     priority = {DEFAULT: LAST} | {name: number for number, name in enumerate(others)}
     return {
         "classes": [
-            {"name": name, "priority": priority[name], **sizes, **VIA}
+            {"name": name, "priority": priority[name], **sizes, **VIA, **SHEET}
             for name, sizes in CLASSES.items()
         ],
         "meta": {"version": 4},

@@ -32,7 +32,8 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     InputError : a case, a part or a layout that the catalogue does not have.
     Unreachable : a value that cannot be bought.
     """
-    from designer.board import schematic_drawing  # with matplotlib, which nothing before this needs
+    # With matplotlib, which nothing before this needs.
+    from designer.schematic import schematic_drawing
 
     doing("bill of materials, drawing")
     circuit, choice = board_circuit(synthesis)
@@ -70,7 +71,7 @@ def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice
 
 def picture(synthesis: Synthesis) -> bytes:
     """The drawing once more, as points."""
-    from designer.board import schematic_drawing
+    from designer.schematic import schematic_drawing
 
     doing("drawing")
     circuit, choice = board_circuit(synthesis)

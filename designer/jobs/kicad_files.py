@@ -15,7 +15,6 @@ from designer.base.manifest import StageName, Stages, file_hash
 from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
-from designer.board.kicad_project import Project, files
 from designer.board.kicad_reader import BoardFile, read_board
 from designer.board.kicad_rules import board_rules, rules_text
 from designer.check.checked_design import CheckedResponse
@@ -23,6 +22,7 @@ from designer.check.deck_runs import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.jobs.design_files import design_provenance
 from designer.model.model_file import naming
+from designer.schematic.kicad_project import Project, files
 
 STAGE: StageName = "kicad"
 FOLDER = "kicad"
@@ -42,7 +42,8 @@ def texts(synthesis: Synthesis, checked: CheckedResponse | None = None) -> dict[
         parts = components(circuit, synthesis.catalog, choice)
         rules = rules_text(board_rules(circuit, synthesis.modelfile.rules))
         run = first_run(synthesis, checked)
-        project = Project(synthesis.modelfile.title, circuit, parts, run, rules)
+        file = synthesis.modelfile
+        project = Project(file.title, circuit, parts, run, rules, file.board.date)
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 

@@ -19,6 +19,13 @@ def _layout() -> Accepts:
     return Accepts(name.expected, name.read, json=name.json)
 
 
+def _date() -> Accepts:
+    """A tool that writes the same files every day knows no date of its own."""
+    return text(
+        r"|[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])", 'a date such as "2026-11-23"'
+    )
+
+
 @dataclass(frozen=True)
 class BoardSpec(FileTable):
     """What the board has; the defaults of a model file."""
@@ -44,6 +51,8 @@ class BoardSpec(FileTable):
         tuple[str, ...], several('a list of layouts such as ["kicad", "jlcpcb"]', _layout())
     ] = ("kicad", "jlcpcb")
     """Layouts in which the bill is written beside ``bom.csv``."""
+    date: Annotated[str, _date()] = ""
+    """Date in the title blocks of sheet and board, such as "2026-11-23"; "" leaves it out."""
 
 
 @dataclass(frozen=True)

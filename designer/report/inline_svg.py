@@ -1,8 +1,8 @@
 """SVG documents as parts of a page: no identifiers that clash, colours that follow the page.
 
-A figure of ``base.figure_style`` and a drawing of ``board.schematic_drawing`` state their colours
-outright, since they also stand alone. Inside a page each of these colours is a CSS variable, whose
-values for a light page, a dark page and paper stand in ``templates/page.css.j2``.
+A figure of ``base.figure_style`` and a drawing of ``schematic.schematic_drawing`` state their
+colours outright, since they also stand alone. Inside a page each of these colours is a CSS
+variable, whose values for a light page, a dark page and paper stand in ``templates/page.css.j2``.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from designer.base.figure_style import to_svg
 from designer.base.page import Gallery, Picture
-from designer.board import schematic_drawing
 from designer.board.kicad_reader import BoardFile
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
@@ -24,6 +23,7 @@ from designer.report.inline_svg import InlineSvg
 from designer.report.model_drawing import model_drawing
 from designer.report.plot_names import portrait_name, stop_name
 from designer.report.system_drawing import system_drawing
+from designer.schematic import schematic_drawing
 
 INTRO = (
     "Displacement x₁ and velocity x₁′ of mass 1, in the model's units, over one response; below, "

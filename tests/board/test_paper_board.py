@@ -10,13 +10,13 @@ import pytest
 from designer.base.errors import Unreachable
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit, fitted, trim_reach
-from designer.board.kicad_project import Project, files
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.paper_values import MODEL, OPAMP, circuit, corrected, rounded
 from designer.design_rules import run_rules
 from designer.design_rules.subject import RuleSubject
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import parse_model_file
+from designer.schematic.kicad_project import Project, files
 from tests.base.test_views import CIRCUITS
 from tests.shared.kicad_cases import RUN
 from tests.shared.model_text import PAPER_TABLE

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError
-from designer.board.kicad_project import Project
 from designer.catalog.catalog import load_catalog
 from designer.catalog.read import ENVIRONMENT
 from designer.check.synthesis_result import Synthesis
 from designer.cli import entry
 from designer.jobs import kicad_files
+from designer.schematic.kicad_project import Project
 from tests.catalog.test_catalog import own_opamp
 from tests.shared.paper_cases import PAPER
 

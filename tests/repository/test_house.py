@@ -20,13 +20,13 @@ DRAWS = "matplotlib takes a second to import, and nothing before a picture needs
 STARTS = "most verbs do not need it"
 LAZY = {
     DRAWS: {
-        ("board.schematic_drawing", "base.figure_style"),
+        ("schematic.schematic_drawing", "base.figure_style"),
         ("jobs.bench_job", "base.figure_style"),
         ("jobs.bench_job", "report.record_page"),
         ("jobs.bench_job", "report.record_plots"),
         ("jobs.bifurcation_job", "report.bifurcation_plots"),
         ("jobs.bifurcation_work", "base.figure_style"),
-        ("jobs.board_files", "board.schematic_drawing"),
+        ("jobs.board_files", "schematic.schematic_drawing"),
         ("jobs.cure_job", "base.figure_style"),
         ("jobs.cure_job", "centering.cure_plots"),
         ("jobs.study_folder", "report.map_plots"),

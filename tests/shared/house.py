@@ -24,6 +24,7 @@ ORDER = (
     "check",
     "verdicts",
     "board",
+    "schematic",
     "routing",
     "yields",
     "design_rules",

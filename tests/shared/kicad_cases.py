@@ -12,12 +12,12 @@ import numpy as np
 
 from designer.board.board_parts import fitted
 from designer.board.component import components
-from designer.board.kicad_project import Project, files
 from designer.board.kicad_rules import board_rules, rules_text
 from designer.catalog.entries import Mounting
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import Circuit, Excitation
 from designer.model.board_table import BoardChoice, BoardSpec
+from designer.schematic.kicad_project import Project, files
 from designer.spice.deck import SolverSettings
 from tests.base.test_views import CIRCUITS
 from tests.shared.stages import CATALOG

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Sequence
-from textwrap import wrap
 from typing import Any, Literal, cast
 
 import schemdraw
@@ -17,7 +15,9 @@ import schemdraw.elements as elm
 
 from designer.base.units import format_quantity
 from designer.board.component import Numbers, designator
-from designer.board.drawing_cells import (
+from designer.circuit.board_parts_only import SupplyCapacitor
+from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, Reference, Resistor
+from designer.schematic.drawing_cells import (
     Amplifier,
     Cell,
     CellRows,
@@ -25,9 +25,8 @@ from designer.board.drawing_cells import (
     TwoPin,
     board_cells,
     circuit_cells,
+    role_lines,
 )
-from designer.circuit.board_parts_only import SupplyCapacitor
-from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, Reference, Resistor
 
 _SYMBOLS: dict[type, Any] = {
     Resistor: elm.ResistorIEEE,
@@ -208,7 +207,7 @@ class _Page:
             self.drawing += _element(part).endpoints(a, b)
             middle = x + (i + 0.5) * step
             self.text(middle, y + 0.5, _named(part), NAME_SIZE, align="center")
-            for n, line in enumerate(_wrapped(part.role)):
+            for n, line in enumerate(role_lines(part.role, ROLE_WIDTH)):
                 self.text(middle, y - 0.58 - 0.26 * n, line, ROLE_SIZE, FAINT, "center")
 
     def hanging(self, x: float, y: float, length: float, chain: Chain) -> None:
@@ -220,7 +219,7 @@ class _Page:
                 a, b = b, a
             self.drawing += _element(part).endpoints(a, b)
             self.text(x + 0.4, y - (i + 0.4) * step, _named(part), NAME_SIZE)
-            for n, line in enumerate(_wrapped(part.role)):
+            for n, line in enumerate(role_lines(part.role, ROLE_WIDTH)):
                 self.text(x + 0.4, y - (i + 0.4) * step - 0.4 - 0.26 * n, line, ROLE_SIZE, FAINT)
         self.drawing += elm.Ground().theta(0).at((x, y - length)).scale(0.7)
 
@@ -291,9 +290,3 @@ def _named(part: TwoPin) -> str:
 
 def _element(part: TwoPin) -> Any:
     return _SYMBOLS[type(part)]().scale(0.8)
-
-
-def _wrapped(role: str) -> Sequence[str]:
-    """A role in lines, two at most."""
-    lines = wrap(role, ROLE_WIDTH, break_long_words=False, break_on_hyphens=False)
-    return lines if len(lines) < 3 else [lines[0], f"{lines[1]} …"]

@@ -6,17 +6,19 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from designer.base.sexpr import Expression, expression, lists, word
 from designer.board import kicad_symbols as symbols
-from designer.board.kicad_items import SIMULATION, Entry
-from designer.board.kicad_layout import NetLabel, Note, Placed, Sheet, arrange, flow
-from designer.board.kicad_names import HEAD, LIBRARY, SHEET_VERSION, identifier, safe_text
+from designer.board.kicad_board import revision
+from designer.board.kicad_items import Entry
+from designer.board.kicad_names import (
+    HEAD,
+    LIBRARY,
+    SHEET_VERSION,
+    identifier,
+    safe_text,
+    sheet_id,
+    symbol_id,
+)
 from designer.board.kicad_symbols import GRID, SymbolShape, effects, position
-
-
-def layout(entries: Sequence[Entry], directives: Sequence[str]) -> Sheet:
-    """Where everything stands."""
-    simulated = [e.item for e in entries if SIMULATION in e.item.stages.values()]
-    others = [e.item for e in entries if e.item not in simulated]
-    return arrange(others, flow(SIMULATION, simulated, directives))
+from designer.schematic.sheet_drawing import SIZES, NetLabel, Note, Placed, Sheet
 
 
 def shapes(sheet: Sheet) -> tuple[SymbolShape, ...]:
@@ -24,18 +26,10 @@ def shapes(sheet: Sheet) -> tuple[SymbolShape, ...]:
     return tuple({s.item.shape.name: s.item.shape for s in sheet.symbols}.values())
 
 
-def sheet_id(project: str) -> str:
-    """The id of the one sheet."""
-    return identifier(project, "sheet")
-
-
-def symbol_id(project: str, reference: str, unit: int = 1) -> str:
-    """The id of a unit of a symbol; the board's footprints refer to it."""
-    return identifier(project, "symbol", reference, str(unit))
-
-
-def schematic(project: str, title: str, entries: Sequence[Entry], sheet: Sheet) -> Expression:
-    """The file ``.kicad_sch``. title : from the model file, as it is."""
+def schematic(
+    project: str, title: str, entries: Sequence[Entry], sheet: Sheet, date: str = ""
+) -> Expression:
+    """The file ``.kicad_sch``. title : from the model file, as it is. date : of the design."""
     by_reference = {e.item.reference: e for e in entries}
     return expression(
         "kicad_sch",
@@ -46,13 +40,15 @@ def schematic(project: str, title: str, entries: Sequence[Entry], sheet: Sheet) 
             paper=sheet.paper,
             title_block={
                 "title": safe_text(title),
+                **({"date": date} if date else {}),
+                "rev": revision(entries),
                 "comment": (1, "Parts, nets and values follow from the design"),
             },
             lib_symbols=tuple(
                 symbols.symbol(shape, f"{LIBRARY}:{shape.name}") for shape in shapes(sheet)
             ),
         ),
-        *(_note(project, cell.title, note) for cell in sheet.cells for note in cell.notes),
+        *(_note(project, note) for cell in sheet.cells for note in cell.notes),
         *_wiring(project, sheet),
         *(_label(project, label) for label in dict.fromkeys(sheet.labels)),
         *(_symbol(project, placed, by_reference) for placed in sheet.symbols),
@@ -63,14 +59,20 @@ def schematic(project: str, title: str, entries: Sequence[Entry], sheet: Sheet) 
     )
 
 
-def _note(project: str, cell: str, note: Note) -> Expression:
+def _note(project: str, note: Note) -> Expression:
+    """KiCad measures a text of several lines from its first one."""
+    size = SIZES[note.kind]
+    role = note.kind == "role"
+    x, y = note.at
     return expression(
         "text",
         note.text,
         exclude_from_sim=not note.text.startswith("."),  # a directive
-        at=position(*note.at),
-        effects=effects("left", "bottom", size=2.0 if note.heading else symbols.TEXT),
-        uuid=identifier(project, "text", cell, note.text),
+        at=position(x, y),
+        effects=effects(
+            *(("left",) if note.left or not role else ()), "top" if role else "bottom", size=size
+        ),
+        uuid=identifier(project, "text", note.kind, note.owner),
     )
 
 
@@ -133,21 +135,23 @@ def _symbol(project: str, placed: Placed, entries: Mapping[str, Entry]) -> Expre
 
 def _properties(placed: Placed, entry: Entry | None) -> Iterator[Expression]:
     item = placed.item
-    (rx, ry), (vx, vy) = item.shape.texts
+    reference, value = placed.names_at()
     supply = len(item.shape.units) > 1 and placed.unit == len(item.shape.units)
     hidden = item.value in ("GND", "PWR_FLAG") if item.shape.power else item.shape.prefix == "TP"
     if supply:
-        rx, ry = 3.5, 0.0
-    yield _property("Reference", item.reference, placed.x + rx, placed.y - ry, item.shape.power)
-    yield _property("Value", item.value, placed.x + vx, placed.y - vy, hidden or supply)
+        reference = placed.x - 3.8, float(placed.y)
+    # KiCad turns the texts of a symbol that stands with it: these are turned back.
+    angle = 90 if placed.upright else 0
+    yield _property("Reference", item.reference, *reference, item.shape.power, angle)
+    yield _property("Value", item.value, *value, hidden or supply, angle)
     fields = dict(entry.fields) if entry is not None else {}
     fields = {"Footprint": "", "Datasheet": "", "Description": "", **fields}
     for key, text in fields.items():
         yield _property(key, text, placed.x, placed.y, True)
 
 
-def _property(key: str, text: str, x: float, y: float, hide: bool) -> Expression:
-    return expression("property", key, text, at=position(x, y), effects=effects(hide=hide))
+def _property(key: str, text: str, x: float, y: float, hide: bool, angle: int = 0) -> Expression:
+    return expression("property", key, text, at=position(x, y, angle), effects=effects(hide=hide))
 
 
 def _at(point: tuple[int, int]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 from types import MappingProxyType
 
 from designer.base.units import format_quantity
@@ -122,13 +123,23 @@ def chains(parts: Iterable[TwoPin], visible: frozenset[str]) -> list[Chain]:
     return sorted(out, key=lambda chain: min((order.get(p, 0) for p in chain.parts), default=0))
 
 
-def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
+def role_lines(role: str, letters: int) -> list[str]:
+    """A role in lines of so many letters, two lines at most."""
+    lines = wrap(role, letters, break_long_words=False, break_on_hyphens=False)
+    return lines if len(lines) < 3 else [lines[0], f"{lines[1]} …"]
+
+
+def circuit_cells(
+    circuit: Circuit, fittings: Sequence[TwoPin] = ()
+) -> tuple[tuple[Cell, ...], ...]:
     """Rows of cells: for each mass its velocity, displacement and inverses; then each dead zone,
-    and what several of them share."""
+    and what several of them share. fittings : drawn at the nodes of the circuit, with its parts.
+    """
     pins = {net for s in circuit.sections for net in s.nets}
     rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
-    visible = frozenset(pins | rails | {*circuit.stage_outputs})
-    two_pin = [p for p in circuit.parts if not isinstance(p, Section)]
+    shown = {net for part in fittings for net in part.nets}
+    visible = frozenset(pins | rails | shown | {*circuit.stage_outputs})
+    two_pin = [*(p for p in circuit.parts if not isinstance(p, Section)), *fittings]
     left = chains(two_pin, visible)
     stages = section_stages(circuit)
     cells = {s.name: _amplifier(circuit, s, stages[s.name], left) for s in circuit.sections}

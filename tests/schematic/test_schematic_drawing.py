@@ -10,13 +10,13 @@ from itertools import combinations
 import pytest
 from matplotlib import pyplot
 
-from designer.board import schematic_drawing
 from designer.board.board_parts import fitted
 from designer.board.component import Numbers, components, designator, pin_numbers
-from designer.board.drawing_cells import Amplifier, Chain, board_cells, circuit_cells
 from designer.circuit.board_parts_only import Connector, TestPoint
 from designer.circuit.netlist import Circuit, Section
 from designer.model.board_table import BoardChoice
+from designer.schematic import schematic_drawing
+from designer.schematic.drawing_cells import Amplifier, Chain, board_cells, circuit_cells
 from tests.base.test_views import CIRCUITS
 from tests.shared.stages import CATALOG
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from designer.base.sexpr import read
-from designer.board.kicad_project import files
 from designer.check import checked_design
 from designer.check.deck_runs import FirstRun
 from designer.circuit import nominal
 from designer.circuit.netlist import nominal_board
 from designer.dynamics.orbit import Orbit
+from designer.schematic.kicad_project import files
 from designer.spice import deck, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read

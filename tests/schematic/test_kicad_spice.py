@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.board.kicad_project import files
 from designer.catalog.entries import Mounting
 from designer.check.deck_runs import FirstRun
 from designer.circuit.coefficients import coefficient_errors
@@ -18,12 +17,13 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
+from designer.schematic.kicad_project import files
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.worker import open_simulator
-from tests.board.test_kicad_cli import same, spice
+from tests.schematic.test_kicad_cli import same, spice
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit
 from tests.shared.exact_circuits import Scale, exact_values
 from tests.shared.kicad_cases import project, written

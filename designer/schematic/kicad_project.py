@@ -12,14 +12,15 @@ from designer.board.component import Component
 from designer.board.kicad_board import board
 from designer.board.kicad_footprint import module
 from designer.board.kicad_items import entries
-from designer.board.kicad_names import LIBRARY, kicad_net, project_name
+from designer.board.kicad_names import LIBRARY, kicad_net, project_name, sheet_id
 from designer.board.kicad_netlist import netlist
 from designer.board.kicad_placement import place
-from designer.board.kicad_sheet import layout, schematic, shapes, sheet_id
 from designer.board.kicad_symbols import library
 from designer.board.net_classes import net_settings
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
+from designer.schematic.kicad_sheet import schematic, shapes
+from designer.schematic.sheet_layout import layout
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Project:
     """What the simulation of the project shows."""
     rules: str
     """Text of the ``.kicad_dru``."""
+    date: str = ""
+    """Date in the title blocks, such as "2026-11-23"; "" where there is none."""
 
     @property
     def name(self) -> str:
@@ -53,12 +56,14 @@ def files(project: Project) -> dict[str, str]:
     name, circuit = project.name, project.circuit
     models = f"{name}.lib"
     listed = entries(circuit, project.components, project.run, models)
-    sheet = layout(listed, kicad_sim.directives(circuit, project.run))
+    sheet = layout(circuit, listed, kicad_sim.directives(circuit, project.run))
     placed = place(circuit, [c for e in listed if e.placed and (c := e.component) is not None])
     cases = {s.footprint.name: s.footprint for s in (*placed.spots, *placed.holes)}
+    drawn = schematic(name, project.title, listed, sheet, project.date)
+    pads = board(name, project.title, listed, placed, project.date)
     out = {
-        f"{name}.kicad_sch": expression_text(schematic(name, project.title, listed, sheet)),
-        f"{name}.kicad_pcb": expression_text(board(name, project.title, listed, placed)),
+        f"{name}.kicad_sch": expression_text(drawn),
+        f"{name}.kicad_pcb": expression_text(pads),
         f"{name}.kicad_pro": settings(name, circuit),
         f"{name}.net": expression_text(netlist(name, listed)),
         models: kicad_sim.models(circuit, project.components),

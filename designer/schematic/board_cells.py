@@ -1,0 +1,190 @@
+"""Cells of the sheet that only the board or the simulation has: probes, supply, all the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from designer.board.kicad_items import Item
+from designer.board.kicad_names import POWER
+from designer.board.kicad_symbols import PART_ROW, REACH
+from designer.board.pins import SUPPLY_UNIT
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint
+from designer.circuit.netlist import Circuit, Diode, Resistor, Section
+from designer.schematic.amplifier_cells import (
+    PART,
+    SheetParts,
+    follower_cell,
+    headed,
+    row,
+    stand,
+)
+from designer.schematic.drawing_cells import Chain
+from designer.schematic.sheet_drawing import (
+    Inlet,
+    Note,
+    Placed,
+    SheetCell,
+    label_width,
+)
+
+WIDTH = 50
+"""Of a cell of parts in rows."""
+STACK = 18
+"""Of two capacitors one above the other, with their texts."""
+
+
+def node_fittings(circuit: Circuit) -> tuple[Resistor | Diode, ...]:
+    """What the board adds at the summing nodes: protection, the resistor of the trim."""
+    nodes = {s.inverting for s in circuit.sections}
+    both = (p for p in circuit.fittings if isinstance(p, Resistor | Diode))
+    return tuple(p for p in both if nodes & set(p.nets))
+
+
+def probe_cells(circuit: Circuit, parts: SheetParts) -> Iterator[SheetCell]:
+    """The outputs with their resistors and their connector."""
+    at_nodes = node_fittings(circuit)
+    fittings = [p for p in circuit.fittings if isinstance(p, Resistor) and p.name in parts.items]
+    probes = [p for p in fittings if p not in at_nodes]
+    if probes:
+        yield probe_cell(circuit, probes, parts)
+
+
+def supply_cells(circuit: Circuit, parts: SheetParts) -> Iterator[SheetCell]:
+    """The supply, the supply pins of each package, the spare sections."""
+    yield supply_cell(circuit, parts)
+    for package in circuit.packages:
+        yield decoupling_cell(circuit, package, parts)
+    for spare in circuit.fittings:
+        if isinstance(spare, Section):
+            yield follower_cell(spare, parts)
+
+
+def probe_cell(circuit: Circuit, probes: Sequence[Resistor], parts: SheetParts) -> SheetCell:
+    """Each output's resistor, its pad and its pin of the connector in one line."""
+    cell = SheetCell("outputs")
+    pads = {p.net: p for p in circuit.fittings if isinstance(p, TestPoint)}
+    behind = {p.b: p for p in probes}
+    connector = next(
+        p for p in circuit.fittings if isinstance(p, Connector) and set(p.ways) & set(behind)
+    )
+    first = 2 + max(label_width(p.a) for p in probes)
+    named = first + PART + max(map(label_width, behind))
+    pin = named + 10
+    placed = Placed(parts.items[connector.name], 1, pin + REACH, 0)
+    cell.symbols.append(placed)
+    for number, net in placed.item.pins.items():
+        at = placed.point(number)
+        probe = behind.get(net)
+        if probe is None:
+            cell.pin_end(placed, number, (at[0] - 2, at[1]))
+            continue
+        start = first, at[1]
+        row(cell, Chain(probe.a, net, (probe,)), start, first + PART - 2, parts)
+        cell.inlets.append(Inlet(probe.a, start, f"{probe.name}_in"))
+        cell.wire((first + PART - 2, at[1]), at)
+        cell.end(net, (first + PART - 2, at[1]), probe.name, left=False)
+        if net in pads:
+            pad = parts.items[pads[net].name]
+            cell.symbols.append(Placed(pad, 1, named + 1, at[1]))
+    cell.right = pin + REACH + 6
+    cell.bottom = max(y for _, y in map(placed.point, placed.item.pins)) + 5
+    return headed(cell, -6)
+
+
+def supply_cell(circuit: Circuit, parts: SheetParts) -> SheetCell:
+    """The supply's connector, and the bulk capacitors between rails and ground."""
+    cell = SheetCell("supply")
+    rails = set(POWER)
+    connector = next(
+        p for p in circuit.fittings if isinstance(p, Connector) and set(p.ways) <= rails
+    )
+    placed = Placed(parts.items[connector.name], 1, 9, 4)
+    cell.symbols.append(placed)
+    for number in placed.item.pins:
+        x, y = placed.point(number)
+        cell.pin_end(placed, number, (x - 2, y))
+    _stack(cell, _capacitors(circuit, ""), 22, parts)
+    cell.right, cell.bottom = 22 + STACK, 18
+    return headed(cell, -8)
+
+
+def decoupling_cell(circuit: Circuit, package: str, parts: SheetParts) -> SheetCell:
+    """The supply pins of a package, with the capacitors that stand at them."""
+    item, unit = parts.units[f"{package}{SUPPLY_UNIT}"]
+    cell = SheetCell(f"supply · {package}")
+    placed = Placed(item, unit, 6, 6)
+    cell.symbols.append(placed)
+    _stack(cell, _capacitors(circuit, package), 14, parts)
+    for pin in placed.pins:
+        x, y = placed.point(pin.number)
+        rail = 0 if y < placed.y else 12
+        cell.wire((x, y), (x, rail), (14, rail))
+    cell.right, cell.bottom = 14 + STACK, 16
+    return headed(cell, -5)
+
+
+def _capacitors(circuit: Circuit, package: str) -> list[SupplyCapacitor]:
+    """Of a package, that of the positive rail first."""
+    found = [p for p in circuit.fittings if isinstance(p, SupplyCapacitor)]
+    return [p for p in found if p.package == package]
+
+
+def _stack(
+    cell: SheetCell, capacitors: Sequence[SupplyCapacitor], x: int, parts: SheetParts
+) -> None:
+    """Capacitors one above the other from the positive rail, y = 0, down to the negative."""
+    y = 0
+    for part in capacitors:
+        item = parts.items[part.name]
+        stand(cell, item, part.minus, (x, y + REACH), parts)
+        aside = (x, y) if y == 0 else (x - 3, y)
+        cell.wire((x, y), aside)
+        cell.end(part.plus, aside, f"{part.name}_plus", left=False)
+        y += 2 * REACH
+    cell.end(capacitors[-1].minus, (x, y), f"{capacitors[-1].name}_minus", left=False)
+
+
+def flow_cell(title: str, items: Iterable[Item], lines: Sequence[str] = ()) -> SheetCell:
+    """Parts in rows, named at every end; lines of text below them."""
+    cell = SheetCell(title)
+    x, y, tallest = 0, 0, 0
+    for item in items:
+        width, height = _size(item)
+        if x and x + width > WIDTH:
+            x, y, tallest = 0, y + tallest, 0
+        _alone(cell, item, x, y)
+        x, tallest = x + width, max(tallest, height)
+    y += tallest
+    for i, text in enumerate(lines):
+        cell.notes.append(Note(text, (0, y + 2 * i + 2), f"{title} {i}", "line"))
+    cell.right, cell.bottom = WIDTH, y + 2 * len(lines) + 2
+    return headed(cell, -6)
+
+
+def _size(item: Item) -> tuple[int, int]:
+    """Room of a part with its names."""
+    pins = item.shape.units[0].pins
+    if item.shape.prefix in ("#FLG", "TP"):
+        return 12, 10
+    if len(pins) == 2 and not item.shape.numbers:
+        return 25, PART_ROW + (2 if item.shape.prefix == "V" else 0)
+    return 25, max(p.y for p in pins) - min(p.y for p in pins) + 8
+
+
+def _alone(cell: SheetCell, item: Item, x: int, y: int) -> None:
+    """One part with the names of its nets at its pins."""
+    small = item.shape.prefix in ("#FLG", "TP")
+    placed = Placed(item, 1, x + (3 if small else 13), y + (4 if small else 0))
+    cell.symbols.append(placed)
+    for pin in placed.pins:
+        at, net = placed.point(pin.number), item.pins[pin.number]
+        if item.shape.prefix == "#FLG":
+            away = (at[0] + 4, at[1])
+            down = (away[0], away[1] + (2 if POWER.get(net) != "VCC" else 0))
+            cell.wire(at, away, down)
+            cell.end(net, down, f"{item.reference}_{pin.number}", left=False)
+        elif small or not net:
+            cell.pin_end(placed, pin.number, at)
+        else:
+            step = (4 if item.shape.prefix == "V" else 2) * (-1 if pin.angle == 0 else 1)
+            cell.pin_end(placed, pin.number, (at[0] + step, at[1]))
