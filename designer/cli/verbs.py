@@ -434,6 +434,15 @@ def export(
         Path | None,
         option("--session", "FILE", "With --routed: tracks of another router first, a .ses."),
     ] = None,
+    layers: Annotated[
+        int | None,
+        option(
+            "--layers",
+            "N",
+            "With --routed: copper layers, 2, or 4 with planes of ground between the sides "
+            "[as the board has; 2].",
+        ),
+    ] = None,
     dsn: Annotated[
         Path | None,
         option("--dsn", "FILE", "Instead: write the board for another router, a .dsn."),
@@ -479,6 +488,7 @@ def export(
         routed=routed,
         keep=keep,
         session=routes,
+        layers=layers,
         dsn=dsn,
         deck=[name.value for name in deck or ()],
         fab=fab or (),

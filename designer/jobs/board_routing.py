@@ -18,6 +18,7 @@ from designer.board.kicad_rules import board_rules
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import kicad_files
 from designer.jobs.options import Options
+from designer.routing.board_layers import layer_count, with_layers
 from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
 
@@ -28,27 +29,40 @@ def board_file(synthesis: Synthesis) -> str:
 
 
 def route_in_folder(
-    folder: Folder, synthesis: Synthesis, progress: Progress, session: Path | None = None
+    folder: Folder,
+    synthesis: Synthesis,
+    progress: Progress,
+    session: Path | None = None,
+    count: int | None = None,
 ) -> dict[str, Any]:
     """Route what is open on the folder's board; what the answer says of it.
 
-    session : of another router, whose tracks and vias come first, in the place of the board's. A
+    session : of another router, whose tracks and vias come first, in the place of the board's.
+    count : of copper layers, 2 or 4; None for as many as the board has. With another number its
+    tracks are laid anew. A
     board that somebody has changed stays one: the manifest keeps the hash of what was written
     before, so that no verb replaces it.
 
     Raises
     ------
-    InputError : the board cannot be read, or is of another design.
+    InputError : the board cannot be read, is of another design, or has another number of layers
+        and somebody's changes.
     """
     name = board_file(synthesis)
     circuit, choice = board_circuit(synthesis)
     there = read_board(folder / name)
     check_belongs(there, components(circuit, synthesis.catalog, choice))
     progress.stage("routing")
-    text = there.text if session is None else with_session(there.text, session)
+    ours = _as_written(folder, name, (folder / name).read_bytes())
+    text, layers = there.text, layer_count(there.text)
+    if count not in (None, layers):
+        if not ours:
+            expected = f"{layers}, which the board has that somebody has changed"
+            raise InputError(None, "--layers", str(count), expected)
+        text = with_layers(text, count)
+    text = text if session is None else with_session(text, session)
     routed = route_board(text, circuit, board_rules(circuit, synthesis.modelfile.rules))
-    before = (folder / name).read_bytes()
-    if _as_written(folder, name, before):
+    if ours:
         folder.rewrite(name, routed.text)
     else:
         _replace(folder / name, routed.text)
@@ -107,6 +121,7 @@ def _replace(path: Path, text: str) -> None:
 def _answer(name: str, routed: RoutedBoard) -> dict[str, Any]:
     return {
         "board": name,
+        "layers": layer_count(routed.text),
         "open": dict(routed.open),
         "length_mm": round(sum(routed.lengths.values()), 3),
         "vias": routed.vias,

@@ -42,6 +42,7 @@ from designer.jobs.options import Options
 from designer.jobs.rules_job import checked
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
+from designer.routing.board_layers import INNER
 from designer.spice import simulator_decks
 from designer.spice.simulator_decks import Dialect, file_name
 
@@ -100,6 +101,7 @@ def export(
     routed: bool = False,
     keep: bool = False,
     session: Path | str | None = None,
+    layers: int | None = None,
     dsn: Path | str | None = None,
     deck: Sequence[Dialect] = (),
     fab: Sequence[str] = (),
@@ -115,8 +117,9 @@ def export(
     model : a design folder, or a model file with ``out``. routed : with tracks and ground pours on
     the board of the KiCad project. keep : with ``routed``, on the board as somebody has changed it:
     its tracks stay, and what is open is routed. session : with ``routed``, what another router made
-    of the board (.ses), whose tracks come first. dsn : a file to write the board into for such a
-    router (.dsn). deck : "ltspice", "portable" or both.
+    of the board (.ses), whose tracks come first. layers : with ``routed``, 2 copper layers, or 4
+    with planes of ground between the sides; None for as many as the board has, 2 at first. dsn : a
+    file to write the board into for such a router (.dsn). deck : "ltspice", "portable" or both.
     fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
     project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
     parts : with ``fab``, a list of order numbers and prices, before the catalogue's. accept : with
@@ -139,14 +142,16 @@ def export(
     if routed and (deck or fab):
         other = "--fab" if fab else "--deck"
         raise InputError(None, other, "with --routed", "one after the other: --routed first")
-    for option, given in (("--keep", keep), ("--session", session)):
+    for option, given in (("--keep", keep), ("--session", session), ("--layers", layers)):
         if given and not routed:
             raise InputError(None, option, "given alone", "--routed beside it")
+    if layers not in (None, *INNER):
+        raise InputError(None, "--layers", str(layers), "2 or 4")
     if dsn is not None and (routed or deck or fab):
         raise InputError(None, "--dsn", "with another", "one after the other")
     modelfile, folder = source(model, out)
     if routed:
-        return export_routed(modelfile, folder, keep, options, progress, _path(session))
+        return export_routed(modelfile, folder, keep, options, progress, _path(session), layers)
     if dsn is not None:
         return export_design(modelfile, folder, Path(dsn), options, progress)
     if fab:
@@ -196,10 +201,11 @@ def export_routed(
     options: Options,
     progress: Progress,
     session: Path | None = None,
+    layers: int | None = None,
 ) -> ExportResult:
     """Write the project where there is none, and route what is open on its board.
 
-    session : of another router, or None.
+    session : of another router, or None. layers : of copper; None for as many as there are.
 
     Raises
     ------
@@ -213,7 +219,7 @@ def export_routed(
         export_into(modelfile, out, options, progress)
         runner, synthesis, reused = _design(modelfile, out, options, progress)
         folder = runner.folder
-    routing = route_in_folder(folder, synthesis, progress, session)
+    routing = route_in_folder(folder, synthesis, progress, session, layers)
     listed = {} if folder.manifest is None else folder.manifest.files
     files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
     made = _result(runner, files, reused)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import shapely
@@ -18,6 +18,8 @@ from designer.board.outline import pen_path, read_outline
 FRONT, BACK = "F.Cu", "B.Cu"
 LAYERS = (FRONT, BACK)
 """The layers that tracks are laid on."""
+ALL = "*.Cu"
+"""KiCad's name of every copper layer."""
 CHORDS = 8
 """Of a quarter of a circle."""
 SCREW_ROOM = 0.3
@@ -41,6 +43,19 @@ class Copper:
     """Whether no via may be in it: a pad, a hole or a via."""
     relief: bool = False
     """Whether a pour leaves a thermal relief round it: a pad that is soldered."""
+    inner: frozenset[str] = frozenset()
+    """The inner layers that it is on."""
+
+    def on(self, layer: str) -> bool:
+        """Whether it is on the layer of this name."""
+        return layer in self.inner or any(
+            there and layer == name for name, there in zip(LAYERS, self.layers, strict=True)
+        )
+
+    @property
+    def through(self) -> bool:
+        """Whether it joins both sides, and the planes between them."""
+        return all(self.layers)
 
 
 @dataclass(frozen=True)
@@ -55,6 +70,15 @@ class BoardCopper:
     """The board's edge as lines."""
     area: Geometry
     """What the outermost edge encloses, less the cut-outs."""
+    inner: tuple[str, ...] = ()
+    """The inner copper layers, from the front."""
+    planes: tuple[str, ...] = ()
+    """Those of them that no zone is on: planes of ground lie there, which every via reaches."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All copper layers, from the front."""
+        return FRONT, *self.inner, BACK
 
 
 def grown(shape: Geometry, by: float) -> Geometry:
@@ -74,15 +98,32 @@ def read_copper(board: Expression) -> BoardCopper:
     if not len(outline.sides) or outline.open_at is not None:
         raise board.error("no closed edge", "a closed line on Edge.Cuts")
     edge = shapely.multilinestrings([shapely.linestrings(outline.sides)])[0]
-    pieces = [piece for each in board.all("footprint") for piece in _pads(each)]
-    pieces += [_track(each) for kind in TRACKS for each in board.all(kind)]
-    pieces += [_via(each) for each in board.all("via")]
+    inner = inner_layers(board)
+    pieces = [piece for each in board.all("footprint") for piece in _pads(each, inner)]
+    pieces += [_track(each, inner) for kind in TRACKS for each in board.all(kind)]
+    pieces += [_via(each, inner) for each in board.all("via")]
+    zones = {name for each in board.all("zone") for name in zone_layers(each)}
     return BoardCopper(
         tuple(pieces),
         {int(net.number(0)): net.text(1) for net in board.all("net")},
         edge,
         _enclosed(edge),
+        inner,
+        tuple(name for name in inner if not zones & {name, ALL}),
     )
+
+
+def inner_layers(board: Expression) -> tuple[str, ...]:
+    """The copper layers between front and back, from the front."""
+    listed = board.find("layers")
+    names = [each.text(0) for each in listed.children] if listed is not None else []
+    return tuple(name for name in names if name.endswith(".Cu") and name not in LAYERS)
+
+
+def zone_layers(zone: Expression) -> frozenset[str]:
+    """The names of layers that a zone states, such as ``*.Cu``."""
+    stated = (*zone.all("layer"), *zone.all("layers"))
+    return frozenset(name for each in stated for name in each.atoms)
 
 
 def _enclosed(edge: Geometry) -> Geometry:
@@ -95,7 +136,7 @@ def _enclosed(edge: Geometry) -> Geometry:
     return area
 
 
-def _pads(footprint: Expression) -> Iterator[Copper]:
+def _pads(footprint: Expression, inner: Sequence[str]) -> Iterator[Copper]:
     at = footprint.get("at")
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
     for pad in footprint.all("pad"):
@@ -104,11 +145,14 @@ def _pads(footprint: Expression) -> Iterator[Copper]:
         angle = math.radians(own.number(2) if len(own.atoms) > 2 else 0.0)
         net = pad.find("net")
         number = NO_NET if net is None else int(net.number(0))
-        layers, shape = layers_of(pad.get("layers").atoms), _pad_shape(pad, place, angle)
+        names, shape = pad.get("layers").atoms, _pad_shape(pad, place, angle)
         if pad.text(1) == "np_thru_hole":
-            yield Copper(grown(shape, SCREW_ROOM), NO_NET, (True, True))
+            bare = grown(shape, SCREW_ROOM)
+            yield Copper(bare, NO_NET, (True, True), inner=frozenset(inner))
         else:
-            yield Copper(shape, number, layers, relief=True)
+            yield Copper(
+                shape, number, layers_of(names), relief=True, inner=_inner_of(names, inner)
+            )
 
 
 def _pad_shape(pad: Expression, place: tuple[float, float], angle: float) -> Geometry:
@@ -122,8 +166,13 @@ def _pad_shape(pad: Expression, place: tuple[float, float], angle: float) -> Geo
 
 def layers_of(names: Iterable[str]) -> tuple[bool, bool]:
     there = set(names)
-    both = "*.Cu" in there or "F&B.Cu" in there
+    both = ALL in there or "F&B.Cu" in there
     return both or FRONT in there, both or BACK in there
+
+
+def _inner_of(names: Iterable[str], inner: Sequence[str]) -> frozenset[str]:
+    there = set(names)
+    return frozenset(inner if ALL in there else there & set(inner))
 
 
 def track_path(item: Expression) -> list[Point]:
@@ -132,17 +181,16 @@ def track_path(item: Expression) -> list[Point]:
     return pen_path(Expression((word(drawn), *item.items[1:]), item.source, item.offset))
 
 
-def _track(item: Expression) -> Copper:
+def _track(item: Expression, inner: Sequence[str]) -> Copper:
     shape = grown(shapely.LineString(track_path(item)), item.get("width").number() / 2.0)
-    return Copper(
-        shape, int(item.get("net").number()), layers_of(item.get("layer").atoms), pad=False
-    )
+    net, names = int(item.get("net").number()), item.get("layer").atoms
+    return Copper(shape, net, layers_of(names), pad=False, inner=_inner_of(names, inner))
 
 
-def _via(item: Expression) -> Copper:
+def _via(item: Expression, inner: Sequence[str]) -> Copper:
     at = item.get("at")
     shape = grown(shapely.Point(at.number(0), at.number(1)), item.get("size").number() / 2.0)
-    return Copper(shape, int(item.get("net").number()), (True, True))
+    return Copper(shape, int(item.get("net").number()), (True, True), inner=frozenset(inner))
 
 
 def track_item(

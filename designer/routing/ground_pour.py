@@ -25,8 +25,9 @@ BRIDGE = 0.4
 """Width of a thermal bridge [mm]."""
 BRIDGES = 2
 """Least number of bridges of a pad; with fewer its track alone joins it."""
-OVERLAP = 0.2
-"""How far a bridge reaches into the pour [mm]."""
+OVERLAP = 0.25
+"""How far a bridge reaches past the gap [mm], to the middle of its round end: more than half its
+width and the slack, so that the end lies in the pour."""
 SLACK = 0.01
 """More than each gap [mm]: corners of circles lie on them, chords inside."""
 
@@ -35,8 +36,8 @@ SLACK = 0.01
 class Pour:
     """A pour of one layer."""
 
-    layer: int
-    """0 on the front, 1 on the back."""
+    layer: str
+    """Name of the layer."""
     border: Array
     """(n, 2) corners of its border [mm]."""
     fills: tuple[Array, ...]
@@ -44,7 +45,7 @@ class Pour:
 
 
 def ground_pour(
-    copper: BoardCopper, ground: int, layer: int, clearances: Mapping[int, float], least: float
+    copper: BoardCopper, ground: int, layer: str, clearances: Mapping[int, float], least: float
 ) -> Pour:
     """Fill a layer of a routed board.
 
@@ -52,7 +53,7 @@ def ground_pour(
     the pour itself [mm].
     """
     border = shapely.buffer(copper.area, -EDGE - SLACK, join_style="mitre")
-    there = [piece for piece in copper.pieces if piece.layers[layer]]
+    there = [piece for piece in copper.pieces if piece.on(layer)]
     own = [piece for piece in there if piece.net == ground]
     foreign = shapely.union_all(
         [

@@ -158,8 +158,13 @@ def relax(
 
 
 @callee
-def find(grid: Grid, tariff: Tariff, work: SearchSpace, trees: int, box: Int, search: int) -> int:
-    """The node of the goal that the cheapest way from the tree ends at; -1 where there is none."""
+def find(
+    grid: Grid, tariff: Tariff, work: SearchSpace, trees: int, box: Int, search: int, plane: bool
+) -> int:
+    """The node of the goal that the cheapest way from the tree ends at; -1 where there is none.
+
+    plane : whether any via is a goal too.
+    """
     width, places = grid.width, grid.places
     owner, taken = grid.owner[tariff.kind], grid.taken[tariff.kind]
     rows = places // width
@@ -178,10 +183,10 @@ def find(grid: Grid, tariff: Tariff, work: SearchSpace, trees: int, box: Int, se
         x, y = place % width, place // width
         if key > work.cost[node] + bound(x, y, box, least):
             continue
-        if work.goal[node] == search:
-            return int(node)
         before = work.parent[node]
         came = 0 if before < 0 else node - before
+        if work.goal[node] == search or (plane and abs(came) == places):
+            return int(node)
         factor = tariff.back if layer else tariff.front
         for dy in range(-1, 2):
             for dx in range(-1, 2):
@@ -267,7 +272,7 @@ def route(
             x, y = place % grid.width, place // grid.width
             box[0], box[1] = min(box[0], x), min(box[1], y)
             box[2], box[3] = max(box[2], x), max(box[3], y)
-        node = find(grid, tariff, work, trees, box, search)
+        node = find(grid, tariff, work, trees, box, search, False)
         if node < 0:
             open_ += 1
             continue
@@ -280,6 +285,46 @@ def route(
         size += 1
         for i in range(starts[target], starts[target + 1]):
             trees = grow(grid, work, trees, nodes[i], starts, nodes, gaps)
+    return size, open_
+
+
+@compiled
+def route_to_plane(
+    grid: Grid, tariff: Tariff, work: SearchSpace, starts: Int, nodes: Small, out: Small
+) -> tuple[int, int]:
+    """Join each terminal of a net to a plane below: by a via, or to copper that has one.
+
+    Arguments and answer as of ``route``.
+    """
+    terminals = len(starts) - 1
+    reached = np.zeros(terminals, dtype=np.int16)
+    box = np.zeros(4, dtype=np.int64)
+    box[2], box[3] = grid.width - 1, grid.places // grid.width - 1
+    size, open_ = 0, 0
+    for t in range(terminals):
+        work.searches[0] += 1
+        search = work.searches[0]
+        for i in range(size):
+            if out[i] != BREAK:
+                work.goal[out[i]] = search
+        for i in range(starts[t]):
+            work.goal[nodes[i]] = search
+        for other in range(t):
+            if reached[other] == 0:
+                for i in range(starts[other], starts[other + 1]):
+                    work.goal[nodes[i]] = 0
+        trees = starts[t + 1] - starts[t]
+        work.tree[:trees] = nodes[starts[t] : starts[t + 1]]
+        node = find(grid, tariff, work, trees, box, search, True)
+        reached[t] = node >= 0
+        open_ += node < 0
+        while node >= 0:
+            out[size] = node
+            size += 1
+            node = work.parent[node]
+        if reached[t]:
+            out[size] = BREAK
+            size += 1
     return size, open_
 
 

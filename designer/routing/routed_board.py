@@ -12,7 +12,14 @@ from designer.base.sexpr import Expression, expression, expression_text, lists, 
 from designer.board.kicad_names import circuit_net, identifier
 from designer.board.kicad_rules import CustomRule
 from designer.circuit.netlist import Circuit
-from designer.routing.board_copper import LAYERS, read_copper, track_item, via_item
+from designer.routing.board_copper import (
+    ALL,
+    LAYERS,
+    read_copper,
+    track_item,
+    via_item,
+    zone_layers,
+)
 from designer.routing.ground_pour import (
     BRIDGE,
     RELIEF,
@@ -107,19 +114,18 @@ def _straight(grid: RoutingGrid, run: Nodes) -> Iterator[list[int]]:
 def _pours(
     board: Expression, kinds: Sequence[NetKind], of: Mapping[int, str]
 ) -> Iterator[Expression]:
-    """A pour of ground for each layer that has none."""
+    """A pour of ground for each side that has none, and for each inner layer without a zone."""
     copper = read_copper(board)
     clearance = {kind.name: kind.clearance for kind in kinds}
     clearances = {net: clearance[name] for net, name in of.items()}
     least = clearance[GROUND_KIND]
     for ground in (net for net, name in of.items() if name == GROUND_KIND):
         zones = [z for z in board.all("zone") if z.get("net").text() == str(ground)]
-        places = [each for z in zones for each in (*z.all("layer"), *z.all("layers"))]
-        there = {name for each in places for name in each.atoms}
-        for layer in (0, 1):
-            if not there & {LAYERS[layer], "F&B.Cu", "*.Cu"}:
-                pour = ground_pour(copper, ground, layer, clearances, least)
-                yield _zone(pour, ground, copper.nets[ground], least)
+        there = {name for zone in zones for name in zone_layers(zone)}
+        outer = [name for name in LAYERS if not there & {name, "F&B.Cu", ALL}]
+        for layer in (*outer, *copper.planes):
+            pour = ground_pour(copper, ground, layer, clearances, least)
+            yield _zone(pour, ground, copper.nets[ground], least)
 
 
 def _ours(item: object) -> bool:
@@ -132,14 +138,13 @@ def _ours(item: object) -> bool:
 
 
 def _zone(pour: Pour, net: int, name: str, clearance: float) -> Expression:
-    layer = LAYERS[pour.layer]
     return expression(
         "zone",
         *lists(
             net=net,
             net_name=name,
-            layer=layer,
-            uuid=identifier("pour", name, layer),
+            layer=pour.layer,
+            uuid=identifier("pour", name, pour.layer),
             name=POUR,
             hatch=(word("edge"), 0.5),
         ),
@@ -147,7 +152,10 @@ def _zone(pour: Pour, net: int, name: str, clearance: float) -> Expression:
         *lists(min_thickness=THINNEST, filled_areas_thickness=False),
         expression("fill", True, thermal_gap=RELIEF, thermal_bridge_width=BRIDGE),
         expression("polygon", _points(pour.border)),
-        *(expression("filled_polygon", *lists(layer=layer), _points(fill)) for fill in pour.fills),
+        *(
+            expression("filled_polygon", *lists(layer=pour.layer), _points(fill))
+            for fill in pour.fills
+        ),
     )
 
 

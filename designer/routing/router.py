@@ -30,6 +30,7 @@ from designer.routing.kernel_router import (
     conflicts,
     count,
     route,
+    route_to_plane,
 )
 from designer.routing.net_kinds import GROUND_KIND, NetKind
 from designer.routing.routing_grid import STEP, Nodes, RoutingGrid, routing_grid
@@ -56,6 +57,13 @@ class Terminals:
     """(T + 1,) where each terminal's nodes begin in ``nodes``."""
     nodes: Nodes
     """The nodes of all terminals."""
+    plane: bool = False
+    """Whether a plane of the net is to be reached by a via, instead of the other terminals."""
+
+    @property
+    def connections(self) -> int:
+        """How many are to be made."""
+        return len(self.starts) - (1 if self.plane else 2)
 
 
 @dataclass(frozen=True)
@@ -87,13 +95,19 @@ def find_routes(copper: BoardCopper, kinds: Sequence[NetKind], of: Mapping[int, 
 def _nets(
     copper: BoardCopper, grid: RoutingGrid, kinds: Sequence[NetKind], of: Mapping[int, int]
 ) -> list[Terminals]:
-    """Nets with two terminals or more, by kind, the shorter ones first."""
+    """Nets with something to join, by kind, the shorter ones first.
+
+    Where there are planes of ground, what goes through the board is on them already.
+    """
     out = []
     for net in copper.nets:
         pieces = [p for p in copper.pieces if p.net == net and net != NO_NET]
         # A via that only joins the pours is no end of a connection.
         groups = [g for g in _joined(pieces) if any(piece.relief for piece in g)]
-        if len(groups) < 2:
+        plane = bool(copper.planes) and kinds[of.get(net, 0)].name == GROUND_KIND
+        if plane:
+            groups = [g for g in groups if not any(piece.through for piece in g)]
+        if len(groups) < (1 if plane else 2):
             continue
         box = shapely.bounds(shapely.union_all([p.shape for p in pieces]))
         kind = of[net]
@@ -104,7 +118,7 @@ def _nets(
         ends = np.cumsum([0, *map(len, lists)])
         flat = np.array([n for each in lists for n in each], dtype=np.int32)
         size = round(float(box[2] - box[0] + box[3] - box[1]), 3)
-        out.append(((kind, size, copper.nets[net]), Terminals(net, kind, ends, flat)))
+        out.append(((kind, size, copper.nets[net]), Terminals(net, kind, ends, flat, plane)))
     return [terminals for _, terminals in sorted(out, key=lambda each: each[0])]
 
 
@@ -150,7 +164,7 @@ class _Negotiation:
         for net in reversed(todo):  # what could not be settled stays open: no two nets touch
             if self._conflicts(net, 0):
                 self._count(net, -1)
-                self.open[net.net] = len(net.starts) - 2
+                self.open[net.net] = net.connections
                 self.paths[net.net] = np.zeros(0, dtype=np.int32)
         self.grid.arrays.history[:] = 0
         for _, net in product(range(TIDYINGS), self.nets):
@@ -180,7 +194,8 @@ class _Negotiation:
         tariff = Tariff(
             net.net, net.kind, kind.front, kind.back, kind.via, pressure * kind.yields // UNIT
         )
-        size, left = route(arrays, tariff, self.grid.work, net.starts, net.nodes, self.out)
+        way = route_to_plane if net.plane else route
+        size, left = way(arrays, tariff, self.grid.work, net.starts, net.nodes, self.out)
         self.paths[net.net], self.open[net.net] = self.out[:size].copy(), left
         self._count(net, 1)
 

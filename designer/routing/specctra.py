@@ -40,6 +40,7 @@ from designer.routing.board_copper import (
     track_item,
     track_path,
     via_item,
+    zone_layers,
 )
 from designer.routing.net_kinds import NetKind, kinds_of_nets, net_kinds
 
@@ -92,7 +93,7 @@ def design_text(board: BoardFile, name: str, circuit: Circuit, rules: Sequence[C
     if (outlines := len(shapely.get_parts(copper.area))) != 1:
         raise source.error(f"{outlines} separate outlines", "one, which Specctra's format has")
     kinds, of = net_kinds(rules), kinds_of_nets(circuit, copper.nets)
-    pins = list(_pins(board, source))
+    pins = list(_pins(board, source, copper.names))
     padstacks = {
         key: f"pad_{k}" for k, key in enumerate(dict.fromkeys((p.shape, p.layers) for p in pins))
     }
@@ -102,9 +103,9 @@ def design_text(board: BoardFile, name: str, circuit: Circuit, rules: Sequence[C
         expression("parser", word("QUOTE"), *lists(host_cad="designer", host_version=__version__)),
         expression("resolution", word("um"), 10),
         expression("unit", word("um")),
-        expression("structure", *_structure(copper, kinds)),
+        expression("structure", *_structure(source, copper, kinds)),
         expression("placement", *_placement(pins)),
-        expression("library", *_library(pins, padstacks)),
+        expression("library", *_library(pins, padstacks, copper.names)),
         expression("network", *_network(pins, copper.nets, of, kinds)),
         expression("wiring", *_wiring(source, copper.nets)),
     )
@@ -135,32 +136,47 @@ def with_session(text: str, session: Path) -> str:
     return expression_text(Expression((*kept, *items), board.source))
 
 
-def _pins(board: BoardFile, source: Expression) -> Iterator[_Pin]:
+def _pins(board: BoardFile, source: Expression, names: Sequence[str]) -> Iterator[_Pin]:
     for placed, item in zip(board.footprints, source.all("footprint"), strict=True):
         for pad, own in zip(placed.pads, item.all("pad"), strict=True):
             net = own.find("net")
-            there = layers_of(own.get("layers").atoms)
-            layers = tuple(name for name, on in zip(LAYERS, there, strict=True) if on)
+            front, back = layers_of(own.get("layers").atoms)
+            outer = (*names[:1][:front], *names[-1:][:back])
+            layers = tuple(names) if front and back else outer
             if pad.number and layers:
                 yield _Pin(placed.reference, pad, "" if net is None else net.text(1), layers)
 
 
-def _structure(copper: BoardCopper, kinds: Sequence[NetKind]) -> Iterator[Expression]:
-    for layer in LAYERS:
-        yield expression("layer", word(layer), expression("type", word("signal")))
+def _structure(
+    source: Expression, copper: BoardCopper, kinds: Sequence[NetKind]
+) -> Iterator[Expression]:
+    for layer in copper.names:
+        kind = "power" if layer in copper.inner else "signal"
+        yield expression("layer", word(layer), expression("type", word(kind)))
+    yield from _planes(source, copper)
     yield expression("boundary", _path("pcb", 0.0, _corners(copper.area)))
     for hole in shapely.get_parts(copper.area):
         for ring in hole.interiors:
-            yield from _keepouts(shapely.Polygon(ring))
+            yield from _keepouts(shapely.Polygon(ring), copper.names)
     for piece in copper.pieces:
         if piece.pad and not piece.relief and not piece.net:  # a bare hole
-            yield from _keepouts(piece.shape)
+            yield from _keepouts(piece.shape, copper.names)
     yield expression("via", word(PADSTACK))
     yield _rule(next(kind for kind in kinds if kind.name == DEFAULT))
 
 
-def _keepouts(shape: Geometry) -> Iterator[Expression]:
-    for layer in LAYERS:
+def _planes(source: Expression, copper: BoardCopper) -> Iterator[Expression]:
+    """The zones of the inner layers: what a via of their net reaches. Pours of the sides are made
+    anew, so another router is not told of them."""
+    for zone in source.all("zone"):
+        places = [(p.number(0), p.number(1)) for p in zone.get("polygon").get("pts").all("xy")]
+        for layer in (name for name in copper.inner if name in zone_layers(zone)):
+            net = copper.nets[int(zone.get("net").number())]
+            yield expression("plane", net, _polygon(layer, [_um(place) for place in places]))
+
+
+def _keepouts(shape: Geometry, names: Sequence[str]) -> Iterator[Expression]:
+    for layer in names:
         yield expression("keepout", "", _polygon(layer, _corners(shape)))
 
 
@@ -171,7 +187,9 @@ def _placement(pins: Iterable[_Pin]) -> Iterator[Expression]:
         yield expression("component", component, place)
 
 
-def _library(pins: Sequence[_Pin], padstacks: Mapping[_Stack, str]) -> Iterator[Expression]:
+def _library(
+    pins: Sequence[_Pin], padstacks: Mapping[_Stack, str], layers: Sequence[str]
+) -> Iterator[Expression]:
     own: dict[str, list[_Pin]] = defaultdict(list)
     for pin in pins:
         own[pin.component].append(pin)
@@ -195,7 +213,7 @@ def _library(pins: Sequence[_Pin], padstacks: Mapping[_Stack, str]) -> Iterator[
         yield expression("padstack", word(name), *outlines, expression("attach", word("off")))
     circles = (
         expression("shape", expression("circle", word(layer), VIA["via_diameter"] * UM))
-        for layer in LAYERS
+        for layer in layers
     )
     yield expression("padstack", word(PADSTACK), *circles, expression("attach", word("off")))
 

@@ -22,6 +22,7 @@ from designer.fabrication.fab import fabs
 from designer.fabrication.kicad_plot import undated
 from designer.fabrication.order import BoardOrder, order_files, packed
 from designer.fabrication.order_refusal import accepted_failures, not_checked, refusals
+from designer.routing.board_layers import with_layers
 from tests.shared.gerber_reader import flashes, holes
 from tests.shared.kicad_cases import case_files
 from tests.shared.stages import CATALOG
@@ -35,10 +36,11 @@ def with_items(text: str, *items: Expression) -> str:
 
 
 @cache
-def board_text(name: str = "paper") -> str:
+def board_text(name: str = "paper", layers: int = 2) -> str:
     """The board of a case, with a piece of track and a via; the rest is not routed."""
     made = case_files(name)
     text = next(text for name, text in made.items() if name.endswith(".kicad_pcb"))
+    text = with_layers(text, layers)
     (net,) = (n for n in read(text).all("net") if n.text(1) == "GND")
     number = float(net.text(0))
     via = expression("via", at=VIA, size=0.6, drill=0.3, layers=("F.Cu", "B.Cu"), net=number)
@@ -65,14 +67,15 @@ def ordered(board: BoardFile, name: str, title: str = "A board") -> dict[str, by
 
 @pytest.mark.kicad
 def test_every_pad_has_its_copper_its_opening_and_its_hole(tmp_path: Path) -> None:
-    board = board_of(board_text(), tmp_path)
+    """On a board of four layers: what goes through it is on all of them."""
+    board = board_of(board_text(layers=4), tmp_path)
     files = ordered(board, "jlcpcb")
-    top, bottom, mask = (
+    top, *inner, bottom, mask = (
         {
             (*flash.pad, flash.at): flash
             for flash in flashes(files[f"gerbers/board-{layer}"].decode())
         }
-        for layer in ("F_Cu.gtl", "B_Cu.gbl", "F_Mask.gts")
+        for layer in ("F_Cu.gtl", "In1_Cu.g1", "In2_Cu.g2", "B_Cu.gbl", "F_Mask.gts")
     )
     opened = {(round(x, 6), round(y, 6)) for _, _, (x, y) in mask}
     through = 0
@@ -96,6 +99,8 @@ def test_every_pad_has_its_copper_its_opening_and_its_hole(tmp_path: Path) -> No
             if (drill := shape.find("drill")) is not None:
                 through += 1
                 assert bottom[key].box == pytest.approx(flash.box)
+                for layer in inner:  # where KiCad does not name the pad
+                    assert layer["", "", place].box == pytest.approx(flash.box)
                 expected.append((*place, drill.number()))
     assert through > 15
     assert {key[:2] for key in top} == {(f.reference, p.number) for f in board.footprints

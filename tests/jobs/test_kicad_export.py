@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError
+from designer.base.sexpr import Expression, expression_text, read
 from designer.catalog.catalog import load_catalog
 from designer.catalog.read import ENVIRONMENT
 from designer.check.synthesis_result import Synthesis
@@ -245,6 +247,11 @@ def test_the_sheet_takes_the_gate_s_settings_unless_somebody_changed_it(
     assert sheet.read_text() == "by hand"
 
 
+def track_length(item: Expression) -> float:
+    start, end = ((item.get(n).number(0), item.get(n).number(1)) for n in ("start", "end"))
+    return math.dist(start, end)
+
+
 def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path: Path) -> None:
     folder = tmp_path / "design"
     shutil.copytree(made, folder)
@@ -263,10 +270,17 @@ def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path:
     again = designer("export", folder, "--routed", "--json")
     assert json.loads(again.stdout)["routing"]["length_mm"] == 0.0
     assert board.read_text("utf-8") == routed
-    # A track is taken away by hand, another one stays.
-    first = routed.index("\t(segment")
-    second = routed.index("\t(segment", first + 1)
-    board.write_text(routed[:first] + routed[second:], encoding="utf-8")
+    for options in (["--layers", "4"], ["--routed", "--layers", "3"]):
+        assert designer("export", folder, *options).returncode == 2
+    four = designer("export", folder, "--routed", "--layers", "4", "--json")
+    assert json.loads(four.stdout)["routing"]["layers"] == 4
+    assert designer("export", folder, "--routed", "--layers", "2").returncode == 0
+    assert board.read_text("utf-8") == routed
+    # The longest track is taken away by hand, the others stay.
+    source = read(routed)
+    longest = max(source.all("segment"), key=track_length)
+    left = tuple(item for item in source.items if item is not longest)
+    board.write_text(expression_text(Expression(left)), encoding="utf-8")
     refused = designer("export", folder, "--routed")
     assert refused.returncode == 2
     assert "linear-pair.kicad_pcb" in refused.stderr
@@ -274,6 +288,8 @@ def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path:
     assert kept.returncode == 0, kept.stderr
     assert json.loads(kept.stdout)["routing"]["length_mm"] > 0.0
     assert designer("export", folder, "--routed").returncode == 2, "it is still somebody's board"
+    other = designer("export", folder, "--routed", "--keep", "--layers", "4")
+    assert (other.returncode, "--layers" in other.stderr) == (2, True)
 
 
 def test_a_board_goes_to_another_router_and_comes_back(made: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_rules import board_rules
 from designer.routing.board_copper import BoardCopper, read_copper
+from designer.routing.board_layers import layer_count, with_layers
 from designer.routing.ground_pour import cut_open
 from designer.routing.net_kinds import kinds_of_nets, net_kinds
 from designer.routing.routed_board import RoutedBoard, route_board
@@ -168,3 +169,69 @@ def test_a_pour_with_holes_is_one_line_of_the_same_area(corners: list[tuple[int,
     area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
     assert area == pytest.approx(float(whole.area))
     assert shapely.Polygon(line).buffer(0.0).symmetric_difference(whole).area < 1e-9
+
+
+def bridges(board: str) -> int:
+    """How many arms of the pour on the back reach the pad of ground at (10, 5)."""
+    source = read(board)
+    (zone,) = [z for z in source.all("zone") if z.get("layer").text() == "B.Cu"]
+    rings = [
+        [(p.number(0), p.number(1)) for p in each.get("pts").all("xy")]
+        for each in zone.all("filled_polygon")
+    ]
+    pour = shapely.union_all([shapely.Polygon(ring).buffer(0.0) for ring in rings])
+    round_pad = shapely.box(9.3, 4.3, 10.7, 5.7).exterior  # in the gap of the relief
+    return len(shapely.get_parts(shapely.intersection(pour, round_pad)))
+
+
+def test_a_pad_of_ground_has_thermal_bridges_and_none_where_two_find_no_room() -> None:
+    """A pad of 1 mm in the open, and one between two tracks of another net."""
+    pad = (
+        '(footprint "g" (layer "F.Cu") (at 10 5) (pad "1" thru_hole rect (at 0 0) (size 1 1) '
+        '(drill 0.5) (layers "*.Cu") (net 3 "GND"))) (net 3 "GND")'
+    )
+    walls = "".join(
+        f'(segment (start {x} 3) (end {x} 7) (width 0.3) (layer "B.Cu") (net 2))' for x in (9, 11)
+    )
+    circuit = case(NAME).circuit
+    rules = board_rules(circuit)
+    assert bridges(route_board(small(pad), circuit, rules).text) == 4
+    assert bridges(route_board(small(pad + walls), circuit, rules).text) == 2
+    walls += walls.replace("(start 9 3) (end 9 7)", "(start 9 4) (end 11 4)")
+    assert bridges(route_board(small(pad + walls), circuit, rules).text) == 0
+
+
+def test_on_four_layers_every_pad_of_ground_reaches_the_planes() -> None:
+    """By tracks of its own side to a via, or through the board; no track leads from pad to pad."""
+    circuit = case(NAME).circuit
+    rules = board_rules(circuit)
+    board = route_board(with_layers(placed(), 4), circuit, rules)
+    assert (board.open, layer_count(board.text)) == ({}, 4)
+    found = read_copper(read(board.text))
+    ground = [p for p in found.pieces if found.nets[p.net] == "GND"]
+    for side in (0, 1):
+        own = [p for p in ground if p.layers[side]]
+        copper = shapely.union_all([p.shape for p in own])
+        through = shapely.union_all([p.shape for p in own if p.through])
+        assert any(not p.through for p in own) or side
+        assert all(shapely.intersects(part, through) for part in shapely.get_parts(copper))
+    assert board.lengths["0"] < 0.25 * routed().lengths["0"]
+    planes = [z for z in read(board.text).all("zone") if z.get("layer").text().startswith("In")]
+    assert [len(z.all("filled_polygon")) for z in planes] == [1, 1]
+    # With its number back, the board is the one that was placed.
+    assert with_layers(board.text, 2) == with_layers(placed(), 2)
+    assert route_board(board.text, circuit, rules).text == board.text
+
+
+def test_an_inner_layer_of_somebody_s_own_stays_his() -> None:
+    """A zone on it: no plane of ground there, and no via through a track of the other."""
+    zone = (
+        '(layers (0 "F.Cu" signal) (4 "In1.Cu" power) (6 "In2.Cu" signal) (2 "B.Cu" signal))'
+        '(zone (net 2) (net_name "/v2") (layer "In1.Cu") '
+        "(polygon (pts (xy 1 1) (xy 9 1) (xy 9 9))))"
+        '(segment (start 2 5) (end 18 5) (width 0.3) (layer "In2.Cu") (net 2))'
+    )
+    found = read_copper(read(small(zone)))
+    assert (found.inner, found.planes) == (("In1.Cu", "In2.Cu"), ("In2.Cu",))
+    track = next(p for p in found.pieces if not p.pad)
+    assert [track.on(name) for name in found.names] == [False, False, True, False]
