@@ -60,12 +60,19 @@ def _render(modelfile: ModelFile, styles: str, loads: str, more: dict[str, objec
             motions=[
                 each.label for each in shown_motions(first_place(modelfile).model.second_order())
             ],
+            stem=stem_for(modelfile),
             plots=plots.TITLES.items(),
             groups=_groups(each),
             styles=Markup(styles),
             scripts=Markup(f'<script type="application/json" id="page">{data}</script>{loads}'),
         )
     )
+
+
+def stem_for(modelfile: ModelFile) -> str:
+    """The name under which a place is saved unless another is typed."""
+    source = modelfile.source
+    return f"{'model' if source is None else source.stem}-explored"
 
 
 def _groups(each: tuple[Control, ...]) -> list[tuple[str, list[Control]]]:

@@ -5,27 +5,25 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hmac
-import json
 import secrets
 import socket
 import webbrowser
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
-from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.explorer.omega_strip import strip
+from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
-from designer.explorer.place import read_place
-from designer.explorer.response_view import respond
+from designer.explorer.questions import kept, read_question, viewed
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
 from designer.jobs.design_source import source
@@ -33,6 +31,7 @@ from designer.model.model_file import ModelFile, read_model_file
 
 PORT = 8610
 """Port where none is asked for; another one where it is taken."""
+MOST_PORT = 65_535
 LOOPBACK = "127.0.0.1"
 LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
 """Addresses that no other machine reaches, and names by which a browser may call them."""
@@ -43,10 +42,15 @@ POLICY = (
     "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'"
 )
+REPORT_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""Of a report, which is one file with scripts of its own."""
 TYPES = {"css": "text/css", "js": "text/javascript", "html": "text/html"}
 
 
-@dataclass(frozen=True)
+@dataclass
 class Explorer:
     """What all pages of one server share."""
 
@@ -60,6 +64,23 @@ class Explorer:
     """Address that the server is bound to."""
     token: str
     """What a page has to know; "" where any page on this machine may ask."""
+    sockets: set[_Socket] = field(default_factory=set)
+    """The open pages."""
+
+    @cached_property
+    def jobs(self) -> JobProcesses:
+        """The jobs that pages have started."""
+        return JobProcesses(self._tell)
+
+    def _tell(self, message: Message) -> None:
+        """What every page is told."""
+        for socket_ in tuple(self.sockets):
+            socket_.send({**message, "id": -1})
+
+    def close(self) -> None:
+        """End the thread and the jobs."""
+        self.jobs.close()
+        self.queue.close()
 
     @property
     def local(self) -> bool:
@@ -93,8 +114,8 @@ def explore(
     modelfile = _model(model)
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
-    sockets = _sockets(host, port)
-    number = sockets[0].getsockname()[1]
+    listening = _listening(host, port)
+    number = listening.getsockname()[1]
     address = _address(host, number, token)
 
     def report(error: BaseException) -> None:
@@ -109,8 +130,8 @@ def explore(
         ready(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(_serve(explorer, sockets, started))
-    explorer.queue.close()
+        asyncio.run(_serve(explorer, listening, started))
+    explorer.close()
 
 
 def application(explorer: Explorer) -> Application:
@@ -122,6 +143,7 @@ def application(explorer: Explorer) -> Application:
             ("/", _Page, with_explorer),
             (f"/({names})", _Asset, with_explorer),
             ("/socket", _Socket, with_explorer),
+            ("/report/([^/]+)", _Report, with_explorer),
         ],
         websocket_max_message_size=LARGEST,
         websocket_ping_interval=20,
@@ -136,15 +158,18 @@ def _model(model: Path | str | ModelFile) -> ModelFile:
     return source(path, path)[0] if path.is_dir() else read_model_file(path)
 
 
-def _sockets(host: str, port: int | None) -> list[socket.socket]:
-    """Listening sockets; any free port where none is asked for and the usual one is taken."""
+def _listening(host: str, port: int | None) -> socket.socket:
+    """A listening socket; at any free port where none is asked for and the usual one is taken."""
+    if port is not None and not 0 <= port <= MOST_PORT:
+        raise InputError(None, "--port", port, f"a number from 0 to {MOST_PORT}")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in (PORT, 0) if port is None else (port,):
         try:
-            return bind_sockets(number, host)
+            made = socket.create_server((host, number), family=family)
+            made.setblocking(False)
+            return made
         except OSError as error:
             reason = error.strerror or str(error)
-        except OverflowError:
-            raise InputError(None, "--port", port, "a number from 0 to 65535") from None
     where = f"{host} port {PORT if port is None else port} ({reason})"
     raise InputError(None, "--host, --port", where, "an address of this machine and a free port")
 
@@ -154,11 +179,9 @@ def _address(host: str, port: int, token: str) -> str:
     return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
 
 
-async def _serve(
-    explorer: Explorer, sockets: list[socket.socket], started: Callable[[], None]
-) -> None:
+async def _serve(explorer: Explorer, listening: socket.socket, started: Callable[[], None]) -> None:
     server = HTTPServer(application(explorer), max_body_size=LARGEST)
-    server.add_sockets(sockets)
+    server.add_socket(listening)
     started()
     try:
         await asyncio.Event().wait()
@@ -226,61 +249,48 @@ class _Asset(_Guarded):
         self.write(asset(name))
 
 
+class _Report(_Guarded):
+    """The report of a job that a page started."""
+
+    def get(self, name: str) -> None:
+        path = self.explorer.jobs.report(name)
+        if path is None:
+            raise HTTPError(404, "no job that this page started has such a report")
+        self.set_header("Content-Security-Policy", REPORT_POLICY)
+        self.write(path.read_bytes())
+
+
 class _Socket(WebSocketHandler, _Guarded):
     """One open page."""
 
     def open(self, *_: str) -> None:
         self.set_nodelay(True)
         self._loop = IOLoop.current()
+        self.explorer.sockets.add(self)
+        for message in self.explorer.jobs.messages:
+            self.send(message)
 
     def on_message(self, message: str | bytes) -> None:
-        asked = read_question(message)
-        if asked is None:
+        question = read_question(message)
+        if question is None:
             self.close(1003, "a question of another kind")
             return
-        number, words = asked
-        modelfile = self.explorer.modelfile
-
-        def answer() -> Iterator[Message]:
-            return answers(modelfile, words)
-
-        self.explorer.queue.ask(self, number, answer, self._send)
+        e = self.explorer
+        if question.kind == "view":
+            answer = partial(viewed, e.modelfile, question)
+            e.queue.ask(self, question.number, answer, self.send)
+        else:  # beside the picture, whose next question shall not overtake it
+            answer = partial(kept, e.modelfile, e.root, e.jobs, question)
+            e.queue.ask((self, "kept"), question.number, answer, self.send)
 
     def on_close(self) -> None:
+        self.explorer.sockets.discard(self)
         self.explorer.queue.forget(self)
 
-    def _send(self, message: Message) -> None:
-        """From the queue's thread."""
+    def send(self, message: Message) -> None:
+        """From any thread."""
         self._loop.add_callback(self._write, text_of(message))
 
     def _write(self, text: str) -> None:
         with contextlib.suppress(WebSocketClosedError):
             self.write_message(text)
-
-
-def read_question(text: str | bytes) -> tuple[int, dict[str, object]] | None:
-    """The number and the words of a page's question; None where it is none."""
-    try:
-        asked = json.loads(text)
-    except ValueError:
-        return None
-    if not isinstance(asked, dict) or asked.get("kind") != "view":
-        return None
-    number, words = asked.get("id"), asked.get("words")
-    if not isinstance(number, int) or not isinstance(words, dict):
-        return None
-    return number, words
-
-
-def answers(modelfile: ModelFile, words: dict[str, object]) -> Iterator[Message]:
-    """The messages about the place that these words give: its view, then pieces of the strip.
-
-    Raises
-    ------
-    InputError : words that give no place.
-    """
-    place = read_place(modelfile, words)
-    view = respond(place)
-    yield view.message()
-    if len(view.orbit.start):
-        yield from strip(place, view.orbit.start)

@@ -73,6 +73,7 @@ from .model import (
     SiScales as SiScales,
 )
 from .model_file import (
+    MAX_BYTES as MAX_BYTES,
     ModelFile as ModelFile,
     naming as naming,
     need_responses as need_responses,
@@ -97,6 +98,7 @@ from .si_units import (
     MECHANICAL_UNITS as MECHANICAL_UNITS,
     NO_UNITS as NO_UNITS,
     Reader as Reader,
+    in_si as in_si,
     units_of as units_of,
 )
 from .spread_table import (

@@ -36,6 +36,15 @@ LEAST: dict[str, dict[str, float]] = {
     "base": {"amplitude": SMALLEST},
 }
 """The numbers of each list of elements that can be changed, and the least that each may be."""
+TABLES = {
+    "masses": "mass",
+    "springs": "spring",
+    "dampers": "damper",
+    "gaps": "clearance",
+    "forces": "force",
+    "base": "base",
+}
+"""The table of a model file that has each list of elements."""
 UNITS = {
     "mass": "kg",
     "stiffness": "N/m",
@@ -141,6 +150,15 @@ class LumpedSystem(Elements):
             for index, name in enumerate(names)
             for key in LEAST[group]
             if getattr(self._elements(group)[index], key) is not None
+        }
+
+    @property
+    def places(self) -> Mapping[str, tuple[str, int | None, str]]:
+        """Where in a model file each parameter but ``b`` stands: table, index in a list of tables,
+        key."""
+        return {
+            name: (TABLES[group], None if group == "base" else index, key)
+            for name, (group, index, key) in self._places.items()
         }
 
     def _elements(self, group: str) -> Sequence[Any]:

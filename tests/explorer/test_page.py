@@ -10,7 +10,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from designer import read_model_file
 from tests.explorer.served import EXAMPLES, served
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 pytestmark = pytest.mark.browser
 WAIT = 60_000.0
@@ -53,6 +55,12 @@ def summary(page: Page, text: str) -> None:
 
 def query(page: Page) -> dict[str, list[str]]:
     return parse_qs(urlsplit(page.url).query)
+
+
+def kept(page: Page, text: str) -> None:
+    page.wait_for_function(
+        "text => document.getElementById('kept').textContent.startsWith(text)", arg=text
+    )
 
 
 def drawn(page: Page, source: str, column: str) -> int:
@@ -172,4 +180,63 @@ def test_everybody_can_use_it(browser: Browser, address: str, scheme: str, width
              if (m.type === 'LinearAxis') return m.axis_label_text_color; }"""
     )
     assert (ink == "#1a1a1a") == (scheme == "light")
+    page.close()
+
+
+def test_a_pinned_response_is_saved_and_never_over_another_file(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with served(EXAMPLES / "paper.toml", tmp_path, "--port", "0") as address:
+        page = opened(browser, f"{address}?omega=0.85&zeta=0.101")
+        summary(page, "1-2-2")
+        page.click("#pin")
+        assert query(page)["pin"] == ["0.85~1-2-2~0.25"]
+        page.reload()
+        summary(page, "1-2-2")
+        assert page.locator("#pins li").count() == 1
+        page.fill("#name", "mine")
+        page.click("[data-keep=save]")
+        kept(page, "mine.toml is saved.")
+        saved = read_model_file(tmp_path / "mine.toml")
+        assert [(r.omega, str(r.expect)) for r in saved.responses] == [(0.85, "1-2-2")]
+        assert saved.model.parameter("zeta") == 0.101
+        page.click("#pins button")
+        page.click("[data-keep=save]")
+        kept(page, "mine.toml is there already")
+        page.click("#leave")
+        assert read_model_file(tmp_path / "mine.toml") == saved
+        page.click("[data-keep=save]")
+        page.click("#overwrite")
+        kept(page, "mine.toml is saved.")
+        assert len(read_model_file(tmp_path / "mine.toml").responses) > 1
+        page.fill("#name", "../mine")
+        page.click("[data-keep=save]")
+        kept(page, "name: found")
+        page.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.slow
+def test_the_whole_job_is_run_and_its_report_opened(browser: Browser, tmp_path: Path) -> None:
+    model = tmp_path / "small.toml"
+    wanted = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
+    model.write_text(f"format = 1\n{PAPER_TABLE}{wanted}{COARSE_CIRCUIT}", encoding="utf-8")
+    with served(model, tmp_path, "--port", "0") as address:
+        page = opened(browser, address)
+        page.click("[data-keep=run]")
+        page.wait_for_selector("#jobs li[data-status='0']", timeout=10.0 * WAIT)
+        with page.expect_popup() as popup:
+            page.click("#jobs a")
+        popup.value.wait_for_load_state()
+        assert "1-2-2" in popup.value.inner_text("body")
+        popup.value.close()
+        page.close()
+    assert (tmp_path / "small-explored-run" / "report.html").is_file()
+
+
+def test_other_attractors_are_listed_and_one_can_be_shown(browser: Browser, address: str) -> None:
+    page = opened(browser, f"{address}?omega=0.9")
+    page.wait_for_function("() => document.getElementById('tried').textContent.startsWith('16 of')")
+    assert page.locator("#others li").count() >= 1
+    assert page.inner_text("#summary") in page.inner_text("#others li:first-child")
     page.close()

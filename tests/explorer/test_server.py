@@ -16,7 +16,8 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from designer import InputError, explore, parse_model_file, read_model_file
 from designer.explorer.page import page
-from designer.explorer.server import Explorer, application, read_question
+from designer.explorer.questions import read_question
+from designer.explorer.server import Explorer, application
 from designer.explorer.work_queue import WorkQueue
 from tests.explorer.served import EXAMPLES
 from tests.shared.model_text import PAPER_TABLE
@@ -33,7 +34,8 @@ def visiting(visit: Visit, tmp_path: Path, token: str = "", host: str = "127.0.0
 
     async def both() -> Any:
         queue = WorkQueue()
-        server = HTTPServer(application(Explorer(modelfile, queue, tmp_path, host, token)))
+        explorer = Explorer(modelfile, queue, tmp_path, host, token)
+        server = HTTPServer(application(explorer))
         sockets = bind_sockets(0, "127.0.0.1")
         server.add_sockets(sockets)
         try:
@@ -43,7 +45,7 @@ def visiting(visit: Visit, tmp_path: Path, token: str = "", host: str = "127.0.0
                 WIRES.pop().close()
             server.stop()
             await server.close_all_connections()
-            queue.close()
+            explorer.close()
 
     result = asyncio.run(both())
     assert list(tmp_path.iterdir()) == []
@@ -102,7 +104,16 @@ def test_a_question_is_answered_and_a_bad_one_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"kind": "save"}', '{"kind": "view", "id": "1", "words": {}}', "\0"]
+    "text",
+    [
+        "",
+        "[]",
+        "{",
+        '{"kind": "save", "id": 1}',
+        '{"kind": "eval", "id": 1, "words": {}}',
+        '{"kind": "view", "id": "1", "words": {}}',
+        "\0",
+    ],
 )
 def test_what_is_no_question_closes_the_socket(text: str, tmp_path: Path) -> None:
     assert read_question(text) is None
@@ -144,7 +155,14 @@ def test_a_token_is_asked_for_and_then_kept_as_a_cookie(tmp_path: Path) -> None:
 
 def test_a_wrong_path_is_told_in_a_line(tmp_path: Path) -> None:
     async def visit(port: int) -> list[HTTPResponse]:
-        paths = ("/nothing", "/../pyproject.toml", "/templates/explore.js", "/explore.html.j2")
+        paths = (
+            "/nothing",
+            "/report/x",
+            "/report/..%2Fx",
+            "/../pyproject.toml",
+            "/templates/explore.js",
+            "/explore.html.j2",
+        )
         return [await get(port, path) for path in paths]
 
     for response in visiting(visit, tmp_path):
@@ -159,7 +177,12 @@ def test_a_title_cannot_leave_its_place() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [{"port": 70000}, {"port": -5}, {"host": "192.0.2.7"}, {"host": "no such host"}]
+    "words",
+    [
+        {"port": 70000},
+        {"port": -5},
+        {"host": "192.0.2.7"},
+    ],
 )
 def test_an_address_that_is_none_is_refused(words: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="--port"):

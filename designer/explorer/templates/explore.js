@@ -48,7 +48,7 @@
   };
 
   // --- the state, which the address holds -----------------------------------------------------
-  let start = "";
+  let start = "", pins = [], shownView = null;
   const words = () => {
     const out = {};
     for (const c of controls) if (c.text !== c.own) out[c.name] = c.text;
@@ -59,6 +59,7 @@
   const address = () => {
     const query = new URLSearchParams(words());
     if (by("follow").checked) query.set("follow", "1");
+    for (const pin of pins) query.append("pin", pin);
     const text = query.toString();
     return text ? `?${text}` : location.pathname;
   };
@@ -68,6 +69,8 @@
     by("shown").value = query.get("shown") ?? "0";
     by("follow").checked = query.has("follow");
     start = query.get("start") ?? "";
+    pins = query.getAll("pin").filter((pin) => pin.split("~").length === 3);
+    showPins();
   };
 
   // --- asking: one question is under way; of those behind it only the newest is kept ------------
@@ -82,7 +85,7 @@
   const notice = (text) => { by("notice").textContent = text; by("notice").hidden = !text; };
 
   const heard = (message) => {
-    if (message.id !== undefined && message.id < number) return;
+    if (message.id >= 0 && message.id < number) return;
     (handlers[message.kind] ?? (() => {}))(message);
     if (message.id === underWay && message.first) {
       underWay = 0;
@@ -98,6 +101,8 @@
     view(message) {
       notice("");
       start = message.start;
+      shownView = message;
+      by("pin").disabled = !/^\d+-/.test(message.response);
       const typing = document.activeElement;
       for (const [name, text] of Object.entries(message.words)) {
         const c = named[name];
@@ -111,6 +116,8 @@
       for (const c of controls) c.field.removeAttribute("aria-invalid");
       by("summary").textContent = message.summary;
       const list = document.querySelector("#facts dl");
+      by("tried").textContent = "";
+      document.querySelector("#others ul").replaceChildren();
       list.replaceChildren(...message.facts.flatMap(([name, text]) => {
         const pair = [document.createElement("dt"), document.createElement("dd")];
         pair[0].textContent = name;
@@ -132,13 +139,99 @@
         colour: stripData.colour.concat(colours) };
       later();
     },
+    others(message) {
+      by("tried").textContent = `${message.tried} of ${message.of} starts`;
+      document.querySelector("#others ul").replaceChildren(...message.attractors.map((each, k) =>
+        row(`${each.summary} (${each.starts})`, k ? ["Show", () => {
+          by("follow").checked = true;
+          start = each.start;
+          want();
+        }] : null)));
+    },
+    saved(message) {
+      const missing = message.missing.length
+        ? ` At these values the model does not show ${message.missing.join(", ")}.` : "";
+      by("kept").textContent = `${message.name} is saved.${missing}`;
+    },
+    exists(message) {
+      by("kept").textContent = `${message.name} is there already and says something else.`;
+      by("again").hidden = false;
+      by("overwrite").onclick = () => keep(message.verb, true);
+      by("overwrite").focus();
+    },
+    job(message) {
+      const words = message.status === null ? `at work: ${message.line}`
+        : message.status === 0 ? "done" : `ended with ${message.status}: ${message.line}`;
+      const item = row(`${message.name}, ${words}`, null);
+      if (message.report) {
+        const link = document.createElement("a");
+        link.href = `report/${encodeURIComponent(message.name)}`;
+        link.target = "_blank";
+        link.textContent = "Open the report";
+        item.append(link);
+      }
+      item.dataset.job = message.name;
+      item.dataset.status = message.status ?? "";
+      const old = [...by("jobs").children].find((each) => each.dataset.job === message.name);
+      if (old) old.replaceWith(item); else by("jobs").append(item);
+    },
     error(message) {
+      if (message.id < 0) {
+        by("kept").textContent = message.text;
+        return;
+      }
       notice(message.text);
       const name = controls.find((c) => message.text.startsWith(`${c.name}:`)
         || message.text.startsWith(`model.${c.name}:`));
       if (name) name.field.setAttribute("aria-invalid", "true");
     },
   };
+  const row = (text, action) => {
+    const item = document.createElement("li"), words = document.createElement("span");
+    words.textContent = text;
+    item.append(words);
+    if (action) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = action[0];
+      button.setAttribute("aria-label", `${action[0]}: ${text}`);
+      button.addEventListener("click", action[1]);
+      item.append(button);
+    }
+    return item;
+  };
+
+  // --- what is kept -----------------------------------------------------------------------------
+  const showPins = () => {
+    by("pins").replaceChildren(...pins.map((pin) => {
+      const [omega, expect, b] = pin.split("~");
+      return row(`${expect} at ω = ${short(omega)}, b = ${short(b)}`, ["Remove", () => {
+        pins = pins.filter((each) => each !== pin);
+        showPins();
+        history.replaceState(null, "", address());
+      }]);
+    }));
+  };
+  by("pin").addEventListener("click", () => {
+    const { words: at, response } = shownView;
+    const pin = `${at.omega}~${response}~${at.b}`;
+    if (!pins.includes(pin)) pins.push(pin);
+    showPins();
+    history.replaceState(null, "", address());
+  });
+  const keep = (kind, overwrite) => {
+    by("again").hidden = true;
+    if (!line.open) return;
+    by("kept").textContent = "…";
+    line.ask({ kind, id: -1, words: words(), name: by("name").value, pins, overwrite });
+  };
+  for (const button of document.querySelectorAll("[data-keep]")) {
+    button.addEventListener("click", () => keep(button.dataset.keep, false));
+  }
+  by("leave").addEventListener("click", () => {
+    by("again").hidden = true;
+    by("kept").textContent = "Nothing is written.";
+  });
   const settled = () => { wanted = true; pump(); };
 
   // --- plots ----------------------------------------------------------------------------------

@@ -1,0 +1,94 @@
+"""What a page asks, and the messages that answer it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
+
+from designer.base.guarded_reading import read_text
+from designer.explorer.job_processes import JobProcesses, JobVerb
+from designer.explorer.omega_strip import strip
+from designer.explorer.other_attractors import others
+from designer.explorer.place import read_place
+from designer.explorer.response_view import respond
+from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
+from designer.explorer.wire import Message
+from designer.model.model_file import MAX_BYTES, ModelFile, need_responses, parse_model_file
+
+Kind = Literal["view", "save", "run", "search"]
+
+
+@dataclass(frozen=True)
+class PageQuestion:
+    """What a page asks."""
+
+    kind: Kind
+    """A picture; or a model file to be saved, and then a verb on it."""
+    number: int
+    """The page's own number of the question, which the answers have as ``id``."""
+    words: dict[str, object]
+    """The place (``place.read_place``)."""
+    more: dict[str, object]
+    """Of what is saved: ``name``, ``pins`` and ``overwrite``."""
+
+
+def read_question(text: str | bytes) -> PageQuestion | None:
+    """The question in a message of a page; None where there is none."""
+    try:
+        asked: Any = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(asked, dict) or asked.get("kind") not in get_args(Kind):
+        return None
+    number, words = asked.get("id"), asked.get("words")
+    if not isinstance(number, int) or not isinstance(words, dict):
+        return None
+    more = {key: asked[key] for key in ("name", "pins", "overwrite") if key in asked}
+    return PageQuestion(cast("Kind", asked["kind"]), number, words, more)
+
+
+def viewed(modelfile: ModelFile, question: PageQuestion) -> Iterator[Message]:
+    """The view of a place, pieces of the strip around it, and its other attractors.
+
+    Raises
+    ------
+    InputError : words that give no place.
+    """
+    place = read_place(modelfile, question.words)
+    view = respond(place)
+    yield view.message()
+    if len(view.orbit.start):
+        yield from strip(place, view.orbit.start)
+    yield from others(place, view.orbit)
+
+
+def kept(
+    modelfile: ModelFile, root: Path, jobs: JobProcesses, question: PageQuestion
+) -> Iterator[Message]:
+    """A place saved as a model file in ``root``, and a job that is begun on it.
+
+    A file that is there and says something else is replaced only with ``overwrite``; without it the
+    answer is of kind "exists".
+
+    Raises
+    ------
+    InputError : a name that is none, words that give no place, a file that cannot be written.
+    """
+    more = question.more
+    path = place_for(root, more.get("name", ""))
+    place = read_place(modelfile, question.words)
+    text = saved_text(modelfile, place, read_pins(modelfile, more.get("pins", [])))
+    saved = parse_model_file(text, path)
+    if question.kind != "save":
+        need_responses(saved, ": pin one")
+    if not save(path, text, overwrite=more.get("overwrite") is True) and (
+        read_text(path, "a model file", most=MAX_BYTES) != text
+    ):
+        yield {"kind": "exists", "name": path.name, "verb": question.kind}
+        return
+    yield {"kind": "saved", "name": path.name, "missing": not_found(saved)}
+    if question.kind != "save":
+        yield jobs.start(cast("JobVerb", question.kind), path).message()

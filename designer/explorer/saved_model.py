@@ -1,0 +1,172 @@
+"""The place that the page shows as a model file, with the responses that were pinned on the way."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer.base import atomic_write
+from designer.base.errors import InputError
+from designer.base.guarded_reading import parse_toml
+from designer.base.toml_writer import toml_text
+from designer.dynamics.counts import Counts
+from designer.explorer.place import ModelPlace, read_place
+from designer.model.find_responses import find
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model import Dimensionless, Mechanical
+from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.si_units import MECHANICAL_UNITS, in_si
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}")
+"""What a file may be called: one name, without a folder."""
+MOST_PINS = 24
+"""Responses of one page that are wanted."""
+SUFFIX = ".toml"
+
+
+@dataclass(frozen=True)
+class PinnedResponse:
+    """A response that is wanted."""
+
+    omega: float
+    """Drive frequency in the model's units."""
+    expect: str
+    """n-p-q."""
+    b: float
+    """The clearance, or the factor on all gaps, at which it was seen."""
+
+    @property
+    def text(self) -> str:
+        """As the address has it."""
+        return f"{self.omega!r}~{self.expect}~{self.b!r}"
+
+
+def read_pins(modelfile: ModelFile, texts: object) -> tuple[PinnedResponse, ...]:
+    """The pins that texts as ``PinnedResponse.text`` give.
+
+    Raises
+    ------
+    InputError : a text that is none, or more than ``MOST_PINS``.
+    """
+    if not isinstance(texts, list) or len(texts) > MOST_PINS:
+        raise InputError(None, "pins", repr(texts), f"a list of at most {MOST_PINS}")
+    return tuple(_pin(modelfile, str(text)) for text in texts)
+
+
+def _pin(modelfile: ModelFile, text: str) -> PinnedResponse:
+    try:
+        omega, expect, b = text.split("~")
+        counts = Counts.parse(expect)
+    except ValueError:
+        raise InputError(None, "pins", text, "ω~n-p-q~b") from None
+    place = read_place(modelfile, {"omega": omega, "b": b})
+    return PinnedResponse(place.omega, str(counts), place.model.b)
+
+
+def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedResponse] = ()) -> str:
+    """The model file with the values of a place; the pins take the place of its responses.
+
+    Comments are lost. A value keeps its unit. The factor ``b`` of a system is no number of its
+    file, so it goes to the pins.
+
+    Raises
+    ------
+    InputError : the text would be no model file.
+    """
+    data = parse_toml(modelfile.text, None)
+    _put_values(data, modelfile, place)
+    own = parse_model_file(toml_text(data)).model.b
+    if pins:
+        data["response"] = [_table(pin, own) for pin in pins]
+    text = f"# Saved by designer explore from {_one_line(modelfile.title)}\n{toml_text(data)}"
+    parse_model_file(text)
+    return text
+
+
+def _one_line(title: str) -> str:
+    return "".join(ch if ch.isprintable() else " " for ch in title)
+
+
+def _table(pin: PinnedResponse, own: float) -> dict[str, Any]:
+    table: dict[str, Any] = {"omega": pin.omega, "expect": pin.expect}
+    return table if pin.b == own else {**table, "b": pin.b}
+
+
+def _put_values(data: dict[str, Any], modelfile: ModelFile, place: ModelPlace) -> None:
+    """Change the numbers of a file that the place has changed."""
+    model, new = modelfile.model, place.model
+    changed = [name for name in model.parameters if model.parameter(name) != new.parameter(name)]
+    if isinstance(model, LumpedSystem):
+        units = model.units if in_si(modelfile.si, model) else {}
+        for name in changed:
+            if name != "b":
+                table, index, key = model.places[name]
+                entry = data[table] if index is None else data[table][index]
+                entry[key] = _with_unit(new.parameter(name), units.get(name, ""))
+    elif modelfile.mechanical is None:
+        data["model"] |= {name: new.parameter(name) for name in changed}
+    elif changed:
+        assert isinstance(new, Dimensionless)
+        _put_si(data["mechanical"], modelfile.mechanical, new)
+
+
+def _put_si(table: dict[str, Any], old: Mechanical, model: Dimensionless) -> None:
+    """Of the mechanisms with these ratios the one with the file's M1, K1 and force."""
+    new = Mechanical.from_dimensionless(model, M1=old.M1, K1=old.K1, force=old.P1 + old.P2)
+    for name, unit in MECHANICAL_UNITS.items():
+        value = float(getattr(new, name))
+        if abs(value - getattr(old, name)) > 1e-12 * abs(value):
+            table[name] = _with_unit(value, unit)
+
+
+def _with_unit(value: float, unit: str) -> float | str:
+    return f"{value!r} {unit}" if unit else value
+
+
+def not_found(modelfile: ModelFile) -> list[str]:
+    """The wanted responses that the model does not show, such as "1-2-2 at ω = 0.85"."""
+    wanted = [r for r in modelfile.responses if r.omega is not None and not isinstance(r.b, tuple)]
+    return [
+        f"{each.expected} at ω = {each.omega:.6g}"
+        for each in find(modelfile.model, wanted)
+        if not each.found
+    ]
+
+
+def place_for(root: Path, name: object, suffix: str = SUFFIX) -> Path:
+    """A file or folder directly in ``root``.
+
+    Raises
+    ------
+    InputError : a name that is more than a name.
+    """
+    text = name.removesuffix(suffix) if isinstance(name, str) else ""
+    if not NAME.fullmatch(text) or text.endswith("."):
+        expected = "letters, digits, _, - and ., without a folder, at most 60"
+        raise InputError(None, "name", text, expected)
+    return root / f"{text}{suffix}"
+
+
+def save(path: Path, text: str, *, overwrite: bool = False) -> bool:
+    """Write a model file; False, and nothing is written, where there is one and ``overwrite`` was
+    not said.
+
+    Raises
+    ------
+    InputError : it cannot be written.
+    """
+    if overwrite:
+        atomic_write.write(path, text)
+        return True
+    with atomic_write.writing(path, "name"):
+        try:
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileExistsError:
+            return False
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+    return True

@@ -1,0 +1,155 @@
+"""A place as a model file: the same system when it is read again, and no file but its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from designer import InputError, ModelFile, parse_model_file, read_model_file
+from designer.explorer.job_processes import JobProcesses
+from designer.explorer.place import read_place
+from designer.explorer.questions import kept, read_question
+from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
+from tests.explorer.served import EXAMPLES
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+
+MECHANICAL = (
+    "format = 1\n[mechanical]\nM1 = '2 kg'\nM2 = 3\nC1 = 60\nC2 = 24\nK0 = '540 kN/m'\n"
+    "K1 = '60 kN/m'\nK2 = '40 kN/m'\nB = '0.5 mm'\nP1 = 80\nP2 = 0\n"
+)
+
+
+def file(name: str) -> ModelFile:
+    if name == "mechanical":
+        return parse_model_file(MECHANICAL)
+    return read_model_file(EXAMPLES / f"{name}.toml")
+
+
+FILES = ("paper", "mechanical", "three-masses", "hammer-base", "backlash", "preloaded", "aberdeen")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_saved_place_is_the_same_system_again(name: str) -> None:
+    """Every parameter moved a little; matrices, forces and gaps are those of the place."""
+    modelfile = file(name)
+    model = modelfile.model
+    words: dict[str, Any] = {
+        each: model.parameter(each) * (1.0 + 0.003 * (k + 1))
+        for k, each in enumerate(model.parameters)
+        if each != "f20"
+    }
+    if "b" not in model.units:
+        words["b"] = 1.0
+    place = read_place(modelfile, words)
+    text = saved_text(modelfile, place)
+    again = parse_model_file(text)
+    wanted, found = place.model.second_order(), again.model.second_order()
+    for key in ("mass", "damping", "stiffness", "force", "constant"):
+        assert getattr(found, key) == pytest.approx(getattr(wanted, key), rel=1e-9), key
+    for one, other in zip(found.clearances, wanted.clearances, strict=True):
+        for a, b in zip(one.sides, other.sides, strict=True):
+            assert np.array(a[1].springs) == pytest.approx(np.array(b[1].springs), rel=1e-9)
+    assert found.base == pytest.approx(wanted.base)
+    assert again.responses == modelfile.responses
+    assert (again.circuit, again.spread) == (modelfile.circuit, modelfile.spread)
+    assert again.si == modelfile.si or name == "mechanical"
+
+
+def test_an_unchanged_place_changes_no_number() -> None:
+    for name in FILES:
+        modelfile = file(name)
+        assert parse_model_file(saved_text(modelfile, read_place(modelfile, {}))).model == (
+            modelfile.model
+        )
+
+
+def test_pins_become_the_wanted_responses_and_are_looked_for() -> None:
+    modelfile = file("paper")
+    pins = read_pins(modelfile, ["0.85~1-2-2~0.25", "1.55~1-1-1~0.3", "0.54~1-7-7~0.25"])
+    again = parse_model_file(saved_text(modelfile, read_place(modelfile, {"zeta": 0.1}), pins))
+    wanted = [(r.omega, str(r.expect), r.b) for r in again.responses]
+    assert wanted == [(0.85, "1-2-2", None), (1.55, "1-1-1", 0.3), (0.54, "1-7-7", None)]
+    assert not_found(again) == ["1-7-7 at ω = 0.54"]
+
+
+@pytest.mark.parametrize(
+    "texts",
+    ["x", ["0.85~1-2-2"], ["0.85~one~0.25"], ["nan~1-1-1~0.25"], ["1~1-1-1~-2"], ["1"] * 99],
+)
+def test_what_is_no_pin_is_refused(texts: object) -> None:
+    with pytest.raises(InputError):
+        read_pins(file("paper"), texts)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", ".", "..", "../x", "/etc/passwd", "a/b", "a\\b", ".hidden", "x" * 80, "a\nb", "-rf", None],
+)
+def test_a_name_is_one_name(name: object, tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        place_for(tmp_path, name)
+
+
+def test_no_file_is_replaced_unasked(tmp_path: Path) -> None:
+    path = place_for(tmp_path, "mine.toml")
+    assert path == tmp_path / "mine.toml"
+    assert save(path, "one")
+    assert not save(path, "two")
+    assert path.read_text("utf-8") == "one"
+    assert save(path, "two", overwrite=True)
+    assert path.read_text("utf-8") == "two"
+    outside = tmp_path / "outside"
+    (tmp_path / "link.toml").symlink_to(outside)
+    assert not save(tmp_path / "link.toml", "three")
+    assert save(tmp_path / "link.toml", "three", overwrite=True)
+    assert not outside.exists()
+
+
+def asked(kind: str, **more: object) -> Any:
+    question = read_question(json.dumps({"kind": kind, "id": -1, "words": {}, **more}))
+    assert question is not None
+    return question
+
+
+def test_a_question_to_save_is_answered_and_asks_back(tmp_path: Path) -> None:
+    modelfile, jobs = file("paper"), JobProcesses(lambda _: None)
+    question = asked("save", name="mine", pins=["0.85~1-2-2~0.25"])
+    (first,) = kept(modelfile, tmp_path, jobs, question)
+    assert first == {"kind": "saved", "name": "mine.toml", "missing": []}
+    (same,) = kept(modelfile, tmp_path, jobs, question)
+    assert same["kind"] == "saved"
+    (other,) = kept(modelfile, tmp_path, jobs, asked("save", name="mine"))
+    assert other == {"kind": "exists", "name": "mine.toml", "verb": "save"}
+    assert len(read_model_file(tmp_path / "mine.toml").responses) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_a_job_without_a_wanted_response_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    modelfile = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}")
+    with pytest.raises(InputError, match="pin one"):
+        list(kept(modelfile, tmp_path, JobProcesses(lambda _: None), asked("run", name="mine")))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_job_has_a_folder_of_its_own_and_says_how_it_ended(tmp_path: Path) -> None:
+    """A file that asks for what cannot be: the process ends with status 2 and its message."""
+    path = tmp_path / "mine.toml"
+    path.write_text(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}", encoding="utf-8")
+    (tmp_path / "mine-run").mkdir()
+    told: list[dict[str, Any]] = []
+    jobs = JobProcesses(told.append)
+    job = jobs.start("run", path)
+    job.process.wait(120)
+    jobs.close()
+    assert told[-1]["status"] == 2
+    assert "response" in told[-1]["line"]
+    assert job.folder == tmp_path / "mine-run-2"
+    assert jobs.report("mine-run-2") is None
+    assert jobs.report("../mine-run") is None
+    assert "response" in (tmp_path / "mine-run-2.log").read_text("utf-8")
