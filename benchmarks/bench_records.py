@@ -2,8 +2,8 @@
 
 The boards are of ``bench-1``, in ngspice with full op-amps (``record_boards``). The scope has 8
 bits, 1 % noise, jitter, errors of gain and offset; it takes 2000 to 100 000 points over 3 to 19.9
-drive periods, with two to four of the nets on its channels. What names the records simulates
-nothing. ``DESIGNER_RECORDS`` is the number of boards (56: about 500 records of nine responses).
+drive periods, with two to four of the nets on its channels. Names are as ``designer bench`` gives
+them. ``DESIGNER_RECORDS`` is the number of boards (56: about 500 records of nine responses).
 """
 
 from __future__ import annotations
@@ -12,18 +12,26 @@ import os
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.record_boards import POINTS, RECORDED, BoardRun, runs
 from designer.base.defaults import cores
 from designer.base.errors import InputError
+from designer.base.figure_style import new_figure, styled, to_png
+from designer.base.plain_json import dumps
 from designer.check.synthesis_result import synthesise
+from designer.dynamics.counts import Counts
 from designer.model.model_file import read_model_file
+from designer.spice.read_orbit import ENGINE_ERROR
 from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.naming import named
+from designer.workbench.contact_count import extremes
+from designer.workbench.dead_zone_curve import fitted
+from designer.workbench.naming import NamedMotion, named
 from designer.workbench.prediction import BoardPrediction
 from tests.shared.simulated_scope import SimulatedScope
 
@@ -35,11 +43,57 @@ BOARDS, SEED = 56, 31
 CHANNELS = (("v1", "fv"), ("v1", "fv", "vg"), ("v1", "v3", "fv", "vg"), ("fv", "v1"))
 RIGHT, OPEN, WRONG, NO_TRUTH, REFUSED = "right", "left open", "wrong", "no truth", "refused"
 OUTCOMES = (RIGHT, OPEN, WRONG, NO_TRUTH, REFUSED)
+COLOURS = ("#2b6a4d", "#e0b040", "#b03030", "#c8c8c8", "#808080")
 
 
-def outcome(run: BoardRun, prediction: BoardPrediction) -> str:
+@dataclass(frozen=True)
+class NamedRecord:
+    """What became of one record."""
+
+    question: int
+    """Number of the wanted response."""
+    sample: int
+    """Number of the board."""
+    truth: str
+    """What ngspice shows."""
+    name: str
+    """What the record was called, the likeliest first where it was left open."""
+    outcome: str
+    """One of ``OUTCOMES``."""
+    by_board: bool
+    """Whether the board behind the record gave its curve the shape."""
+    nearest: float
+    """Least distance of an extreme of v1 from a stop in ngspice, over the peak."""
+
+
+def named_record(run: BoardRun, prediction: BoardPrediction) -> NamedRecord:
     """What becomes of one record of a board. A truth that is no n-p-q (grazing, not settled) is
     none."""
+    name = _named(run, prediction)
+    truth, nearest = run.response, _nearest(run, prediction)
+    if name is None:
+        return NamedRecord(run.question, run.sample, truth, "", REFUSED, False, nearest)
+    outcome = OPEN
+    if "-" not in truth and truth != "aperiodic":
+        outcome = NO_TRUTH
+    elif name.sure:
+        outcome = RIGHT if name.response == truth else WRONG
+    words = ", ".join((name.response, *name.others))
+    return NamedRecord(run.question, run.sample, truth, words, outcome, name.by_board, nearest)
+
+
+def _nearest(run: BoardRun, prediction: BoardPrediction) -> float:
+    """By the corners of fv over v1, which ngspice has sharp to 1e-5 of the peak."""
+    lap = slice(-max(Counts.parse(run.response).n if "-" in run.response else 1, 1) * POINTS, None)
+    v1, fv = run.signals["v1"][lap], run.signals["fv"][lap]
+    peak = float(np.abs(v1).max())
+    ends = fitted(v1, fv, (1e-4 * peak, 1e-3 * peak), prediction.stops[0], len(v1)).ends
+    beyond = [side * (v1 - end) for side, end in ends.items()]
+    return min(float(np.abs(b[extremes(b, 1e-4 * peak)]).min()) for b in beyond) / peak
+
+
+def _named(run: BoardRun, prediction: BoardPrediction) -> NamedMotion | None:
+    """The name of one record of a run; None where the record is refused."""
     rng = np.random.default_rng([SEED, run.question, run.sample])
     scope = SimulatedScope(
         points=int(2000 * 50 ** rng.uniform()),
@@ -49,14 +103,9 @@ def outcome(run: BoardRun, prediction: BoardPrediction) -> str:
     at = np.arange(RECORDED * POINTS + 1) * run.period / POINTS
     record = scope.record(at, run.signals, run.period, rng)
     try:
-        name = named(recorded_motion(record, prediction), prediction)
+        return named(recorded_motion(record, prediction), prediction)
     except InputError:
-        return REFUSED
-    if "-" not in run.response and run.response != "aperiodic":
-        return NO_TRUTH
-    if not name.sure:
-        return OPEN
-    return RIGHT if name.response == run.response else WRONG
+        return None
 
 
 def main() -> str:
@@ -65,26 +114,52 @@ def main() -> str:
     synthesis = synthesise(read_model_file(MODEL))
     prediction = BoardPrediction(synthesis)
     wanted = [f"{r.expected} at ω = {r.omega:g}" for r in synthesis.model_responses]
-    counts: list[Counter[str]] = [Counter() for _ in wanted]
-    seconds = 0.0
-    for run in runs(synthesis, range(boards), SEED, cores(), KEPT):
-        began = time.perf_counter()
-        counts[run.question][outcome(run, prediction)] += 1
-        seconds += time.perf_counter() - began
-    total = sum(counts, Counter[str]())
+    began = time.process_time()
+    records = [
+        named_record(run, prediction) for run in runs(synthesis, range(boards), SEED, cores(), KEPT)
+    ]
+    seconds = (time.process_time() - began) / max(len(records), 1)
+    counts = [Counter(r.outcome for r in records if r.question == k) for k in range(len(wanted))]
     REPORT.mkdir(parents=True, exist_ok=True)
-    (REPORT / "README.md").write_text(_report(wanted, counts, total, seconds), encoding="utf-8")
+    text = _report(wanted, counts, records, seconds)
+    (REPORT / "README.md").write_text(text, encoding="utf-8")
+    answer = {"commit": commit(), "seconds": seconds, "records": [asdict(r) for r in records]}
+    (REPORT / "records.json").write_text(dumps(answer), encoding="utf-8")
+    (REPORT / "records.png").write_bytes(to_png(_figure(wanted, counts)))
+    total = Counter(r.outcome for r in records)
     return ", ".join(f"{total[name]} {name}" for name in OUTCOMES)
 
 
+@styled
+def _figure(wanted: Sequence[str], counts: Sequence[Counter[str]]) -> Figure:
+    """Records of each response by what became of them."""
+    figure = new_figure(7.0, 3.5)
+    axes = figure.subplots()
+    left = np.zeros(len(wanted))
+    for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
+        values = np.array([count[outcome] for count in counts])
+        axes.barh(wanted, values, left=left, color=colour, label=outcome)
+        left += values
+    axes.invert_yaxis()
+    axes.set_xlabel("records")
+    axes.legend(loc="outside lower center", ncols=len(OUTCOMES), frameon=False)
+    return figure
+
+
 def _report(
-    wanted: Sequence[str], counts: Sequence[Counter[str]], total: Counter[str], seconds: float
+    wanted: Sequence[str],
+    counts: Sequence[Counter[str]],
+    records: Sequence[NamedRecord],
+    seconds: float,
 ) -> str:
+    total = Counter(r.outcome for r in records)
     rows = [
         [name, *(str(count[each]) for each in OUTCOMES)]
         for name, count in [*zip(wanted, counts, strict=True), ("all", total)]
     ]
-    number = max(total.total(), 1)
+    open_ = [r for r in records if r.outcome == OPEN]
+    near = sum(r.nearest < ENGINE_ERROR for r in open_)
+    asked = sum(r.by_board and r.outcome == RIGHT for r in records)
     return "\n".join(
         [
             "# Records of boards, named",
@@ -95,7 +170,13 @@ def _report(
             "",
             *table(["wanted there", *OUTCOMES], rows),
             "",
-            f"{seconds / number:.2g} s a record.",
+            "![Records of each response by what became of them](records.png)",
+            "",
+            f"Of {total[RIGHT]} that are right {asked} are by the board behind the record. Of "
+            f"{len(open_)} left open {near} come nearer to a stop than {ENGINE_ERROR:g} of the "
+            "peak, which ngspice's own count does not tell.",
+            "",
+            f"{seconds:.2g} CPU s a record.",
             "",
         ]
     )

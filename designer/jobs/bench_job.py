@@ -19,9 +19,7 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.design import GeneratorSetting
 from designer.jobs.design_source import read_design
 from designer.jobs.origin import provenance
-from designer.spread.part_rules import spread_of
 from designer.workbench.advice import Advice
-from designer.workbench.board_prior import Prior
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
 from designer.workbench.naming import NamedMotion, named
@@ -158,7 +156,7 @@ def bench(
     fitted: dict[str, FittedBoard] = {}
     if fit or boards:
         fitted = _fitted(benched, prediction, several=boards, progress=progress)
-        benched = [replace(b, board=fitted[_board(b.path) if boards else ""]) for b in benched]
+        benched = [replace(b, board=fitted[_board(b.path, boards)]) for b in benched]
     fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
     settings = {
         "omega": omega,
@@ -197,26 +195,21 @@ def _fitted(
     progress: Progress,
 ) -> dict[str, FittedBoard]:
     """The boards behind the records by name, each fitted to all of its own."""
-    synthesis = prediction.synthesis
-    prior = Prior(
-        prediction.circuit,
-        spread_of(synthesis.modelfile, prediction.circuit, synthesis.catalog),
-    )
     own: dict[str, list[tuple[str, NamedMotion]]] = {}
     for each in benched:
-        name = _board(each.path) if several else ""
+        name = _board(each.path, several)
         own.setdefault(name, []).append((each.path.name, each.named))
     out = {}
     for name, records in own.items():
         shows = ", ".join(named.response for _, named in records)
         progress.stage(f"board {name} behind {shows}" if name else f"board behind {shows}")
-        out[name] = board_behind(name, records, prediction, prior)
+        out[name] = board_behind(name, records, prediction)
     return out
 
 
-def _board(record: Path) -> str:
-    """The name of a record's board among several: that of its folder."""
-    return record.resolve().parent.name
+def _board(record: Path, several: bool) -> str:
+    """The name of a record's board: among several that of its folder, "" where there is one."""
+    return record.resolve().parent.name if several else ""
 
 
 def channels_of(text: str) -> dict[str, str]:
@@ -287,6 +280,7 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "amplitude_v_peak": motion.amplitude,
         "response": name.response,
         "sure": name.sure,
+        "by_board": name.by_board,
         "others": list(name.others),
         "reason": name.reason,
         "would_tell": name.would_tell,
@@ -309,7 +303,7 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "exact_circuit": None
         if overlay is None
         else {"response": overlay.orbit.response, "difference": dict(overlay.errors)},
-        "fitted": None if benched.board is None else benched.board.as_dict()["figures"],
+        "fitted": None if benched.board is None else [f.as_dict() for f in benched.board.figures],
         "advice": None if benched.advice is None else benched.advice.as_dict(),
     }
 

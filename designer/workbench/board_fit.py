@@ -103,6 +103,17 @@ class BoardFit:
     rounds: int
     """Steps that the search took."""
 
+    @property
+    def told(self) -> float:
+        """How many numbers the records tell of the board, a coordinate of one each."""
+        return float(len(self.centre) - np.trace(self.covariance))
+
+    def shown(self, record: int, phase: Array) -> Array:
+        """(k, nets) what a record shows of the orbit at phases (k,) of its observation [V], but for
+        a constant."""
+        orbit = _shown(self.orbits[record].volts, phase + self.shifts[record])
+        return np.asarray(self.gains[record] * orbit)
+
     def samples(self, count: int, seed: int = 0) -> Array:
         """(count, K) boards as probable as the records leave them; the first is the centre."""
         root = np.linalg.cholesky(self.covariance + 1e-12 * np.eye(len(self.centre)))

@@ -88,14 +88,15 @@ class ContactCount:
     """Where the impacts are, as a fraction of the lap."""
 
 
-def count(evidence: ContactEvidence) -> ContactCount:
-    """The impacts on one stop over a closed lap."""
+def count(evidence: ContactEvidence, sure: float = SURE) -> ContactCount:
+    """The impacts on one stop over a closed lap. sure : logarithm of the ratio of the likelihoods
+    at which an extreme is decided."""
     trace = evidence.trace
     places = extremes(trace, PROMINENT * evidence.noise)
     ratios = [evidence.ratio(int(at)) for at in places]
     touching = [ratio > 0.0 for ratio in ratios]
     open_ = sorted(
-        (k for k, ratio in enumerate(ratios) if abs(ratio) < SURE), key=lambda k: abs(ratios[k])
+        (k for k, ratio in enumerate(ratios) if abs(ratio) < sure), key=lambda k: abs(ratios[k])
     )[:MOST_OPEN]
     impacts, others = _entries(touching), dict[int, float]()
     for size in range(1, len(open_) + 1):
@@ -103,7 +104,7 @@ def count(evidence: ContactEvidence) -> ContactCount:
             turned = [one != (k in flipped) for k, one in enumerate(touching)]
             cost = sum(abs(ratios[k]) for k in flipped)
             number = _entries(turned)
-            if cost < SURE and number != impacts:
+            if cost < sure and number != impacts:
                 others[number] = min(cost, others.get(number, np.inf))
     nearest = min(map(abs, ratios), default=np.inf)
     entries = tuple(_crossings(trace, places, touching))

@@ -11,18 +11,11 @@ from designer.circuit.netlist import Excitation
 from designer.verdicts.verdict import Question
 from designer.workbench.advice import Advice, advise
 from designer.workbench.board_fit import BoardFit, fit_board
-from designer.workbench.board_prior import Prior
 from designer.workbench.fitted_quantities import BoardFigure, told_figures
 from designer.workbench.naming import NamedMotion
 from designer.workbench.observation import Observation, observe
-from designer.workbench.prediction import BoardPrediction, PredictedResponse, nearest
+from designer.workbench.prediction import BoardPrediction, PredictedResponse
 
-ASKED = 3
-"""Predicted responses from which a board may have come to a recorded motion: the nearest ones."""
-SAME_FREQUENCY = 1e-3
-"""Of a setting's frequency: how far a scope's clock shows it elsewhere, with room to spare."""
-SAME_AMPLITUDE = 0.06
-"""Of a setting's amplitude: three standard deviations of a scope's gain."""
 DOUBTFUL = 2.0
 """Misfit from which on it is said: good fits of ngspice's boards have 0.7 to 1.2."""
 
@@ -68,7 +61,6 @@ def board_behind(
     name: str,
     records: Sequence[tuple[str, NamedMotion]],
     prediction: BoardPrediction,
-    prior: Prior,
 ) -> FittedBoard:
     """The board behind these records, each with the name of its file.
 
@@ -79,11 +71,10 @@ def board_behind(
     if not periodic:
         reason = "no record repeats: record the board at the frequency of another response"
         return FittedBoard(name, files, reason=reason)
-    near = [nearest(prediction.responses, n.motion.frequency)[:ASKED] for n in periodic]
-    starts = [[start for response in some for start in response.starts] for some in near]
+    starts = [prediction.starts(each.motion.frequency) for each in periodic]
     try:
-        seen = [_observation(n, some) for n, some in zip(periodic, near, strict=True)]
-        fit = fit_board(prior, seen, starts)
+        seen = [_observation(each, prediction) for each in periodic]
+        fit = fit_board(prediction.prior, seen, starts)
     except DesignerError as error:  # a setting that nobody knows, or no such board
         return FittedBoard(name, files, reason=str(error))
     questions = [_question(response) for response in prediction.responses]
@@ -91,22 +82,9 @@ def board_behind(
     return FittedBoard(name, files, fit, told_figures(fit), advice)
 
 
-def _observation(named: NamedMotion, near: Sequence[PredictedResponse]) -> Observation:
+def _observation(named: NamedMotion, prediction: BoardPrediction) -> Observation:
     n = None if named.counts is None else named.counts.n
-    return observe(named.motion, (named.moving,), _setting(named, near), n=n)
-
-
-def _setting(named: NamedMotion, near: Sequence[PredictedResponse]) -> Excitation | None:
-    """The generator's setting: that of ``setup.csv`` where the record is of one, since it is known
-    better than a scope shows it; else None, for what was recorded."""
-    motion = named.motion
-    for response in near:
-        setting = response.setting
-        same = abs(motion.frequency / setting.frequency_hz - 1.0) < SAME_FREQUENCY
-        louder = abs(motion.amplitude / setting.amplitude_v_peak - 1.0)
-        if same and not louder > SAME_AMPLITUDE:  # nan: the generator was not recorded
-            return Excitation(setting.frequency_hz, setting.amplitude_v_peak)
-    return None
+    return observe(named.motion, (named.moving,), prediction.setting_of(named.motion), n=n)
 
 
 def _question(response: PredictedResponse) -> Question:

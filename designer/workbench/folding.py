@@ -108,11 +108,13 @@ def _splines(
     return np.asarray(_basis(grid, count) @ weights), np.asarray(rates), squares
 
 
-def best_knots(samples: Samples, frequency: float) -> tuple[int, ...]:
-    """Knots of a period for each channel, by generalised cross-validation (Craven and Wahba, Numer.
-    Math. 31, 1979)."""
+def best_knots(
+    samples: Samples, frequency: float, choices: Sequence[int] = KNOTS
+) -> tuple[int, ...]:
+    """Knots of a period for each channel, of some choices by generalised cross-validation (Craven
+    and Wahba, Numer. Math. 31, 1979)."""
     count = len(samples.time)
-    tried = [k for k in KNOTS if SAMPLES_A_KNOT * k <= count] or [KNOTS[0]]
+    tried = [k for k in choices if SAMPLES_A_KNOT * k <= count] or [choices[0]]
     scores = np.array(
         [fold(samples, frequency, 1, k).squares / (1.0 - k / count) ** 2 for k in tried]
     )

@@ -3,7 +3,9 @@
 The record is laid on itself (``folding``). The period is the least after which it repeats within
 its noise; impacts are counted on the curve of all laps (``contact_count``), beyond the stops that
 the record itself has (``dead_zone_curve``) or, where the dead zone's output was not recorded, where
-the nominal board has them, as far off as the spread allows. Nothing here simulates the board.
+the nominal board has them, as far off as the spread allows. Nothing here simulates the board, but
+where contacts are lost in the noise of that curve: then the orbit of the board behind the record
+gives the curve its shape (``board_curve``).
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.counts import MAX_PERIOD, Counts
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, OrbitStatus
+from designer.workbench.board_curve import SURE as BOARD_SURE, board_evidence
 from designer.workbench.contact_count import SURE, ContactCount, ContactEvidence, count
 from designer.workbench.dead_zone_curve import DeadZoneCurve, fitted
 from designer.workbench.folding import (
@@ -85,6 +88,8 @@ class NamedMotion:
     dead_zones: Mapping[str, DeadZoneCurve]
     """By clearance: its stage as the record shows it, where its output and displacement are
     there."""
+    by_board: bool = False
+    """Whether impacts that the curve leaves open were counted on the board behind the record."""
 
     @property
     def symmetric(self) -> bool | None:
@@ -113,7 +118,12 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
         for k, stop in enumerate(prediction.stops)
     ]
     asymmetry, error = _asymmetry(curve, nets, prediction)
-    names = list(_names(n, counted))
+    names, by_board = list(_names(n, counted)), False
+    if len(names) > 1 and not doubt:
+        evidence = board_evidence(curve, samples, motion, nets, prediction, zones)
+        instead = [_by_board(sides, k, evidence) for k, sides in enumerate(counted)]
+        by_board = instead != counted
+        counted, names = instead, list(_names(n, instead))
     reason, remedy = _why(names, counted, doubt, motion, n)
     counts = None if "?" in names[0] else Counts.parse(names[0])
     return NamedMotion(
@@ -130,6 +140,7 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
         nets=nets,
         moving=_moving(nets, prediction),
         dead_zones=zones,
+        by_board=by_board,
     )
 
 
@@ -312,6 +323,23 @@ def _by_output(
     error = math.hypot(noise, ripple) / abs(stop.gains[side])
     depth = side * (output - level) / stop.gains[side]
     return ContactEvidence(None, math.inf, depth, error, error)
+
+
+def _by_board(
+    counted: Mapping[int, ContactCount | None],
+    clearance: int,
+    evidence: Mapping[tuple[int, int], ContactEvidence],
+) -> dict[int, ContactCount | None]:
+    """The impacts on each stop of a clearance: what the curve leaves open as the curve of the board
+    has it, if the first allows that."""
+    out = dict(counted)
+    for side, by_curve in counted.items():
+        if by_curve is None or not by_curve.others or (clearance, side) not in evidence:
+            continue
+        instead = count(evidence[clearance, side], BOARD_SURE)
+        if instead.impacts in (by_curve.impacts, *(number for number, _ in by_curve.others)):
+            out[side] = instead
+    return out
 
 
 # -- the name ---------------------------------------------------------------------------------

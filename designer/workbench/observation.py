@@ -63,6 +63,8 @@ class Observation:
     """What else the scope does."""
     n: int | None = None
     """Drive periods after which the motion repeats; None where that is not known."""
+    first: float = 0.0
+    """Drive periods since that phase at the record's first sample."""
 
     def spread_of(self, peak: Array) -> Array:
         """(nets,) standard deviation [V] that a sample counts with.
@@ -122,6 +124,7 @@ def observe(
         aligned=aligned,
         scope=scope,
         n=n,
+        first=first,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import GeneratorSetting, settings
-from designer.circuit.netlist import Circuit
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
@@ -20,6 +20,8 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
+from designer.workbench.board_prior import Prior
+from designer.workbench.record import RecordedMotion
 
 POINTS = 512
 """Of a drive period, of a predicted wave."""
@@ -27,6 +29,12 @@ DRAWN = 60
 """Boards that say how far the stops of one may be off."""
 DRAWN_WITH = 1
 """Their seed."""
+ASKED = 3
+"""Wanted responses from which a board may have come to a recorded motion: the nearest ones."""
+SAME_FREQUENCY = 1e-3
+"""Of a setting's frequency: how far a scope's clock shows it elsewhere, with room to spare."""
+SAME_AMPLITUDE = 0.06
+"""Of a setting's amplitude: three standard deviations of a scope's gain."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +145,29 @@ class BoardPrediction:
             moved = sum(factor * waves[net] for net, factor in stop.displacement.items())
             waves[stop.output] = stop.output_of(np.asarray(moved))
         return waves
+
+    @cached_property
+    def prior(self) -> Prior:
+        """The boards of the model file's spread, as fits have them."""
+        spread = spread_of(self.synthesis.modelfile, self.circuit, self.synthesis.catalog)
+        return Prior(self.circuit, spread)
+
+    def starts(self, frequency: float) -> list[Array]:
+        """From where a board may have come to a motion at a frequency [Hz]: the starts of the
+        nearest wanted responses."""
+        near = nearest(self.responses, frequency)[:ASKED]
+        return [start for response in near for start in response.starts]
+
+    def setting_of(self, motion: RecordedMotion) -> Excitation | None:
+        """The generator's setting: that of ``setup.csv`` where the record is of one, since it is
+        known better than a scope shows it; else None, for what was recorded."""
+        for response in nearest(self.responses, motion.frequency)[:ASKED]:
+            setting = response.setting
+            same = abs(motion.frequency / setting.frequency_hz - 1.0) < SAME_FREQUENCY
+            louder = abs(motion.amplitude / setting.amplitude_v_peak - 1.0)
+            if same and not louder > SAME_AMPLITUDE:  # nan: the generator was not recorded
+                return Excitation(setting.frequency_hz, setting.amplitude_v_peak)
+        return None
 
     @cached_property
     def end_errors(self) -> tuple[Mapping[int, float], ...]:

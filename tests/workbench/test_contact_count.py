@@ -66,6 +66,16 @@ def test_what_is_within_the_noise_is_left_open(
         assert all(0.0 <= cost < SURE for _, cost in counted.others)
 
 
+def test_how_sure_is_sure_enough_can_be_said() -> None:
+    """A contact 3.5 errors deep is open at four standard errors and decided at three."""
+    trace = bumps([1.0, 3.5 * ERROR, 1.0], [-1.0, -1.0, -1.0])
+    seen = ContactEvidence(trace, ERROR, None, np.inf, ERROR)
+    ((number, cost),) = count(seen).others
+    assert number == 2
+    assert cost == pytest.approx(0.5 * 3.5**2, rel=1e-3)
+    assert count(seen, 4.5).others == ()
+
+
 def test_no_contact_and_no_end_of_contact_are_no_impacts() -> None:
     assert count(evidence(bumps([-1.0], [-2.0]))).impacts == 0
     assert count(evidence(bumps([3.0], [2.0]))).impacts == 0

@@ -39,11 +39,12 @@ def test_channels_and_drive_are_recognised(number: int) -> None:
 
 @pytest.mark.parametrize("number", range(COUNT))
 def test_the_response_is_right_or_left_open(number: int) -> None:
-    """Seven of the nine are sure; the last two stand next to grazing, and their truth is among
-    what is left open."""
+    """Eight of the nine are sure, the eighth by the orbit of the board behind it; the last stands
+    next to grazing, and its truth is among what is left open."""
     truth, name = stored(number), name_of(number)
     assert truth.response in (name.response, *name.others)
-    assert name.sure == (number < 7)
+    assert name.sure == (number < 8)
+    assert name.by_board == (number > 6)
     if name.sure:
         assert name.response == truth.response
         assert (name.reason, name.would_tell, name.others) == ("", "", ())
