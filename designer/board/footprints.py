@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.base.errors import InputError
 from designer.board.kicad_names import footprint_name
@@ -52,10 +52,29 @@ class FootprintShape:
     """Whether pin 1 is marked."""
     soldered: bool = True
     """Whether it is soldered; False for a bare pad, which nothing is soldered to."""
+    library: str = ""
+    """Library of KiCad that has a body of this name; "" where none is known."""
 
     @property
     def through_hole(self) -> bool:
         return any(pad.drill for pad in self.pads)
+
+    @property
+    def diode(self) -> bool:
+        """Whether it is a diode's, whose pin 1 is the cathode."""
+        return self.name.startswith("D_")
+
+    @property
+    def two_rows(self) -> bool:
+        """Whether it is a case with pins on both sides and a notch between them, at pin 1."""
+        return len(self.pads) >= 8 and len({pad.x for pad in self.pads}) == 2
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Where KiCad's footprint of this name, and so its body, has its origin [mm]: the first
+        hole of a part with holes, the middle of any other."""
+        first = next((p for p in self.pads if p.number == "1" and self.through_hole), None)
+        return (0.0, 0.0) if first is None else (first.x, first.y)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -276,7 +295,7 @@ def footprint(full_name: str) -> FootprintShape:
         match = re.fullmatch(pattern, name)
         shape = make(name, *match.groups()) if match is not None else None
         if shape is not None:
-            return shape
+            return replace(shape, library=full_name.rpartition(":")[0] if shape.soldered else "")
     raise InputError(
         None, "footprint", full_name, "a name such as " + ", ".join(EXAMPLES) + " (docs/kicad.md)"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
 
 from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.footprints import FootprintShape, PadShape
@@ -10,8 +11,14 @@ from designer.board.kicad_names import BOARD_VERSION, HEAD, LIBRARY, identifier
 from designer.board.pins import Pin
 from designer.board.placed_component import TEXT, PlacedComponent
 
+LINE, BAR, SILK, NOTCH = 0.12, 0.3, 0.17, 0.7
+"""Silk: width of a line, of the bar at a cathode; from a pad to the middle of a line; radius of the
+notch of a case [mm]."""
 ROUND = 0.25
 """Radius of a pad's corners, of its shorter side."""
+
+BODIES = "${KICAD9_3DMODEL_DIR}"
+"""Folder of KiCad 9's bodies of parts, as KiCad itself names it."""
 
 
 def module(shape: FootprintShape) -> Expression:
@@ -26,6 +33,7 @@ def module(shape: FootprintShape) -> Expression:
         *_drawing(shape, ids),
         *(_pad(pad, 0, ids) for pad in shape.pads),
         *lists(embedded_fonts=False),
+        *_body(shape),
     )
 
 
@@ -70,7 +78,21 @@ def on_board(
             for pad in shape.pads
         ),
         *lists(embedded_fonts=False),
+        *_body(shape),
     )
+
+
+def _body(shape: FootprintShape) -> Iterator[Expression]:
+    """The part's body in KiCad's own library of bodies, where that is installed; y upwards."""
+    if shape.library:
+        x, y = shape.origin
+        yield expression(
+            "model",
+            f"{BODIES}/{shape.library}.3dshapes/{shape.name}.step",
+            offset={"xyz": (x, -y, 0.0)},
+            scale={"xyz": (1.0, 1.0, 1.0)},
+            rotate={"xyz": (0.0, 0.0, 0.0)},
+        )
 
 
 def _texts(
@@ -128,41 +150,108 @@ def _attributes(
 
 
 def _drawing(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression]:
-    """Body, courtyard, an outline in silk, a bar at a cathode, a dot at another pin 1 that
-    matters."""
+    """Body, courtyard, an outline in silk, a dot at a pin 1 that matters."""
     wide, high = shape.body[0] / 2.0, shape.body[1] / 2.0
     if wide and high:
         yield _box("F.Fab", (-wide, -high, wide, high), 0.1, ids)
     yield _box("F.CrtYd", shape.courtyard, 0.05, ids)
-    left, top, right, bottom = shape.extent
     if shape.soldered:
-        outline = (left - 0.17, top - 0.17, right + 0.17, bottom + 0.17)
-        yield _box("F.SilkS", outline, 0.12, ids)
-    if shape.mark and shape.name.startswith("D_"):
-        yield expression(
-            "fp_line",
-            start=(left - 0.36, top - 0.17),
-            end=(left - 0.36, bottom + 0.17),
-            stroke={"width": 0.2, "type": word("solid")},
-            layer="F.SilkS",
-            uuid=identifier(*ids, "cathode"),
-        )
-    elif shape.mark:
-        first = next(pad for pad in shape.pads if pad.number == "1")
-        # Beside the outline, within the courtyard.
-        if first.x < 0.0 or len(shape.pads) == 2 or first.x == 0.0:
-            centre = (left - 0.34, first.y)
-        else:
-            centre = (right + 0.34, first.y)
-        yield expression(
-            "fp_circle",
-            center=centre,
-            end=(centre[0] + 0.08, centre[1]),
-            stroke={"width": 0.16, "type": word("solid")},
-            fill=True,
-            layer="F.SilkS",
-            uuid=identifier(*ids, "first"),
-        )
+        yield from _silk(shape, ids)
+    if shape.mark and not shape.diode:
+        yield _first_pin(shape, ids)
+
+
+def _silk(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression]:
+    """An outline past body and pads: with a notch where a case with two rows of pins has its own,
+    and of a diode as its case looks, with the bar at the cathode."""
+    left, top, right, bottom = shape.extent
+    box = (left - SILK, top - SILK, right + SILK, bottom + SILK)
+    if shape.diode and shape.through_hole:
+        yield from _lying_diode(shape, ids)
+    elif shape.diode:
+        yield from _standing_bar(shape, box, ids)
+    elif shape.two_rows:
+        yield from _notched(box, ids)
+    else:
+        yield _box("F.SilkS", box, LINE, ids)
+
+
+def _standing_bar(
+    shape: FootprintShape, box: tuple[float, float, float, float], ids: tuple[str, ...]
+) -> Iterator[Expression]:
+    """Two lines to the anode's pad, and a bar that closes them at the cathode."""
+    left, top, _, bottom = box
+    anode = next(pad for pad in shape.pads if pad.number == "2")
+    end = anode.x - anode.width / 2.0
+    yield _line((left, top), (end, top), ids, "upper")
+    yield _line((left, bottom), (end, bottom), ids, "lower")
+    at = left + LINE / 2.0 - BAR / 2.0
+    yield _line((at, top), (at, bottom), ids, "cathode", BAR)
+
+
+def _lying_diode(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression]:
+    """The body between the holes with its ring at the cathode, and a line along each lead."""
+    wide, high = shape.body[0] / 2.0, shape.body[1] / 2.0
+    yield _box("F.SilkS", (-wide, -high, wide, high), LINE, ids)
+    ring = -wide + 2.0 * BAR
+    yield _line((ring, -high), (ring, high), ids, "cathode", BAR)
+    for pad in shape.pads:
+        side = 1.0 if pad.x > 0.0 else -1.0
+        reach = abs(pad.x) - pad.width / 2.0 - SILK
+        yield _line((side * wide, 0.0), (side * reach, 0.0), ids, f"lead {pad.number}")
+
+
+def _notched(box: tuple[float, float, float, float], ids: tuple[str, ...]) -> Iterator[Expression]:
+    """A box with a half circle cut into its upper side."""
+    left, top, right, bottom = box
+    around = [(-NOTCH, top), (left, top), (left, bottom), (right, bottom), (right, top)]
+    for i, (a, b) in enumerate(pairwise([*around, (NOTCH, top)])):
+        yield _line(a, b, ids, f"side {i}")
+    yield expression(
+        "fp_arc",
+        start=(NOTCH, top),
+        mid=(0.0, top + NOTCH),
+        end=(-NOTCH, top),
+        stroke={"width": LINE, "type": word("solid")},
+        layer="F.SilkS",
+        uuid=identifier(*ids, "notch"),
+    )
+
+
+def _first_pin(shape: FootprintShape, ids: tuple[str, ...]) -> Expression:
+    """A dot beside pin 1, between the outline and the courtyard."""
+    left, _, right, _ = shape.extent
+    first = next(pad for pad in shape.pads if pad.number == "1")
+    if first.x < 0.0 or len(shape.pads) == 2 or first.x == 0.0:
+        centre = (left - 0.34, first.y)
+    else:
+        centre = (right + 0.34, first.y)
+    return expression(
+        "fp_circle",
+        center=centre,
+        end=(centre[0] + 0.08, centre[1]),
+        stroke={"width": 0.16, "type": word("solid")},
+        fill=True,
+        layer="F.SilkS",
+        uuid=identifier(*ids, "first"),
+    )
+
+
+def _line(
+    start: tuple[float, float],
+    end: tuple[float, float],
+    ids: tuple[str, ...],
+    name: str,
+    width: float = LINE,
+) -> Expression:
+    return expression(
+        "fp_line",
+        start=start,
+        end=end,
+        stroke={"width": width, "type": word("solid")},
+        layer="F.SilkS",
+        uuid=identifier(*ids, name),
+    )
 
 
 def _box(

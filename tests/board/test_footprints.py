@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import pytest
 
 from designer.base.errors import InputError
+from designer.base.sexpr import expression_text, read
 from designer.board.footprints import EXAMPLES, FootprintShape, footprint
+from designer.board.kicad_footprint import module
 from designer.catalog.catalog import load_catalog
 
 CATALOG = load_catalog()
+KICAD = Path("/usr/share/kicad/footprints")
+"""KiCad's own libraries of footprints."""
 
 
 def catalogued() -> set[str]:
@@ -97,3 +102,24 @@ def test_a_case_that_is_not_known_is_refused_by_name(name: str) -> None:
         footprint(name)
     assert caught.value.found == name
     assert "SOIC-14" in str(caught.value)
+
+
+@pytest.mark.kicad
+@pytest.mark.parametrize("name", sorted(catalogued()))
+def test_bodies_stand_on_their_pads_as_in_kicads_libraries(name: str) -> None:
+    """KiCad's footprint of the name refers to the same body, and has its pads about the body where
+    ours are."""
+    library, _, own = name.partition(":")
+    theirs = read((KICAD / f"{library}.pretty" / f"{own}.kicad_mod").read_text("utf-8"))
+    shape = footprint(name)
+    body, kicads = (e.get("model") for e in (module(shape), theirs))
+    assert body.text(0) == kicads.text(0)
+    for key in ("scale", "rotate"):
+        assert body.get(key) == read(expression_text(kicads.get(key)))
+    x, y, _ = (body.get("offset").get("xyz").number(i) for i in range(3))
+    assert kicads.get("offset").get("xyz").atoms == ("0", "0", "0")
+    for pad in theirs.all("pad"):
+        if pad.text(0):
+            at = pad.get("at")
+            found = pins(shape)[pad.text(0)]
+            assert found == pytest.approx((at.number(0) + x, at.number(1) - y), abs=0.15)
