@@ -149,6 +149,7 @@ from .page import (
     SmallPrint as SmallPrint,
     Table as Table,
     Verbatim as Verbatim,
+    Widget as Widget,
     bullets as bullets,
     markdown as markdown,
     table as table,

@@ -106,6 +106,16 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Widget:
+    """A place that a script of HTML fills; nothing elsewhere."""
+
+    name: str
+    """Its name in the page's scripts."""
+    without: str
+    """What stands there where no script runs."""
+
+
+@dataclass(frozen=True)
 class Gallery:
     """Small pictures side by side, in HTML alone."""
 
@@ -157,7 +167,7 @@ class Columns:
     """The sections."""
 
 
-Block = str | Table | Picture | Gallery | Items | Verbatim | PageSection | Columns | None
+Block = str | Table | Picture | Widget | Gallery | Items | Verbatim | PageSection | Columns | None
 
 
 @dataclass(frozen=True)

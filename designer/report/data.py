@@ -19,6 +19,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
+from designer.model.relative_motion import RelativeMotion, relative_motions
 from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
@@ -93,6 +94,11 @@ class ReportData:
     def traces(self) -> tuple[Mapping[str, Trace], ...]:
         """For each response: its orbit by engine, in model units (``checked_design.traces``)."""
         return tuple(traces(self.design, c) for c in self.checked)
+
+    def motions(self, response: int) -> tuple[RelativeMotion, ...]:
+        """What moves in each clearance at a response, by its own stops."""
+        model = self.design.model.at(self.checked[response].model.b)
+        return relative_motions(model.second_order())
 
     @cached_property
     def stops(self) -> tuple[PredictedStop, ...]:

@@ -18,6 +18,7 @@ from designer.base.page import (
     SmallPrint,
     Table,
     Verbatim,
+    Widget,
 )
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
@@ -93,6 +94,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         _parts(data),
         _errors(data, pictures.get("errors")),
         _yields(data, pictures),
+        _boards(data, pictures),
         _blame(data, pictures),
         PageSection(
             "Where to sit",
@@ -247,6 +249,20 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
     blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
     blocks.append(_one("How to reach a response", tolerance_tables.recipes(data)))
     return PageSection("Yields", blocks, "yields")
+
+
+def _boards(data: ReportData, pictures: Pictures) -> PageSection:
+    """Where HTML calls up each board of the study."""
+    if not pictures or not data.study.answers:
+        return PageSection("", [])
+    number = words.plural(data.plan.samples, "board")
+    note = (
+        f"What became of each of the {number}, what was drawn for it, and, of those that stand for "
+        "a way of losing a response, how it moves. A dot in the picture of the edges above calls "
+        "its board up too."
+    )
+    without = "This needs a browser that runs scripts; samples.parquet has the verdicts."
+    return PageSection("Each board", [SmallPrint(note), Widget("boards", without)], "boards")
 
 
 def _study_note(data: ReportData) -> str:

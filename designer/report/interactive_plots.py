@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from bokeh.embed import json_item
 from bokeh.layouts import column
-from bokeh.models import ColumnDataSource, FixedTicker, HoverTool, Model
+from bokeh.models import ColumnDataSource, FixedTicker, HoverTool, Model, Range1d, TapTool
 from bokeh.models.annotations import BoxAnnotation, Span, Title
 from bokeh.plotting import figure
 
@@ -35,7 +35,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import OrbitStatus
-from designer.model.relative_motion import RelativeMotion, relative_motions
+from designer.model.relative_motion import RelativeMotion
 from designer.report import design_tables, orbit_plots, words
 from designer.report.data import ReportData
 from designer.report.plot_names import portrait_name, stop_name
@@ -46,8 +46,10 @@ from designer.yields.yield_count import Yield
 
 MOST_POINTS = 4096
 """Of one curve."""
-POINTS = 512
+POINTS = 1024
 """Of one drive period, at most."""
+BOARD = "board"
+"""Name of the data that the page fills in for the boards of a study (``boards.js``)."""
 ROW = 30
 """Height of a row of a chart, px."""
 TOOLS = "pan,wheel_zoom,box_zoom,reset"
@@ -57,15 +59,14 @@ _NUMBER = "{0.[0000]}"
 def plots(data: ReportData) -> dict[str, str]:
     """The documents of a page as JSON, by the names that its pictures have for them."""
     drawn: dict[str, Any] = {}
-    system = data.design.model.second_order()
     for i, (c, traces) in enumerate(zip(data.checked, data.traces, strict=True)):
-        motions = relative_motions(data.design.model.at(c.model.b).second_order())
-        for k in range(max(1, len(system.clearances))):
-            drawn[portrait_name(i, k)] = _orbit(c, traces, motions[k], k)
+        for k, motion in enumerate(data.motions(i)):
+            drawn[portrait_name(i, k)] = _orbit(c, traces, motion, k)
     for k, stop in enumerate(data.stops):
         drawn[stop_name(k)] = _stop(stop)
     if data.checked:
         drawn["yields"] = _yields(*data.rated)
+        drawn["margins"] = _margins(data)
     if data.design.errors.max_error > EXACT:
         unit = design_tables.spring_of(data.design.model)
         errors = {words.coefficient(n, unit): e for n, e in data.design.errors.errors.items()}
@@ -138,6 +139,9 @@ def _orbit(
             draw: Any = plot.scatter if name == "ngspice" else plot.line
             renderer = draw(x, y, source=source, name=orbit_plots.ENGINES[name], **look)
             (lines if plot is portrait else points).append(renderer)
+    board = ColumnDataSource({"t": [], "x": [], "v": []}, name=BOARD)
+    for plot, x, y in ((portrait, "x", "v"), (wave, "t", "x")):
+        plot.line(x, y, source=board, color=VERDICTS[Verdict.LOST], line_width=2)
     _impacts(portrait, c, motion, clearance)
     tips = [
         ("", "$name"),
@@ -245,6 +249,27 @@ def _yields(names: Sequence[str], yields: Sequence[Yield | None]) -> Model:
     _hover(plot, [dots], [*tips, *counts])
     _rows(plot, names)
     return plot
+
+
+def _margins(data: ReportData) -> Model:
+    """How near each board is to losing its response; the page fills it from the boards' data."""
+    names = [words.label(c) for c in data.checked]
+    edges = [min(a.penetration, a.miss) for a in data.study.answers]
+    positive = [e for e in edges if math.isfinite(e) and e > 0.0] or [1.0]
+    columns: dict[str, Any] = {name: [] for name in ("x", "edge", "row", "colour")}
+    source = ColumnDataSource(columns, name=BOARD)
+    height = ROW * len(names) + 70
+    radius = _figure(height, "largest multiplier; stable below 1", x_range=(0.0, 1.05))
+    edge = _figure(height, "shallowest contact or nearest miss [V]", x_axis_type="log")
+    edge.x_range = Range1d(start=min(positive) / 2.0, end=max(positive) * 2.0)
+    tips = [("", "@name"), ("board", "@board"), ("", "@verdict")]
+    for plot, x in ((radius, "x"), (edge, "edge")):
+        look: dict[str, Any] = {"fill_color": "colour", "line_color": None, "fill_alpha": 0.75}
+        dots = plot.scatter(x, "row", source=source, size=5, nonselection_fill_alpha=0.75, **look)
+        _hover(plot, [dots], tips)
+        plot.add_tools(TapTool(renderers=[dots]))
+        _rows(plot, names)
+    return column(radius, edge, sizing_mode="stretch_width")
 
 
 def _errors(errors: Mapping[str, float]) -> Model:

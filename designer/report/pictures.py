@@ -38,9 +38,9 @@ KEY = (
     "begins. Shaded: contact with a stop."
 )
 MARGINS = (
-    "One mark a board. Left: the largest multiplier of the response that the board settled on; it "
-    "dies at 1. Right: its shallowest contact or nearest miss; the count of impacts changes at 0. "
-    "A lost board stands where its new response has these."
+    "One mark a board, at the largest multiplier of the response that it settled on, which dies at "
+    "1, and at its shallowest contact or nearest miss, where the count of impacts changes at 0. A "
+    "lost board stands where its new response has these."
 )
 AVOIDED = (
     "Per cent of the lost boards that were asked again. Above the line groups, below it the parts "
@@ -191,7 +191,7 @@ def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
     if any(rows):
         shows = "Largest multiplier and nearest grazing of every board, by response."
         svg = element(study_plots.margin_chart(labels, rows), shows)
-        out["margins"] = Picture(caption=MARGINS, svg=svg)
+        out["margins"] = Picture(caption=MARGINS, svg=svg, plot="margins")
     blames = [data.blame_of(i) for i in responses]
     if any(b is not None and b.subjects for b in blames):
         shows = (

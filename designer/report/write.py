@@ -22,6 +22,7 @@ from markupsafe import Markup, escape
 
 from designer.base.atomic_write import write
 from designer.base.page import Page, markdown
+from designer.report.board_columns import boards_json
 from designer.report.data import ReportData
 from designer.report.design_page import FORMAT, design_page
 from designer.report.inline_svg import VARIABLES
@@ -45,12 +46,12 @@ def write_report(data: ReportData, html: Path, text: Path) -> None:
 
 def render_html(data: ReportData) -> str:
     """``report.html`` as text."""
-    return render_page(design_page(data, pictures(data)), plots(data))
+    return render_page(design_page(data, pictures(data)), plots(data), boards_json(data))
 
 
-def render_page(page: Page, plots: Mapping[str, str] | None = None) -> str:
+def render_page(page: Page, plots: Mapping[str, str] | None = None, boards: str = "") -> str:
     """A page as one file of HTML that loads nothing. plots : the documents that its pictures name
-    (``interactive_plots.plots``)."""
+    (``interactive_plots.plots``). boards : those of a study (``board_columns.boards_json``)."""
     templates = Environment(
         loader=PackageLoader("designer.report", "templates"),
         autoescape=True,
@@ -61,7 +62,7 @@ def render_page(page: Page, plots: Mapping[str, str] | None = None) -> str:
     )
     templates.filters["text"] = _unbroken
     template = templates.get_template("page.html.j2")
-    names = ("tables.js", "plots.js") if plots else ("tables.js",)
+    names = ["tables.js", *["plots.js"] * bool(plots), *["boards.js"] * bool(boards)]
     scripts = [_script(name) for name in names]
     blocks: dict[str, Markup] = {}
     allowed = [_digest(script) for script in scripts]
@@ -70,6 +71,8 @@ def render_page(page: Page, plots: Mapping[str, str] | None = None) -> str:
         allowed.append(_digest(library))
         blocks["bokeh"] = _packed(library)
         blocks["plots"] = _packed(json.dumps({"colours": VARIABLES, "items": plots}))
+    if boards:
+        blocks["board-data"] = _packed(boards)
     return template.render(
         page=page, format=FORMAT, scripts=scripts, allowed=allowed, blocks=blocks
     )

@@ -149,6 +149,31 @@ def test_plots_are_drawn_with_the_orbits_own_values(report: Loaded) -> None:
     )
 
 
+def test_a_board_is_called_up_by_the_keyboard(report: Loaded) -> None:
+    page, data = report.page, plain_report()
+    page.locator("#boards").scroll_into_view_if_needed()
+    page.locator("#boards canvas").first.wait_for()
+    page.get_by_label("Response", exact=True).select_option("1")
+    number = page.get_by_label("Number of the board")
+    number.fill("2")
+    number.press("Enter")
+    (answer,) = (a for a in data.study.answers_to(1) if a.sample == 2)
+    page.get_by_text(f"Board 2, ω = 0.85 (1-2-2): {answer.verdict}").wait_for()
+    row = page.locator("#boards table").first.locator("tbody tr").nth(1)
+    assert row.locator("td").nth(2).inner_text() == answer.response
+    assert row.locator("td").nth(4).inner_text() == f"{answer.radius:.4g}"
+    page.get_by_text("the farthest from nominal first").press("Enter")
+    parts = page.locator("#boards table").nth(1)
+    drawn = data.plan.boards(range(3)).board(2).values["R50"]
+    cell = parts.locator("tr", has_text="R50").locator("td").nth(1)
+    assert float(cell.inner_text().split()[0]) == pytest.approx(drawn / 1e3, rel=1e-3)
+    page.wait_for_function(BOARD)
+
+
+BOARD = """() => Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [...root.references()])
+  .some((model) => model.name === "board" && model.data.v?.length > 200)"""
+
+
 def test_paper_has_the_pictures(report: Loaded, tmp_path: Path) -> None:
     report.page.emulate_media(media="print")
     pictures = report.page.locator("svg[role=img]")

@@ -298,6 +298,14 @@ def test_every_response_appears_with_its_facts(whole: ReportData, html: str, kin
         assert wanted in text, wanted
 
 
+def test_what_the_text_says_stands_on_the_page(whole: ReportData, html: str) -> None:
+    """Every number of the one in the other."""
+    shown = set(re.findall(r"\d+(?:\.\d+)?", Page(html).text))
+    said = set(re.findall(r"\d+(?:\.\d+)?", render_markdown(whole)))
+    assert len(said) > 150
+    assert said - shown == set()
+
+
 def test_markdown_tables_line_up(whole: ReportData) -> None:
     rows = [line for line in render_markdown(whole).splitlines() if line.startswith("|")]
     assert len(rows) > 60

@@ -25,11 +25,16 @@ const report = {
     return this.stored;
   },
 
+  // What fills a plot's data in once it is drawn, by the plot's name; after ``ready``.
+  filled: {},
+  ready: null,
+
+  colour: (name) =>
+    getComputedStyle(document.documentElement).getPropertyValue(`--plot-${name}`).trim(),
+
   async item(name) {
     const { colours, items } = await this.documents();
-    const style = getComputedStyle(document.documentElement);
-    const page = (hex) =>
-      hex in colours ? style.getPropertyValue(`--plot-${colours[hex]}`).trim() : hex;
+    const page = (hex) => (hex in colours ? this.colour(colours[hex]) : hex);
     return JSON.parse(items[name].replace(/(?<=")#[0-9a-f]{6}(?=")/g, page));
   },
 
@@ -41,6 +46,8 @@ const report = {
     const root = [...views][0].model;
     if (matchMedia("(pointer: coarse)").matches)
       for (const model of root.references()) if (model.type === "Toolbar") model.active_drag = null;
+    await this.ready;
+    this.filled[name]?.(root);
     return root;
   },
 };
