@@ -118,3 +118,6 @@ from .pins import (
     SUPPLY_UNIT as SUPPLY_UNIT,
     Pin as Pin,
 )
+from .summing_nodes import (
+    shortest_tree as shortest_tree,
+)

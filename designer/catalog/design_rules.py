@@ -325,6 +325,14 @@ RULES: tuple[DesignRule, ...] = (
         board=True,
     ),
     _rule(
+        "summing-span",
+        "Shortest tree over the pads of one summing node",
+        "25 mm; 45 mm where a part of the node stands in holes", "mm",
+        f"{OWN}: what a good placement reaches; each millimetre of track adds about 0.1 pF",
+        "move the node's parts to the op-amp's input",
+        board=True,
+    ),
+    _rule(
         "summing-vias",
         "Vias in one summing node",
         2, "",

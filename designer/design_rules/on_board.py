@@ -12,11 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from designer.base.natural_sort import natural_key
+from designer.base.views import View
 from designer.board.component import Component
+from designer.board.footprints import footprint
 from designer.board.kicad_names import POWER, circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CustomRule
 from designer.board.outline import LAYER
+from designer.board.summing_nodes import shortest_tree
 from designer.catalog.design_rule import (
     FAIL,
     PASS,
@@ -30,7 +34,7 @@ from designer.catalog.design_rule import (
     value_text,
 )
 from designer.catalog.design_rules import RULES
-from designer.circuit.netlist import NEGATIVE, POSITIVE
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
 from designer.design_rules import on_parts
 from designer.design_rules.kicad_drc import (
     OPEN,
@@ -48,6 +52,8 @@ MOST = 5
 NETS = 12
 """Nets that are not routed in a message."""
 _READ = "read from the board file"
+SPAN, SPAN_THROUGH_HOLES = 25.0, 45.0
+"""Limits of a summing node [mm]: all of its parts on the surface, or one of them in holes."""
 COPPER = frozenset({"clearance"})
 """Rules that say nothing of a board without tracks."""
 
@@ -122,6 +128,29 @@ def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> It
             yield Finding(distance, place, more=f"to {reference}; {_READ}")
 
 
+def summing_span(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
+    """Shortest tree over the pads of each summing node [mm]: about as long as its track has to be.
+
+    A node that an op-amp's output is on has a low impedance, and is none.
+    """
+    pins = [(c, pin) for c in components for pin in c.pins if pin.net and View.BOARD in c.views]
+    driven = {GROUND, *(pin.net for _, pin in pins if pin.electrical == "output")}
+    nodes = {pin.net for _, pin in pins if (pin.electrical, pin.name) == ("input", "-")} - driven
+    spans = {node: shortest_tree(_places(board, node)) for node in sorted(nodes, key=natural_key)}
+    each = ", ".join(f"{node} {span:.1f}" for node, span in spans.items())
+    for node, span in spans.items():
+        of_node = [c for c, pin in pins if pin.net == node]
+        holes = any(footprint(c.footprint).through_hole for c in of_node)
+        limit = SPAN_THROUGH_HOLES if holes else SPAN
+        yield Finding(span, node, limit, f"in mm: {each}; {_READ}")
+
+
+def _places(board: BoardFile, net: str) -> list[tuple[float, float]]:
+    """Where the pads of a net are [mm]."""
+    pads = (pad for footprint in board.footprints for pad in footprint.pads)
+    return list(dict.fromkeys(pad.at for pad in pads if pad.net == net))
+
+
 def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """From each pad of the design's components to the board's edge [mm]."""
     if not len(board.outline.sides):
@@ -166,6 +195,7 @@ REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Finding]]
 READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]] = {
     **on_parts.READ,
     "decoupling-distance": decoupling_distance,
+    "summing-span": summing_span,
     "board-outline": board_outline,
 }
 """Rules that KiCad is not asked about: they are read from the file."""

@@ -13,6 +13,9 @@ from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
+from scipy.optimize import brentq
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial.distance import pdist, squareform
 
 from designer.base.errors import InputError
 from designer.base.sexpr import Expression, expression, expression_text, read, read_all
@@ -49,7 +52,7 @@ BY_REPORT = ("unconnected", "short-circuit")
 tests/design_rules/test_rules_copper.py."""
 OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted")
 """Rules on the parts: the pairs stand in tests/design_rules/test_rules_parts.py."""
-BY_READING = ("decoupling-distance", "board-outline", *OF_PARTS)
+BY_READING = ("decoupling-distance", "summing-span", "board-outline", *OF_PARTS)
 NOTHING: Mapping[str, int] = {}
 
 
@@ -310,6 +313,43 @@ def test_a_capacitor_on_the_other_rail_does_not_decouple_this_one(tmp_path: Path
     board = board_of(drawn(), tmp_path)
     found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked"))
     assert found["decoupling-distance"].status == NOT_RUN
+
+
+def spanning(length: float) -> tuple[str, str]:
+    """A node of R4, and the exported board with R4 moved to where the node's tree is this long."""
+    r4 = next(c for c in base().components if c.reference == "R4")
+    (node,) = {pin.net for pin in r4.pins} & {s.inverting for s in base().circuit.sections}
+    pads = [
+        (reference(item), place)
+        for item in whole().all("footprint")
+        for place, pad in zip(pads_of(reference(item)), item.all("pad"), strict=True)
+        if (net := pad.find("net")) is not None and net.text(1) == kicad_net(node)
+    ]
+
+    def tree(down: float) -> float:
+        places = [(x, y + down * (name == "R4")) for name, (x, y, *_) in pads]
+        return float(minimum_spanning_tree(squareform(pdist(places))).sum())
+
+    down = brentq(lambda by: tree(by) - length, 10.0, 200.0)
+    return node, shifted("R4", (0.0, down))
+
+
+def test_a_far_part_of_a_summing_node_is_caught_and_a_near_miss_is_not(tmp_path: Path) -> None:
+    """The tree by scipy; in holes a node may be larger."""
+    node, text = spanning(25.05)
+    far = by_reading(text, tmp_path)["summing-span"]
+    assert (far.status, far.where, far.limit) == (FAIL, node, 25.0)
+    assert far.value == pytest.approx(25.05, abs=1e-5)
+    nodes = {s.inverting for s in base().circuit.sections} - {"0"}
+    assert all(re.search(rf"\b{name} \d+\.\d\b", far.found) for name in nodes)
+    near = by_reading(spanning(24.95)[1], tmp_path)["summing-span"]
+    assert near.status == PASS
+    axial = "Resistor_THT:R_Axial_DIN0207_L6.3mm_D2.5mm_P10.16mm_Horizontal"
+    listed = [replace(c, footprint=axial) if c.reference == "R4" else c for c in base().components]
+    for length, status in ((44.95, PASS), (45.05, FAIL)):
+        board = board_of(spanning(length)[1], tmp_path)
+        found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked"))["summing-span"]
+        assert (found.status, found.limit) == (status, 45.0)
 
 
 def edge() -> tuple[Expression, dict[str, float]]:
