@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from designer.board.kicad_items import Item
@@ -25,6 +26,7 @@ from designer.schematic.sheet_drawing import (
     Placed,
     SheetCell,
     label_width,
+    text_width,
 )
 
 WIDTH = 50
@@ -157,7 +159,8 @@ def flow_cell(title: str, items: Iterable[Item], lines: Sequence[str] = ()) -> S
     y += tallest
     for i, text in enumerate(lines):
         cell.notes.append(Note(text, (0, y + 2 * i + 2), f"{title} {i}", "line"))
-    cell.right, cell.bottom = WIDTH, y + 2 * len(lines) + 2
+    longest = max(map(text_width, lines), default=0.0)
+    cell.right, cell.bottom = max(WIDTH, math.ceil(longest)), y + 2 * len(lines) + 2
     return headed(cell, -6)
 
 
