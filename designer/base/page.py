@@ -212,7 +212,12 @@ def table_of(
 
 def markdown(page: Page) -> str:
     """The page as Markdown. A section of pictures alone is left out."""
-    return "\n\n".join([f"# {plain(page.title)}", *_texts([*page.head, *page.sections], 2)]) + "\n"
+    return f"# {plain(page.title)}\n\n" + paragraphs([*page.head, *page.sections])
+
+
+def paragraphs(blocks: Sequence[Block]) -> str:
+    """Blocks of a page as Markdown, below its title."""
+    return "\n\n".join(_texts(blocks, 2)) + "\n"
 
 
 def _texts(blocks: Sequence[Block], level: int) -> list[str]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
@@ -31,6 +32,8 @@ BEYOND = 0.1
 """Of a ray: how far past the window Newton's method may look, where the parameters' domains let."""
 EDGE = "edge of the window"
 """What a border is called where the response lives on beyond the window."""
+ROUND = 1e-6
+"""Of the region's size: how closely the largest ellipse is found."""
 GRID, ROUNDS, NARROWER = 41, 8, 0.25
 """The best box is sought on a grid of so many points a side, then on ever narrower ones."""
 
@@ -56,6 +59,26 @@ class ToleranceBox:
 
 
 @dataclass(frozen=True)
+class ToleranceEllipse:
+    """An ellipse of equal relative half axes in both parameters, which it has along its axes."""
+
+    centre: tuple[float, float]
+    """Values of both parameters in its middle."""
+    half_axes: tuple[float, float]
+    """Of both parameters."""
+    share: float
+    """Half axes over the nominal values."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain, for JSON."""
+        return {
+            "centre": list(self.centre),
+            "half_axes": list(self.half_axes),
+            "share": self.share,
+        }
+
+
+@dataclass(frozen=True)
 class ResponseRegion:
     """The part of a response's region that is seen from a nominal point."""
 
@@ -73,6 +96,10 @@ class ResponseRegion:
     """The largest box about the nominal point that lies inside."""
     best: ToleranceBox
     """The largest box of these proportions inside, wherever its centre."""
+    ellipse_around: ToleranceEllipse
+    """The largest ellipse about the nominal point that lies inside."""
+    ellipse_best: ToleranceEllipse
+    """The largest ellipse of these proportions inside, wherever its centre."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""
@@ -86,6 +113,8 @@ class ResponseRegion:
             ],
             "around": self.around.as_dict(),
             "best": self.best.as_dict(),
+            "ellipse_around": self.ellipse_around.as_dict(),
+            "ellipse_best": self.ellipse_best.as_dict(),
         }
 
 
@@ -128,6 +157,7 @@ def region(
         tuple(kind for _, kind in ends),
         _box(*around, nominal),
         _box(*best, nominal),
+        *(_ellipse(*each, nominal) for each in _circles(border / nominal, np.array(at) / nominal)),
     )
 
 
@@ -157,6 +187,21 @@ def _box(centre: Array, share: float, nominal: Array) -> ToleranceBox:
     a, b = (centre * nominal).tolist()
     wide, tall = (share * nominal).tolist()
     return ToleranceBox((a, b), (wide, tall), share)
+
+
+def _ellipse(centre: Array, share: float, nominal: Array) -> ToleranceEllipse:
+    box = _box(centre, share, nominal)
+    return ToleranceEllipse(box.centre, box.half_widths, box.share)
+
+
+def _circles(border: Array, at: Array) -> tuple[tuple[Array, float], tuple[Array, float]]:
+    """(centre, radius) of the largest circle about a point and of the largest anywhere, inside a
+    polygon (k, 2)."""
+    polygon = shapely.Polygon(border)
+    around = (at, float(polygon.exterior.distance(shapely.Point(at))))
+    ray = shapely.maximum_inscribed_circle(polygon, tolerance=ROUND * np.ptp(border))
+    best = (np.array(ray.coords[0]), float(ray.length))
+    return around, best if best[1] > around[1] else around
 
 
 def _boxes(border: Array, at: Array) -> tuple[tuple[Array, float], tuple[Array, float]]:

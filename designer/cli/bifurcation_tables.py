@@ -121,7 +121,11 @@ def _region(answer: Mapping[str, Any]) -> Iterator[str]:
     rays = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
     yield f"\nRegion of {found['response']} about {place(found['at'])}"
     yield f"rays end by: {rays}"
-    yield f"both parameters may be off by {found['around']['share']:.2%} there"
+    ellipse = found["ellipse_around"]["share"]
+    yield (
+        f"both parameters may be off by {found['around']['share']:.2%} there, one alone or both "
+        f"within an ellipse by {ellipse:.2%}"
+    )
     best = found["best"]
     yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"
 

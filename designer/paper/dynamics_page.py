@@ -159,7 +159,12 @@ def _pictures(dynamics: Dynamics, names: Iterable[str]) -> list[Block]:
         f"{len(dynamics.windows)} windows, those of longer periods included, end where no "
         f"bifurcation was located{_named(unseen)}."
     )
-    return [text, *(Picture(CAPTIONS[n], CAPTIONS[n], f"{n}.png") for n in names)]
+    return [text, *map(shown, names)]
+
+
+def shown(name: str) -> Picture:
+    """One of the report's pictures on its page."""
+    return Picture(CAPTIONS[name], CAPTIONS[name], f"{name}.png")
 
 
 def _named(windows: Sequence[BranchWindow]) -> str:

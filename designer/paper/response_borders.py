@@ -2,14 +2,14 @@
 
 Both ends of each main window at the paper's parameters are continued over b and over k0: pitchfork
 below, fold or grazing above. ``python -m designer.paper.response_borders FOLDER`` makes these
-pictures and tables of the report on the dynamics alone.
+pictures and tables of the report on the dynamics alone, and shows them on its page if there is one.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from designer.base.atomic_write import write
 from designer.base.figure_style import picture
+from designer.base.page import paragraphs
 from designer.base.progress import Progress
 from designer.bifurcations import border_curves
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
@@ -27,7 +28,8 @@ from designer.bifurcations.windows import BranchWindow, window
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import settle
 from designer.model.swept_model import ModelSubject
-from designer.paper.report_files import make_report
+from designer.paper.dynamics_page import shown
+from designer.paper.report_files import README, make_report
 from designer.report import curve_plots
 
 OMEGA = (0.15, 1.8)
@@ -102,7 +104,15 @@ def report(*, out: Path, jobs: int, progress: Progress) -> Mapping[str, Response
         for form in ("png", "svg"):
             write(out / f"{borders.name}.{form}", picture(figure, form, 160.0))
         write(out / f"{borders.name}.csv", borders.table())
+    if (out / README).is_file():
+        write(out / README, _with_pictures((out / README).read_text("utf-8"), found.values()))
     return found
+
+
+def _with_pictures(page: str, borders: Iterable[ResponseBorders]) -> str:
+    """The report's page, with those pictures at its end that it does not show."""
+    missing = [b.name for b in borders if f"({b.name}.png)" not in page]
+    return f"{page}\n{paragraphs([shown(name) for name in missing])}" if missing else page
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

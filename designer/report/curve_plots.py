@@ -27,6 +27,8 @@ Label = tuple[str, float, float]
 """A response, and from where to where along the sweep it is seen."""
 
 
+BESIDE = 3
+"""Points of a curve that lie beside one of codimension two."""
 UPRIGHT = 0.012
 """Of the axes: width of a name that is written upwards, for want of room."""
 
@@ -94,14 +96,18 @@ def _line(axes: Axes, curve: BorderCurve) -> None:
 
 
 def _meetings(axes: Axes, found: Sequence[BorderCurve]) -> list[Line2D]:
-    """Points of codimension two, a mark for each name; their legend."""
+    """Points of codimension two beside which a stable orbit lives, a mark for each name; their
+    legend. The others stand in the tables."""
+    widths = np.ptp(np.concatenate([curve.points for curve in found]), axis=0) if found else 1.0
     places: dict[str, list[tuple[float, float]]] = {}
     for curve in found:
         for name, a, b in curve.codimension_two:
-            places.setdefault(name, []).append((a, b))
+            away = np.linalg.norm((curve.points - [a, b]) / np.maximum(widths, 1e-300), axis=1)
+            if any(curve.stable[k] for k in np.argsort(away)[:BESIDE]):
+                places.setdefault(name, []).append((a, b))
     handles = []
     for k, (name, at) in enumerate(sorted(places.items())):
-        look: dict[str, Any] = {"marker": MEETINGS[k % len(MEETINGS)], "ms": 5, "mew": 0.9}
+        look: dict[str, Any] = {"marker": MEETINGS[k % len(MEETINGS)], "ms": 4, "mew": 0.8}
         look |= {"color": OTHERS[k % len(OTHERS)], "mfc": "white", "ls": ""}
         axes.plot(*np.transpose(at), **look, zorder=4)
         handles.append(Line2D([], [], label=name, **look))
@@ -122,6 +128,12 @@ def _region(axes: Axes, region: ResponseRegion) -> list[Any]:
         x, y = [a - wide, a + wide, a + wide, a - wide], [b - tall, b - tall, b + tall, b + tall]
         axes.plot([*x, x[0]], [*y, y[0]], color=INK, lw=1.0, ls=line, zorder=4)
         handles.append(Line2D([], [], color=INK, lw=1.0, ls=line, label=text))
+    for ellipse, line in ((region.ellipse_around, ":"), (region.ellipse_best, "-")):
+        (wide, tall), turn = ellipse.half_axes, np.linspace(0.0, 2.0 * np.pi, 181)
+        x, y = ellipse.centre[0] + wide * np.cos(turn), ellipse.centre[1] + tall * np.sin(turn)
+        axes.plot(x, y, color=MUTED, lw=0.9, ls=line, zorder=4)
+    shares = f"± {region.ellipse_around.share:.1%}, {region.ellipse_best.share:.1%}"
+    handles.append(Line2D([], [], color=MUTED, lw=0.9, label=f"ellipses {shares}"))
     return handles
 
 
@@ -150,8 +162,10 @@ def _named(axes: Axes, plan: CurvePlan, labels: Sequence[Label]) -> None:
         if ends[1] - ends[0] < wide or middle - 0.5 * wide < last:
             continue
         centre = float(np.sqrt(low * high)) if axes.get_xscale() == "log" else 0.5 * (low + high)
-        off: dict[str, Any] = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center"}
+        # Across the line where there is little room: so it stands between slanting borders.
+        off: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+        off["xytext"] = (0, 0 if upright else 6)
         off |= {"path_effects": [withStroke(linewidth=2.5, foreground="white")], "zorder": 6}
-        off |= {"rotation": 90, "va": "bottom"} if upright else {}
+        off |= {"rotation": 90, "va": "center"} if upright else {}
         axes.annotate(text, (centre, plan.at), fontsize=7, color=INK, **off)
         last = middle + 0.5 * wide

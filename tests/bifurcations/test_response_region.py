@@ -57,3 +57,15 @@ def test_region_without_impacts_ends_where_the_linear_response_reaches_the_stop(
     for box in (around, best):
         centre = np.array(box.centre) / nominal
         assert room(found.border / nominal, centre[None])[0] == pytest.approx(box.share, rel=1e-9)
+    # A box has its ellipse inside it.
+    assert found.ellipse_around.share >= around.share
+    assert found.ellipse_best.share >= found.ellipse_around.share
+
+
+def test_largest_circles_of_a_triangle() -> None:
+    """That about (0.1, 0.3) ends at a leg; the inscribed one has the radius 1 - 1/√2."""
+    radius = 1.0 - np.sqrt(0.5)
+    about, best = response_region._circles(TRIANGLE, np.array([0.1, 0.3]))
+    assert about[1] == pytest.approx(0.1, abs=1e-12)
+    assert best[1] == pytest.approx(radius, abs=1e-5)
+    assert best[0] == pytest.approx([radius, radius], abs=1e-4)
