@@ -130,8 +130,8 @@ def _region(axes: Axes, region: ResponseRegion) -> list[Any]:
         handles.append(Line2D([], [], color=INK, lw=1.0, ls=line, label=text))
     for ellipse, line in ((region.ellipse_around, ":"), (region.ellipse_best, "-")):
         (wide, tall), turn = ellipse.half_axes, np.linspace(0.0, 2.0 * np.pi, 181)
-        x, y = ellipse.centre[0] + wide * np.cos(turn), ellipse.centre[1] + tall * np.sin(turn)
-        axes.plot(x, y, color=MUTED, lw=0.9, ls=line, zorder=4)
+        curve = ellipse.centre[0] + wide * np.cos(turn), ellipse.centre[1] + tall * np.sin(turn)
+        axes.plot(*curve, color=MUTED, lw=0.9, ls=line, zorder=4)
     shares = f"± {region.ellipse_around.share:.1%}, {region.ellipse_best.share:.1%}"
     handles.append(Line2D([], [], color=MUTED, lw=0.9, label=f"ellipses {shares}"))
     return handles
