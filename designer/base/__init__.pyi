@@ -152,6 +152,7 @@ from .page import (
     Widget as Widget,
     bullets as bullets,
     markdown as markdown,
+    paragraphs as paragraphs,
     table as table,
     table_of as table_of,
 )
