@@ -163,8 +163,10 @@ def _trace(flow: Flow, orbit: Orbit, design: Design, b: float) -> Trace:
     wanted = POINTS if orbit.counts.total <= MANY_IMPACTS else 2 * POINTS
     points = max(wanted // periods, LEAST_POINTS)
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
-    states = flow.run(start, periods, mode=orbit.mode or None, points=points).strobes
+    volts = design.volts(b)
+    run = flow.run(start, periods, mode=orbit.mode or None, points=points)
+    states = run.strobes[:, : len(volts)]  # behind them what op-amps that lag have for states
     finite = np.isfinite(states).all(axis=1)
     time = np.arange(len(states)) * flow.drive.period / points
     seconds = design.errors.scales.seconds
-    return Trace(time[finite] / seconds, states[finite] / design.volts(b))
+    return Trace(time[finite] / seconds, states[finite] / volts)
