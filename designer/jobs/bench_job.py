@@ -131,8 +131,8 @@ def bench(
 
     Raises
     ------
-    InputError : no design folder, a file that is no record, channels that cannot be told apart, or
-        files in the way; nothing is written then.
+    InputError : no design folder, a file that is no record, channels that cannot be told apart,
+        several boards in one folder, or files in the way; nothing is written then.
     """
     began, path = time.perf_counter(), Path(folder)
     progress = Progress() if progress is None else progress
@@ -141,6 +141,9 @@ def bench(
     names = _names(files)
     lists = [LIST] if boards else []
     _check(path, files, place, (*names, *lists), overwrite)
+    if boards and len(files) > 1 and len({_board(file, True) for file in files}) == 1:
+        found, expected = "all records in one folder", "a folder for each board, with its name"
+        raise InputError(None, "--boards", found, f"{expected}; --fit takes them as of one board")
     catalog = load_catalog()
     synthesis = read_design(path, catalog, progress)
     prediction = BoardPrediction(synthesis)

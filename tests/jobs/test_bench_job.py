@@ -119,6 +119,14 @@ def test_a_record_that_does_not_repeat_has_no_board(folder: Path, tmp_path: Path
     assert answer["records"][0]["advice"] is None
 
 
+def test_boards_in_one_folder_are_refused(folder: Path, tmp_path: Path) -> None:
+    """They would be taken for one board."""
+    files = [csv_of(0, tmp_path / "a.csv"), csv_of(2, tmp_path / "b.csv")]
+    with pytest.raises(InputError, match="a folder for each board") as error:
+        bench(folder, files, boards=True)
+    assert error.value.field == "--boards"
+
+
 @pytest.mark.parametrize("text", ["", "v1", "v1=", "v1=CH1,v1=CH2", "v1=CH1,fv=CH1"])
 def test_channels_that_are_no_pairs_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="--channels"):

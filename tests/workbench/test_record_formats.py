@@ -143,6 +143,7 @@ def broken(change: Callable[[list[str]], None]) -> str:
         (broken(lambda lines: lines.__setitem__(100, "1,2")), "line 101", "1,2"),
         (broken(lambda lines: lines.__setitem__(100, "1,2,3,4,5")), "line 101", "1 s"),
         (broken(lambda lines: lines.__setitem__(100, "1,∞,3")), "line 101", "∞"),
+        (broken(lambda lines: lines.__setitem__(100, "1,nan,3")), "line 101", "nan"),
         (broken(lambda lines: lines.__delitem__(slice(100, 200))), "line", "s"),
         (broken(lambda lines: lines.__delitem__(slice(50, None))), "its samples", "49"),
         (TWO["Siglent"].replace("Second,Volt,Volt", "Second,Volt,Ampere"), "the unit", "Ampere"),
