@@ -73,6 +73,7 @@ picture: env ngspice ## draw the README's pictures
 	@$(VENV)/bin/python scripts/make-model-picture
 	@$(VENV)/bin/python scripts/make-picture
 	@$(VENV)/bin/python scripts/make-board-picture
+	@$(VENV)/bin/python scripts/make-explore-picture
 
 site: env ## build the documentation into out/site
 	@$(VENV)/bin/python -m sphinx -q -W --keep-going -d out/site/.doctrees docs out/site

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from designer.base.guarded_reading import read_text
+from designer.explorer.board_box import Choose, board_box, expected
 from designer.explorer.job_processes import JobProcesses, JobVerb
 from designer.explorer.omega_strip import strip
 from designer.explorer.other_attractors import others
@@ -18,7 +19,7 @@ from designer.explorer.saved_model import not_found, place_for, read_pins, save,
 from designer.explorer.wire import Message
 from designer.model.model_file import MAX_BYTES, ModelFile, need_responses, parse_model_file
 
-Kind = Literal["view", "save", "run", "search"]
+Kind = Literal["view", "save", "run", "search", "board"]
 
 
 @dataclass(frozen=True)
@@ -26,13 +27,13 @@ class PageQuestion:
     """What a page asks."""
 
     kind: Kind
-    """A picture; or a model file to be saved, and then a verb on it."""
+    """A picture; a model file to be saved, and then a verb on it; or real parts."""
     number: int
     """The page's own number of the question, which the answers have as ``id``."""
     words: dict[str, object]
     """The place (``place.read_place``)."""
     more: dict[str, object]
-    """Of what is saved: ``name``, ``pins`` and ``overwrite``."""
+    """Of what is saved: ``name``, ``pins`` and ``overwrite``; of real parts ``expect``."""
 
 
 def read_question(text: str | bytes) -> PageQuestion | None:
@@ -46,7 +47,7 @@ def read_question(text: str | bytes) -> PageQuestion | None:
     number, words = asked.get("id"), asked.get("words")
     if not isinstance(number, int) or not isinstance(words, dict):
         return None
-    more = {key: asked[key] for key in ("name", "pins", "overwrite") if key in asked}
+    more = {key: asked[key] for key in ("name", "pins", "overwrite", "expect") if key in asked}
     return PageQuestion(cast("Kind", asked["kind"]), number, words, more)
 
 
@@ -63,6 +64,17 @@ def viewed(modelfile: ModelFile, question: PageQuestion) -> Iterator[Message]:
     if len(view.orbit.start):
         yield from strip(place, view.orbit.start)
     yield from others(place, view.orbit)
+
+
+def boards(modelfile: ModelFile, choose: Choose, question: PageQuestion) -> Iterator[Message]:
+    """Real parts for the response that a page shows, and their yield.
+
+    Raises
+    ------
+    InputError : words that give no place, or what no circuit makes.
+    """
+    place = read_place(modelfile, question.words)
+    yield from board_box(modelfile, place, expected(question.more.get("expect")), choose)
 
 
 def kept(

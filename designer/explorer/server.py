@@ -21,9 +21,10 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
+from designer.explorer.board_box import PartsProcess
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
-from designer.explorer.questions import kept, read_question, viewed
+from designer.explorer.questions import boards, kept, read_question, viewed
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
 from designer.jobs.design_source import source
@@ -64,6 +65,8 @@ class Explorer:
     """Address that the server is bound to."""
     token: str
     """What a page has to know; "" where any page on this machine may ask."""
+    report: Callable[[BaseException], None] = lambda _: None
+    """Told of defects that a page's question met."""
     sockets: set[_Socket] = field(default_factory=set)
     """The open pages."""
 
@@ -71,6 +74,16 @@ class Explorer:
     def jobs(self) -> JobProcesses:
         """The jobs that pages have started."""
         return JobProcesses(self._tell)
+
+    @cached_property
+    def board_queue(self) -> WorkQueue:
+        """The thread that waits for parts and counts boards: a picture does not wait for it."""
+        return WorkQueue(self.report)
+
+    @cached_property
+    def parts(self) -> PartsProcess:
+        """The process that chooses parts."""
+        return PartsProcess()
 
     def _tell(self, message: Message) -> None:
         """What every page is told."""
@@ -80,6 +93,8 @@ class Explorer:
     def close(self) -> None:
         """End the thread and the jobs."""
         self.jobs.close()
+        self.parts.close()
+        self.board_queue.close()
         self.queue.close()
 
     @property
@@ -121,7 +136,7 @@ def explore(
     def report(error: BaseException) -> None:
         progress.note(f"a page's question failed: {type(error).__name__}: {error}")
 
-    explorer = Explorer(modelfile, WorkQueue(report), Path.cwd(), host, token)
+    explorer = Explorer(modelfile, WorkQueue(report), Path.cwd(), host, token, report)
 
     def started() -> None:
         progress.note(f"{address} shows {modelfile.title}; Ctrl-C ends it")
@@ -279,6 +294,9 @@ class _Socket(WebSocketHandler, _Guarded):
         if question.kind == "view":
             answer = partial(viewed, e.modelfile, question)
             e.queue.ask(self, question.number, answer, self.send)
+        elif question.kind == "board":
+            answer = partial(boards, e.modelfile, e.parts, question)
+            e.board_queue.ask(self, question.number, answer, self.send)
         else:  # beside the picture, whose next question shall not overtake it
             answer = partial(kept, e.modelfile, e.root, e.jobs, question)
             e.queue.ask((self, "kept"), question.number, answer, self.send)
@@ -286,6 +304,7 @@ class _Socket(WebSocketHandler, _Guarded):
     def on_close(self) -> None:
         self.explorer.sockets.discard(self)
         self.explorer.queue.forget(self)
+        self.explorer.board_queue.forget(self)
 
     def send(self, message: Message) -> None:
         """From any thread."""

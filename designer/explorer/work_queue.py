@@ -62,12 +62,12 @@ class WorkQueue:
             self._asked.pop(page, None)
 
     def close(self) -> None:
-        """End the thread once what it is at is done."""
+        """End the thread once what it is at is done, which is not waited for longer than 5 s."""
         with self._change:
             self._open = False
             self._asked.clear()
             self._change.notify()
-        self._thread.join()
+        self._thread.join(5.0)
 
     def _work(self) -> None:
         while (turn := self._next()) is not None:

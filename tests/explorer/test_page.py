@@ -240,3 +240,18 @@ def test_other_attractors_are_listed_and_one_can_be_shown(browser: Browser, addr
     assert page.locator("#others li").count() >= 1
     assert page.inner_text("#summary") in page.inner_text("#others li:first-child")
     page.close()
+
+
+def test_real_parts_are_chosen_for_the_response(browser: Browser, address: str) -> None:
+    page = opened(browser, f"{address}?omega=0.85")
+    summary(page, "1-2-2")
+    page.click("#choose")
+    page.wait_for_function(
+        "() => document.getElementById('boards').textContent.includes('of 200 boards')",
+        timeout=5.0 * WAIT,
+    )
+    assert "R1" in page.inner_text("#board dl")
+    page.fill("[data-name=zeta] .number", "0.11")
+    page.press("[data-name=zeta] .number", "Enter")
+    summary(page, "1-2-2")
+    page.close()

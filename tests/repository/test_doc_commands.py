@@ -61,6 +61,7 @@ NOT_RUN = {
     "dask": "several machines; tests/jobs/test_dask_runner.py has two processes",
     "python -m designer.paper.robust_design": "hours; it is `make reports`",
     "python -m designer.examples.example_report": "minutes; tests/examples has one",
+    "explore": "serves a page until Ctrl-C; tests/explorer has it in a browser",
     "reproduce": "hours; tests/paper has smaller ones",
     "search examples/robust.toml": "minutes; tests/jobs/test_search_job.py has a smaller one",
     "search out/paper --yield": "minutes; tests/jobs/test_cure_whole.py has a smaller one",

@@ -6,6 +6,7 @@
     "#a06a00", "#7a5ccf"];
   const OPEN = "#bbbbbb";
   const STEPS = 2000;
+  const BOARD = -2; // number of the question about parts
   const page = JSON.parse(document.getElementById("page").textContent);
   const by = (id) => document.getElementById(id);
   const root = document.documentElement;
@@ -118,12 +119,8 @@
       const list = document.querySelector("#facts dl");
       by("tried").textContent = "";
       document.querySelector("#others ul").replaceChildren();
-      list.replaceChildren(...message.facts.flatMap(([name, text]) => {
-        const pair = [document.createElement("dt"), document.createElement("dd")];
-        pair[0].textContent = name;
-        pair[1].textContent = text;
-        return pair;
-      }));
+      table(list, message.facts);
+      by("choose").disabled = by("pin").disabled;
       for (const name of ["portrait", "trace"]) {
         by(name).setAttribute("aria-label", `${name}: ${message.summary}`);
       }
@@ -147,6 +144,17 @@
           start = each.start;
           want();
         }] : null)));
+    },
+    board(message) {
+      by("boards").textContent = message.words;
+      by("boards-bar").hidden = true;
+      table(document.querySelector("#board dl"), message.rows);
+    },
+    yield(message) {
+      by("boards").textContent = message.words;
+      by("boards-bar").hidden = false;
+      by("boards-bar").max = message.of;
+      by("boards-bar").value = message.ok;
     },
     saved(message) {
       const missing = message.missing.length
@@ -177,7 +185,7 @@
     },
     error(message) {
       if (message.id < 0) {
-        by("kept").textContent = message.text;
+        by(message.id === BOARD ? "boards" : "kept").textContent = message.text;
         return;
       }
       notice(message.text);
@@ -186,6 +194,12 @@
       if (name) name.field.setAttribute("aria-invalid", "true");
     },
   };
+  const table = (list, rows) => list.replaceChildren(...rows.flatMap(([name, text]) => {
+    const pair = [document.createElement("dt"), document.createElement("dd")];
+    pair[0].textContent = name;
+    pair[1].textContent = text;
+    return pair;
+  }));
   const row = (text, action) => {
     const item = document.createElement("li"), words = document.createElement("span");
     words.textContent = text;
@@ -218,6 +232,13 @@
     if (!pins.includes(pin)) pins.push(pin);
     showPins();
     history.replaceState(null, "", address());
+  });
+  by("choose").addEventListener("click", () => {
+    if (!line.open) return;
+    const { words: at, response } = shownView;
+    by("boards").textContent = "…";
+    table(document.querySelector("#board dl"), []);
+    line.ask({ kind: "board", id: BOARD, words: at, expect: response });
   });
   const keep = (kind, overwrite) => {
     by("again").hidden = true;

@@ -1,0 +1,51 @@
+"""Real parts for the response that is shown: those of ``synthesise``, with the yield of a study."""
+
+from __future__ import annotations
+
+import pytest
+
+from designer import InputError, parse_model_file, synthesise, tolerance
+from designer.check.synthesis_result import synthesise as choose
+from designer.explorer.board_box import PartsProcess, board_box, expected
+from designer.explorer.place import read_place
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+
+FILE = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}")
+WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
+
+
+def test_the_parts_and_the_yield_are_those_of_the_verbs() -> None:
+    messages = list(board_box(FILE, read_place(FILE, {"omega": 0.85}), "1-2-2", choose))
+    rows = dict(messages[1]["rows"])
+    design = synthesise(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+    assert design.design is not None
+    names = {part.name for part in design.design.circuit.resistors}
+    assert names < rows.keys()
+    assert rows["exact circuit"] == "1-2-2"
+    yields = [message for message in messages if message["kind"] == "yield"]
+    assert [message["samples"] for message in yields] == list(range(10, 210, 10))
+    study = tolerance(design, samples=40, rung="exact", blame=False, jobs=1).study
+    assert study is not None
+    (counted,) = study.yields
+    assert counted is not None
+    assert (yields[3]["samples"], yields[3]["ok"]) == (40, counted.ok)
+
+
+def test_what_no_circuit_makes_is_said() -> None:
+    text = f"format = 1\n{PAPER_TABLE}[circuit]\nresistor_range = [1e3, 1.1e3]\n"
+    modelfile = parse_model_file(text)
+    with pytest.raises(InputError):
+        list(board_box(modelfile, read_place(modelfile, {"omega": 0.85}), "1-2-2", choose))
+    with pytest.raises(InputError, match="n-p-q"):
+        expected(None)
+
+
+def test_parts_are_chosen_in_a_process_of_their_own() -> None:
+    process = PartsProcess()
+    process.close()  # one that was never asked
+    try:
+        there = process(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+    finally:
+        process.close()
+    here = choose(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+    assert there.design.circuit == here.design.circuit
