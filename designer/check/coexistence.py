@@ -80,6 +80,7 @@ class Coexistence:
                     "symmetric": b.orbit.symmetric,
                     "count": b.count,
                     "on_twin": b.twins,
+                    **dict(zip(("x1_min", "x1_max"), _reach(b.orbit), strict=True)),
                     **self._share(b.count),
                 }
                 for b in self.basins
@@ -90,6 +91,14 @@ class Coexistence:
     def _share(self, count: int) -> dict[str, float]:
         low, high = wilson(count, self.starts)
         return {"share": count / self.starts, "low": low, "high": high}
+
+
+def _reach(orbit: Orbit) -> tuple[float | None, float | None]:
+    """Least and largest displacement of the first mass; None where there is no orbit."""
+    if not orbit.n:
+        return None, None
+    low, high = orbit.extremes[0].tolist()
+    return low, high
 
 
 def check(starts: int) -> None:

@@ -35,7 +35,7 @@ def _sweep(answer: Mapping[str, Any]) -> None:
                 "track": w["track"],
                 f"from{unit}": f"{w['from']:.6g}",
                 "to": f"{w['to']:.6g}",
-                **({f"{end} (SI)": _si(w, end, si) for end in ("from", "to")} if si else {}),
+                **({f"{end} [{si}]": _si(w, end, si) for end in ("from", "to")} if si else {}),
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
@@ -123,8 +123,8 @@ def _region(answer: Mapping[str, Any]) -> Iterator[str]:
     yield f"rays end by: {rays}"
     ellipse = found["ellipse_around"]["share"]
     yield (
-        f"both parameters may be off by {found['around']['share']:.2%} there, one alone or both "
-        f"within an ellipse by {ellipse:.2%}"
+        f"each parameter may be off by {found['around']['share']:.2%} there whatever the other "
+        f"does, by {ellipse:.2%} in an ellipse: the less, the more the other is off"
     )
     best = found["best"]
     yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -233,8 +233,11 @@ def _reach(
 def coexisting(starts: Mapping[str, Any]) -> str:
     """Where the starts that were drawn from a box end, the largest share first."""
     parts = []
+    names = Counter(a["response"] for a in starts["attractors"])
     for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
         name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
+        if names[a["response"]] > 1 and a["x1_min"] is not None:
+            name += f" (x1 {a['x1_min']:.4g} to {a['x1_max']:.4g})"
         parts.append(f"{name} {_share(a)}")
     if starts["not_settled"]["count"]:
         parts.append(f"not settled {_share(starts['not_settled'])}")

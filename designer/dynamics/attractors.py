@@ -96,7 +96,7 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
             spent += cost
             if found is not None:
                 return replace(found, periods=spent)
-    still = is_stationary(run.strobes) and not (_decays(flow, run.mode) and not np.any(run.counts))
+    still = _without_period(flow, run)
     if not still:  # a growth too small to be seen at once
         growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
         spent += BLOCK * len(growth.rates)
@@ -107,7 +107,7 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         spent += len(run.strobes) - 1 + cost
         if found is not None:
             return replace(found, periods=spent)
-        still = run.status is FlowStatus.DONE and is_stationary(run.strobes)
+        still = run.status is FlowStatus.DONE and _without_period(flow, run)
     why = "quasi-periodic, or of a longer period" if still else "very slow"
     return _unperiodic(
         OrbitStatus.APERIODIC if still else OrbitStatus.NOT_SETTLED,
@@ -115,6 +115,11 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         spent,
         f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: {why}",
     )
+
+
+def _without_period(flow: Flow, run: FlowResult) -> bool:
+    """Whether a run shows a motion that has settled without a period."""
+    return is_stationary(run.strobes) and (bool(np.any(run.counts)) or not _decays(flow, run.mode))
 
 
 def _decays(flow: Flow, mode: ModeKey) -> bool:

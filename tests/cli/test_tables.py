@@ -30,3 +30,26 @@ def test_whether_the_width_was_reached(
     err = capsys.readouterr().err
     assert "narrower than 5 %" in err
     assert said in err
+
+
+def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
+    def attractor(response: str, ends: tuple[float | None, float | None], share: float) -> Any:
+        reach = dict(zip(("x1_min", "x1_max"), ends, strict=True))
+        return {"response": response, "on_twin": None, "share": share, **reach}
+
+    starts = {
+        "attractors": [
+            attractor("1-1-0", (-0.31, 0.52), 0.25),
+            attractor("1-1-0", (-1.2, 0.9), 0.5),
+            attractor("2-2-1", (-1.0, 1.0), 0.125),
+            attractor("aperiodic", (None, None), 0.0625),
+            attractor("aperiodic", (None, None), 0.0625),
+        ],
+        "not_settled": {"count": 0, "share": 0.0},
+        "box": {"x1": 2.0},
+        "count": 16,
+        "asked": 16,
+    }
+    text = tables.coexisting(starts)
+    assert "1-1-0 (x1 -1.2 to 0.9) 50 %; 1-1-0 (x1 -0.31 to 0.52) 25 %; 2-2-1 12.5 %" in text
+    assert text.count("aperiodic 6.25 %") == 2

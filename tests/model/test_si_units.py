@@ -286,7 +286,7 @@ def test_a_sweep_in_hertz(drill: Path, tmp_path: Path, capfd: Captured) -> None:
     assert entry.status(["bifurcation", *map(str, words[1:]), "--periods", "60", "--keep", "2",
                        "--no-points", "--out", str(out)]) == 0  # fmt: skip
     table = capfd.readouterr().err
-    assert "from (SI)" in table
+    assert "from [Hz]" in table
     assert "60 Hz" in table
 
 
