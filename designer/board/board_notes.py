@@ -19,12 +19,13 @@ from designer.board.board_parts import (
 )
 from designer.board.component import Component
 from designer.board.kicad_placement import place
+from designer.board.reverse_protection import supply_current
 from designer.board.summing_nodes import node_spans
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
-from designer.circuit.board_parts_only import Connector, Trimmer
-from designer.circuit.netlist import Circuit, Section, nominal_board
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, Trimmer
+from designer.circuit.netlist import Circuit, Fitting, Section, nominal_board
 from designer.circuit.working_modes import at_rest
 from designer.model.board_table import BoardChoice
 
@@ -48,6 +49,7 @@ def markdown(
         _supply(circuit, synthesis.catalog),
         _outputs(circuit, choice),
         *_summing_nodes(circuit, components),
+        *_reverse_protection(circuit, components),
         *_protection(synthesis, circuit, choice),
         *_trim(synthesis, circuit, choice),
         *_spare(circuit),
@@ -94,15 +96,35 @@ def _connections(circuit: Circuit, components: Sequence[Component]) -> str:
 
 
 def _supply(circuit: Circuit, catalog: Catalog) -> str:
-    opamp = catalog.opamp(circuit.opamp)
-    sections = opamp.sections * len(circuit.packages)
-    current = opamp.supply_current
-    most = current.max if current.max is not None else current.nominal
+    sections = catalog.opamp(circuit.opamp).sections * len(circuit.packages)
+    usual, most = supply_current(circuit, catalog)
     return (
         f"Supply: ± {circuit.supply:g} V at `vcc` and `vee`. The {sections} amplifiers draw "
-        f"{_q(sections * current.nominal, 'A')} from each rail, {_q(sections * most, 'A')} at "
+        f"{_q(usual, 'A')} from each rail, {_q(most, 'A')} at "
         "most; what they deliver comes on top."
     )
+
+
+def _reverse_protection(circuit: Circuit, components: Sequence[Component]) -> list[str]:
+    """What the diodes in the rails ask of the supply."""
+    diodes = circuit.supply_diodes
+    if not diodes:
+        return []
+    names = " and ".join(d.name for d in diodes)
+    bulk = " and ".join(c.name for c in circuit.fittings if _is_bulk(c))
+    drop, supply = diodes[0].drop, circuit.supply
+    connector = next(c.reference for c in components if diodes[0].source in c.nets.values())
+    return [
+        "## Reverse polarity",
+        f"{names}, {diodes[0].model}, lie between {connector} and the rails: a supply that is "
+        f"connected the wrong way round drives no current. Each drops up to {_q(drop, 'V')} at the "
+        f"current above, so {connector} wants about ± {supply + drop:.3g} V. Set the supply by the "
+        f"voltage across {bulk}, {supply:g} V each: that is what everything here is computed for.",
+    ]
+
+
+def _is_bulk(part: Fitting) -> bool:
+    return isinstance(part, SupplyCapacitor) and not part.package
 
 
 def _outputs(circuit: Circuit, choice: BoardChoice) -> str:

@@ -13,9 +13,16 @@ from typing import Protocol
 
 from designer.base.errors import Unreachable
 from designer.base.views import View
+from designer.board.reverse_protection import supply_diodes
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import THERMAL, diode_model
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.design import Design
 from designer.circuit.netlist import (
     GROUND,
@@ -27,6 +34,7 @@ from designer.circuit.netlist import (
     Resistor,
     Section,
 )
+from designer.circuit.stage_title import SUPPLY
 from designer.model.board_table import BoardChoice
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
@@ -42,6 +50,9 @@ MOST_SERIES = 10e6
 """Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
 PROBES = 10
 """Probes that the numbers before the trim's leave room for; with more, the trim's moves on."""
+PROTECTION = 10
+"""Diodes of summing nodes that the numbers before the supply's leave room for; with more, the
+supply's move on."""
 WAYS = 40
 """Most ways of a header that each output has a pin of ground beside its own on."""
 GENERATOR_MOST = 10.0
@@ -69,13 +80,14 @@ def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
 
     Raises
     ------
-    InputError : an op-amp, a diode or a connector that the catalogue does not have.
+    InputError : an op-amp, a diode or a connector that the catalogue does not have, or a diode that
+        does not stand the supply.
     Unreachable : no resistor for a trim that is to be fitted can be bought. Footprints that stay
         empty are left out then.
     """
     bare = replace(circuit, fittings=())
     spec = choice.spec
-    parts: list[Fitting] = [*_spare(bare, catalog), *_supply(bare, choice)]
+    parts: list[Fitting] = [*_spare(bare, catalog), *_supply(bare, choice, catalog)]
     parts.append(Connector("J2", (bare.generator.net, GROUND), "generator"))
     parts += _probes(bare, choice)
     if spec.input_protection:
@@ -180,8 +192,14 @@ def _spare(circuit: Circuit, catalog: Catalog) -> Iterator[Section]:
                 yield Section(name, net, GROUND, net, "spare, tied off", views=View.BOARD)
 
 
-def _supply(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
-    yield Connector("J1", (POSITIVE, GROUND, NEGATIVE), "supply")
+def _supply(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:
+    diodes: tuple[SupplyDiode, ...] = ()
+    if choice.spec.reverse_protection:
+        first = 901 + max(PROTECTION, 2 * len(driven_nodes(circuit)))
+        diodes = tuple(supply_diodes(circuit, choice.spec.reverse_protection, catalog, first))
+    positive, negative = (d.source for d in diodes) if diodes else (POSITIVE, NEGATIVE)
+    yield Connector("J1", (positive, GROUND, negative), SUPPLY)
+    yield from diodes
     number = 901
     for package in ("", *circuit.packages):
         value = choice.spec.decoupling if package else choice.spec.bulk

@@ -11,8 +11,15 @@ from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import Kind, PartChoice, Rating, Use
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.catalog.entries import DiodeEntry, Kind, PartChoice, Rating, Use
+from designer.catalog.supply_diode import SupplyDiodeEntry
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.netlist import (
     Capacitor,
     Circuit,
@@ -233,10 +240,9 @@ class _Lister:
     def entry(self, part: Fitting) -> Component:
         """A part that has an entry of its own in the catalogue."""
         if isinstance(part, Diode):
-            diode = self.catalog.diode(part.model.name)
-            rating = f"{format_quantity(diode.reverse_voltage.nominal, 'V')} reverse"
-            bought = Bought(diode.manufacturer, diode.part_number, rating, diode.price)
-            return self.component(part, "diode", diode.name, diode.footprint, bought)
+            return self.diode(part, self.catalog.diode(part.model.name))
+        if isinstance(part, SupplyDiode):
+            return self.diode(part, self.catalog.supply_diode(part.model), "diode of the supply")
         if isinstance(part, Reference):
             one = self.catalog.reference(part.model)
             rating = format_quantity(one.voltage, "V")
@@ -248,6 +254,13 @@ class _Lister:
         rating, value = rated(sold.rating), format_quantity(sold.value, "Ω")
         bought = Bought(sold.manufacturer, sold.part_number, rating, sold.price, sold.grade)
         return self.component(part, "trimmer", value, sold.footprint, bought, sold.value)
+
+    def diode(
+        self, part: Diode | SupplyDiode, entry: DiodeEntry | SupplyDiodeEntry, words: str = ""
+    ) -> Component:
+        rating = f"{format_quantity(entry.reverse_voltage.nominal, 'V')} reverse"
+        bought = Bought(entry.manufacturer, entry.part_number, rating, entry.price)
+        return self.component(part, "diode", entry.name, entry.footprint, bought, description=words)
 
     def connector(self, part: Connector) -> Component:
         ways = len(part.ways)

@@ -107,6 +107,9 @@ TERMINALS = {
 """Length of a chip's terminals by the length and width of its body, as chip makers state them."""
 SMALL_DIODES = {"123": (3.7, 0.45, 0.6, (2.7, 1.6)), "323": (2.5, 0.3, 0.35, (1.7, 1.25))}
 """SOD-123 and SOD-323: span over the leads, length of a foot, width of a lead, body."""
+LYING_DIODES = {"35_SOD27": ((4.0, 2.0), 1.6, 0.8), "41_SOD81": ((5.2, 2.7), 2.2, 1.1)}
+"""DO-35 and DO-41: length and width of the body, pad, hole. Leads of the DO-41 are 0.71 mm to
+0.86 mm thick, its body is up to 5.21 mm by 2.72 mm (JEDEC DO-204AL)."""
 
 
 def _chip(name: str, code: str) -> FootprintShape | None:
@@ -156,8 +159,11 @@ def _lying(name: str, length: str, width: str, pitch: str) -> FootprintShape:
     return _two_holes(name, float(pitch), (float(length), float(width)))
 
 
-def _lying_diode(name: str, pitch: str) -> FootprintShape:
-    return _two_holes(name, float(pitch), (4.0, 2.0), mark=True)
+def _lying_diode(name: str, case: str, pitch: str) -> FootprintShape | None:
+    if case not in LYING_DIODES:
+        return None
+    body, pad, drill = LYING_DIODES[case]
+    return _two_holes(name, float(pitch), body, mark=True, pad=pad, drill=drill)
 
 
 def _can(name: str, diameter: str, pitch: str) -> FootprintShape:
@@ -166,9 +172,14 @@ def _can(name: str, diameter: str, pitch: str) -> FootprintShape:
 
 
 def _two_holes(
-    name: str, pitch: float, body: tuple[float, float], mark: bool = False
+    name: str,
+    pitch: float,
+    body: tuple[float, float],
+    mark: bool = False,
+    pad: float = 1.6,
+    drill: float = 0.8,
 ) -> FootprintShape:
-    return FootprintShape(name, _row(2, (pitch, 0.0), (1.6, 1.6), 0.8, square=mark), body, mark)
+    return FootprintShape(name, _row(2, (pitch, 0.0), (pad, pad), drill, square=mark), body, mark)
 
 
 def _transistor_outline(name: str) -> FootprintShape:
@@ -265,7 +276,8 @@ _RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
         rf"[RC]_Axial_(?:DIN\d+_)?L{_N}mm_D{_N}mm_P{_N}mm_Horizontal",
         _lying,
     ),
-    "D_DO-35_SOD27_P7.62mm_Horizontal": (rf"D_DO-35_SOD27_P{_N}mm_Horizontal", _lying_diode),
+    "D_DO-35_SOD27_P7.62mm_Horizontal": (rf"D_DO-(35_SOD27)_P{_N}mm_Horizontal", _lying_diode),
+    "D_DO-41_SOD81_P10.16mm_Horizontal": (rf"D_DO-(41_SOD81)_P{_N}mm_Horizontal", _lying_diode),
     "C_Rect_L7.2mm_W5.5mm_P5.00mm": (
         rf"C_(?:Rect|Disc)_[LD]{_N}mm_W{_N}mm_P{_N}mm(?:_.*)?",
         _lying,

@@ -17,6 +17,7 @@ from designer.board.board_parts import probed_nets
 from designer.board.component import Component
 from designer.board.footprints import footprint
 from designer.board.placed_component import ROOM, Label, PlacedBox, PlacedComponent, bounds
+from designer.circuit.board_parts_only import SupplyDiode
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Section
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
 
@@ -140,8 +141,14 @@ def _pin_labels(component: Component, circuit: Circuit) -> tuple[str, ...]:
         POSITIVE: f"+{volts}",
         NEGATIVE: f"-{volts}",
         circuit.generator.net: "generator",
+        **{d.source: _input_label(circuit, d) for d in circuit.supply_diodes},
     }
     return tuple(names.get(pin.net, pin.net.removesuffix("_out")) for pin in component.pins)
+
+
+def _input_label(circuit: Circuit, diode: SupplyDiode) -> str:
+    """The voltage that a pin before a diode wants, for the rail to be at the supply's."""
+    return f"{'+' if diode.positive else '-'}{circuit.supply + diode.drop:.3g} V"
 
 
 def _owners(circuit: Circuit, components: Sequence[Component]) -> dict[str, list[str]]:

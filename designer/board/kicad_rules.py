@@ -110,7 +110,8 @@ def board_rules(
     beside = limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"]))
     pads, width = limit("pad-clearance", max(leads, MADE)), limit("supply-width")
     summing = tuple(dict.fromkeys(kicad_net(s.inverting) for s in circuit.sections))
-    supply = tuple(kicad_net(net) for net in (POSITIVE, NEGATIVE, GROUND))
+    rails = (POSITIVE, NEGATIVE, GROUND, *circuit.supply_inputs)
+    supply = tuple(kicad_net(net) for net in rails)
     return (
         rule("clearance", "clearance", clearance),
         rule("summing-clearance", "clearance", beside, summing),

@@ -9,7 +9,13 @@ from typing import Literal
 from designer.base.errors import InputError
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.netlist import (
     NEGATIVE,
     POSITIVE,
@@ -102,6 +108,9 @@ def pins(part: Fitting, circuit: Circuit, catalog: Catalog) -> tuple[Pin, ...]:
     if isinstance(part, Diode):
         entry = catalog.diode(part.model.name)
         return _named(entry.pins, {"cathode": part.cathode, "anode": part.anode})
+    if isinstance(part, SupplyDiode):
+        series = catalog.supply_diode(part.model)
+        return _named(series.pins, {"cathode": part.cathode, "anode": part.anode})
     if isinstance(part, Reference):
         reference = catalog.reference(part.model)
         return _named(reference.pins, {"cathode": part.cathode, "anode": part.anode})

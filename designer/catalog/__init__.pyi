@@ -64,6 +64,9 @@ from .stock_list import (
     order_number as order_number,
     stock_rows as stock_rows,
 )
+from .supply_diode import (
+    SupplyDiodeEntry as SupplyDiodeEntry,
+)
 from .vendor_model import (
     VendorModel as VendorModel,
 )

@@ -40,11 +40,13 @@ from designer.catalog.entries import (
 from designer.catalog.read import STOCK, Entry, read_folders
 from designer.catalog.shortage import Offer, no_part, no_values, other_case
 from designer.catalog.stock_list import StockRow, read_stock
+from designer.catalog.supply_diode import SupplyDiodeEntry
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same
-_NamedT = TypeVar("_NamedT", OpAmp, DiodeEntry, ReferenceEntry, PartFamily)
+_NamedT = TypeVar("_NamedT", OpAmp, DiodeEntry, ReferenceEntry, PartFamily, SupplyDiodeEntry)
 _EntryT = TypeVar("_EntryT", bound=Entry)
-_CasedT = TypeVar("_CasedT", OpAmp, DiodeEntry, ReferenceEntry, TrimmerEntry)
+_Cased = OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | SupplyDiodeEntry
+_CasedT = TypeVar("_CasedT", OpAmp, DiodeEntry, ReferenceEntry, TrimmerEntry, SupplyDiodeEntry)
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,8 @@ class Catalog:
     """The folders that were read, in order."""
     trimmers: tuple[TrimmerEntry, ...] = ()
     """Trimming potentiometers that can be bought."""
+    supply_diodes: tuple[SupplyDiodeEntry, ...] = ()
+    """Diodes against a supply of the wrong polarity."""
     headers: tuple[Header, ...] = ()
     """Pin headers that can be bought."""
     prices: tuple[Price, ...] = ()
@@ -230,6 +234,12 @@ class Catalog:
         same = [r for r in self.references if math.isclose(r.voltage, named.voltage, rel_tol=_SAME)]
         return self._cased(named, f"references of {format_quantity(named.voltage, 'V')}", same)
 
+    def supply_diode(self, name: str) -> SupplyDiodeEntry:
+        """The diode of this name against a supply of the wrong polarity; InputError as for
+        ``opamp``."""
+        named = _named(self.supply_diodes, name, "board.reverse_protection")
+        return self._cased(named, "diodes of a supply", self.supply_diodes)
+
     def trimmer(self, value: float) -> TrimmerEntry:
         """The first trimmer of this value [Ω]; InputError names the values that there are."""
         same = [t for t in self.trimmers if math.isclose(t.value, value, rel_tol=_SAME)]
@@ -331,6 +341,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         hash=content_hash,
         folders=folders,
         trimmers=of(TrimmerEntry),
+        supply_diodes=of(SupplyDiodeEntry),
         headers=of(Header),
         prices=of(Price),
         build_costs=of(BuildCost),
@@ -344,7 +355,7 @@ def _nearest(ascending: Sequence[float], value: float) -> float:
     return min(ascending[max(above - 1, 0) : above + 1], key=lambda each: abs(each - value))
 
 
-def _footprints(entry: OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry) -> tuple[str, ...]:
+def _footprints(entry: _Cased) -> tuple[str, ...]:
     """Of every case that it is sold in."""
     return entry.footprint, *(case.footprint for case in entry.cases)
 

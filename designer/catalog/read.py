@@ -48,8 +48,12 @@ from designer.catalog.entries import (
     TrimmerEntry,
 )
 from designer.catalog.fields import CODE_TEXT, quantities, quantity
+from designer.catalog.supply_diode import SupplyDiodeEntry
 
-Entry = PartFamily | OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | Header | Price | BuildCost
+Entry = (
+    PartFamily | OpAmp | DiodeEntry | ReferenceEntry | SupplyDiodeEntry | TrimmerEntry | Header
+    | Price | BuildCost
+)  # fmt: skip
 
 ENVIRONMENT = "DESIGNER_CATALOGS"
 """Environment variable: folders to search first, separated as in PATH."""
@@ -248,6 +252,7 @@ class _File(FileTable):
     opamp: tuple[OpAmp, ...] = ()
     diode: tuple[DiodeEntry, ...] = ()
     reference: tuple[ReferenceEntry, ...] = ()
+    supply_diode: tuple[SupplyDiodeEntry, ...] = ()
     trimmer: tuple[TrimmerEntry, ...] = ()
     header: tuple[Header, ...] = ()
     price: tuple[Price, ...] = ()
@@ -257,8 +262,8 @@ class _File(FileTable):
     def entries(self) -> tuple[Entry, ...]:
         families = (table.family for table in self.family)
         others: tuple[tuple[Entry, ...], ...] = (
-            self.opamp, self.diode, self.reference, self.trimmer, self.header, self.price,
-            self.build_cost,
+            self.opamp, self.diode, self.reference, self.supply_diode, self.trimmer, self.header,
+            self.price, self.build_cost,
         )  # fmt: skip
         return (*families, *(entry for entries in others for entry in entries))
 

@@ -9,6 +9,7 @@ from .board_arrays import (
 from .board_parts_only import (
     Connector as Connector,
     SupplyCapacitor as SupplyCapacitor,
+    SupplyDiode as SupplyDiode,
     TestPoint as TestPoint,
     Trimmer as Trimmer,
 )

@@ -36,6 +36,37 @@ class SupplyCapacitor:
 
 
 @dataclass(frozen=True)
+class SupplyDiode:
+    """A diode between the supply's connector and a rail, which blocks the wrong polarity."""
+
+    name: str
+    """Its name in the circuit."""
+    anode: str
+    """Net of the anode."""
+    cathode: str
+    """Net of the cathode."""
+    source: str
+    """The one of both nets that the connector is on."""
+    model: str
+    """Its name in the catalogue."""
+    drop: float
+    """Most that it drops at the current that the op-amps draw [V]."""
+    role: str
+    """What it is for, in words."""
+    views: View = View.FITTED
+    """Where it stands: simulated, on the board, bought."""
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.anode, self.cathode)
+
+    @property
+    def positive(self) -> bool:
+        """Whether it stands in the positive rail."""
+        return self.anode == self.source
+
+
+@dataclass(frozen=True)
 class Connector:
     """A pin header."""
 

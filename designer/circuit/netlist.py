@@ -20,7 +20,13 @@ from designer.base.views import View
 from designer.catalog.diode_curve import DiodeModel
 from designer.catalog.entries import OpAmp
 from designer.catalog.output_stage import OutputStage
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.resistor_network import Conductance, without_inner_nets
 from designer.circuit.stop import Contact, Stop
 from designer.dynamics.piecewise_linear import Drive
@@ -180,7 +186,7 @@ class Generator:
 
 Part = Resistor | Capacitor | Section | Diode | Reference
 """What is simulated."""
-Fitting = Part | SupplyCapacitor | Connector | TestPoint | Trimmer
+Fitting = Part | SupplyCapacitor | SupplyDiode | Connector | TestPoint | Trimmer
 """What may stand on the board or the bill alone, or be any part of a view."""
 
 
@@ -291,6 +297,16 @@ class Circuit:
     @property
     def references(self) -> tuple[Reference, ...]:
         return tuple(p for p in self.parts if isinstance(p, Reference))
+
+    @property
+    def supply_diodes(self) -> tuple[SupplyDiode, ...]:
+        """Those between the supply's connector and the rails; none on most boards."""
+        return tuple(p for p in self.fittings if isinstance(p, SupplyDiode))
+
+    @property
+    def supply_inputs(self) -> tuple[str, ...]:
+        """The nets of the supply's connector that diodes part from the rails."""
+        return tuple(diode.source for diode in self.supply_diodes)
 
     @property
     def rails(self) -> tuple[Supply, ...]:

@@ -41,12 +41,13 @@ def stage_names(circuit: Circuit) -> dict[str, str]:
     """
     owner = _owners(circuit)
     sections = section_stages(circuit)
+    supply = {POSITIVE, NEGATIVE, GROUND, *circuit.supply_inputs}
     out: dict[str, str] = {}
     for part in (*circuit.parts, *circuit.fittings):
         if part.name in sections:
             out[part.name] = sections[part.name]
             continue
-        if isinstance(part, Section) or set(part.nets) <= {POSITIVE, NEGATIVE, GROUND}:
+        if isinstance(part, Section) or set(part.nets) <= supply:
             out[part.name] = SUPPLY
             continue
         owned = [stage for net, stage in owner.items() if net in part.nets]

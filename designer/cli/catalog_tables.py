@@ -59,6 +59,6 @@ def catalog(entries: Catalog) -> None:
             for o in entries.opamps
         ),
     )
-    for kind in ("Diodes", "References", "Trimmers", "Headers"):
-        names = [entry.name for entry in getattr(entries, kind.lower())]
+    for kind in ("Diodes", "References", "Supply diodes", "Trimmers", "Headers"):
+        names = [entry.name for entry in getattr(entries, kind.lower().replace(" ", "_"))]
         say(f"{kind}: {', '.join(names) or 'none'}")

@@ -28,7 +28,9 @@ def catalog(
 
     entries = load_catalog()
     if check is None:
-        kinds = ("opamps", "families", "diodes", "references", "trimmers", "headers")
+        kinds = (
+            "opamps", "families", "diodes", "references", "supply_diodes", "trimmers", "headers",
+        )  # fmt: skip
         names = {kind: [entry.name for entry in getattr(entries, kind)] for kind in kinds}
         answer = {"format": 1, **names, "hash": entries.hash}
         return Output(answer, lambda: catalog_tables.catalog(entries))

@@ -6,7 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, several, text
+from designer.base.schema import (
+    Accepts,
+    FileTable,
+    choice,
+    flag,
+    number,
+    physical,
+    several,
+    text,
+)
 from designer.catalog.entries import Mounting, PartChoice
 from designer.model.circuit_table import CircuitSpec
 
@@ -47,6 +56,11 @@ class BoardSpec(FileTable):
     """Whether the DC trim has footprints, and whether these are fitted."""
     input_protection: Annotated[bool, flag()] = True
     """Whether diodes protect the driven summing nodes."""
+    reverse_protection: Annotated[
+        str, text(".*", 'the name of a supply diode of the catalogue, such as "1N5819", or ""')
+    ] = ""
+    """The diode between each pin of the supply and its rail, by its name in the catalogue; "" for
+    none."""
     bom: Annotated[
         tuple[str, ...], several('a list of layouts such as ["kicad", "jlcpcb"]', _layout())
     ] = ("kicad", "jlcpcb")

@@ -63,7 +63,7 @@ def net_kinds(rules: Sequence[CustomRule]) -> tuple[NetKind, ...]:
 def kinds_of_nets(circuit: Circuit, names: Mapping[int, str]) -> dict[int, str]:
     """Name of the kind of each net, by its number."""
     summing = {kicad_net(s.inverting) for s in circuit.sections} - {kicad_net(GROUND)}
-    rails = {kicad_net(POSITIVE), kicad_net(NEGATIVE)}
+    rails = {kicad_net(net) for net in (POSITIVE, NEGATIVE, *circuit.supply_inputs)}
     out = {}
     for number, name in names.items():
         supply = SUPPLY if name in rails else DEFAULT

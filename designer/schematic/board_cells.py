@@ -9,7 +9,7 @@ from designer.board.kicad_items import Item
 from designer.board.kicad_names import POWER
 from designer.board.kicad_symbols import PART_ROW, REACH
 from designer.board.pins import SUPPLY_UNIT
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, SupplyDiode, TestPoint
 from designer.circuit.netlist import Circuit, Diode, Resistor, Section
 from designer.schematic.amplifier_cells import (
     PART,
@@ -96,9 +96,9 @@ def probe_cell(circuit: Circuit, probes: Sequence[Resistor], parts: SheetParts) 
 def supply_cell(circuit: Circuit, parts: SheetParts) -> SheetCell:
     """The supply's connector, and the bulk capacitors between rails and ground."""
     cell = SheetCell("supply")
-    rails = set(POWER)
+    nets = {*POWER, *circuit.supply_inputs}
     connector = next(
-        p for p in circuit.fittings if isinstance(p, Connector) and set(p.ways) <= rails
+        p for p in circuit.fittings if isinstance(p, Connector) and set(p.ways) <= nets
     )
     placed = Placed(parts.items[connector.name], 1, 9, 4)
     cell.symbols.append(placed)
@@ -107,7 +107,21 @@ def supply_cell(circuit: Circuit, parts: SheetParts) -> SheetCell:
         cell.pin_end(placed, number, (x - 2, y))
     _stack(cell, _capacitors(circuit, ""), 22, parts)
     cell.right, cell.bottom = 22 + STACK, 18
+    for diode in circuit.supply_diodes:
+        _series(cell, diode, 5, parts)
     return headed(cell, -8)
+
+
+def _series(cell: SheetCell, diode: SupplyDiode, x: int, parts: SheetParts) -> None:
+    """A diode of the supply below what the cell has, from the connector's net to the rail."""
+    rail = next(net for net in diode.nets if net != diode.source)
+    start = x + label_width(diode.source), cell.bottom + 3
+    end = start[0] + PART + 2  # the rail's symbol stands clear of the role
+    cell.end(diode.source, start, f"{diode.name}_in", left=True)
+    row(cell, Chain(diode.source, rail, (diode,)), start, end - 2, parts)
+    cell.wire((end - 2, start[1]), (end, start[1]))
+    cell.end(rail, (end, start[1]), f"{diode.name}_out", left=False)
+    cell.bottom += 8
 
 
 def decoupling_cell(circuit: Circuit, package: str, parts: SheetParts) -> SheetCell:

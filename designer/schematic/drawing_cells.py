@@ -15,7 +15,13 @@ from types import MappingProxyType
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import SUPPLY_UNIT
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
@@ -30,7 +36,7 @@ from designer.circuit.netlist import (
 )
 from designer.circuit.stage_title import dead_zone_titles, section_stages, stage_names
 
-TwoPin = Resistor | Capacitor | Diode | Reference | SupplyCapacitor
+TwoPin = Resistor | Capacitor | Diode | Reference | SupplyCapacitor | SupplyDiode
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,7 @@ class Chain:
         for part in self.parts[:index]:
             net = next(n for n in part.nets if n != net)
         part = self.parts[index]
-        first = part.anode if isinstance(part, Diode | Reference) else part.nets[0]
+        first = part.anode if isinstance(part, Diode | Reference | SupplyDiode) else part.nets[0]
         return first == net
 
 
@@ -228,7 +234,9 @@ def board_cells(
             if View.BOM not in part.views:
                 notes.append("the DC trim is not fitted")
     tied = [p.name for p in fittings if isinstance(p, Section)]
-    supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in (POSITIVE, GROUND, NEGATIVE)]
+    outside = [*(circuit.supply_inputs or (POSITIVE, NEGATIVE))]
+    outside.insert(1, GROUND)
+    supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in outside]
     supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
     for package in circuit.packages:
         pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
@@ -240,6 +248,9 @@ def board_cells(
     cells = [
         CellRows("board: outputs", tuple(outputs), pads),
         CellRows("board: generator", (*drive, *notes)),
+        CellRows(
+            "board: supply", tuple(Chain(d.anode, d.cathode, (d,)) for d in circuit.supply_diodes)
+        ),
         CellRows("board: connectors", tuple(supply)),
     ]
     for rail in (NEGATIVE, POSITIVE):

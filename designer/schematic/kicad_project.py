@@ -80,7 +80,7 @@ def files(project: Project) -> dict[str, str]:
 def settings(name: str, circuit: Circuit) -> str:
     """The file ``.kicad_pro``: net classes, and which nets are in them."""
     summing = sorted({s.inverting for s in circuit.sections} - {GROUND})
-    supply = (GROUND, POSITIVE, NEGATIVE)
+    supply = (GROUND, POSITIVE, NEGATIVE, *circuit.supply_inputs)
     value: dict[str, Any] = {
         "board": {"design_settings": {"defaults": {}, "rules": {}, "track_widths": []}},
         "meta": {"filename": f"{name}.kicad_pro", "version": 3},

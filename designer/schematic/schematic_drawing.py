@@ -15,7 +15,7 @@ import schemdraw.elements as elm
 
 from designer.base.units import format_quantity
 from designer.board.component import Numbers, designator
-from designer.circuit.board_parts_only import SupplyCapacitor
+from designer.circuit.board_parts_only import SupplyCapacitor, SupplyDiode
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, Reference, Resistor
 from designer.schematic.drawing_cells import (
     Amplifier,
@@ -34,6 +34,7 @@ _SYMBOLS: dict[type, Any] = {
     SupplyCapacitor: elm.Capacitor,
     Reference: elm.Zener,
     Diode: elm.Diode,
+    SupplyDiode: elm.Schottky,
 }
 
 Canvas = Literal["svg", "matplotlib"]

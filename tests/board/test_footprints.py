@@ -21,7 +21,9 @@ KICAD = Path("/usr/share/kicad/footprints")
 def catalogued() -> set[str]:
     """Every footprint that the catalogue names, in whichever case; arrays stand on bills alone."""
     found = {family.footprint for family in CATALOG.families if family.use != "array"}
-    for entries in (CATALOG.opamps, CATALOG.diodes, CATALOG.references, CATALOG.trimmers):
+    for entries in (
+        CATALOG.opamps, CATALOG.diodes, CATALOG.references, CATALOG.supply_diodes, CATALOG.trimmers,
+    ):  # fmt: skip
         found |= {case.footprint for entry in entries for case in (entry, *entry.cases)}
     return found | {CATALOG.header(ways).place(ways) for ways in range(2, 8)}
 
@@ -89,6 +91,7 @@ def test_holes_are_as_far_apart_as_the_name_says() -> None:
         ("R_Axial_DIN0207_L6.3mm_D2.5mm_P10.16mm_Horizontal", 10.16),
         ("C_Rect_L7.2mm_W5.5mm_P5.00mm_FKS2_FKP2_MKS2_MKP2", 5.0),
         ("D_DO-35_SOD27_P7.62mm_Horizontal", 7.62),
+        ("D_DO-41_SOD81_P10.16mm_Horizontal", 10.16),
         ("CP_Radial_D5.0mm_P2.00mm", 2.0),
         ("C_Axial_L22.0mm_D9.5mm_P27.50mm_Horizontal", 27.5),
     ):

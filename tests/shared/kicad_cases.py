@@ -25,20 +25,32 @@ from tests.shared.stages import CATALOG
 RUN = FirstRun(Excitation(300.0, 1.0), SolverSettings("trap", 1e-6), 0.01, np.zeros(4))
 CASES: dict[str, tuple[str, Mounting]] = {
     **{name: (name, "mixed") for name in CIRCUITS},
+    "protected": ("paper", "mixed"),
     "through-hole": ("rectifier", "tht"),
     "surface": ("rectifier", "smd"),
     "duals on the surface": ("duals", "smd"),
     "singles on the surface": ("singles", "smd"),
 }
 """Circuit and mounting."""
+PROTECTED = ("surface", "protected")
+"""Cases with a diode in each rail; the others are connected straight to it."""
 
 
 def project(
-    circuit: Circuit, mounting: Mounting = "mixed", title: str = "a board", dc_trim: str = "fitted"
+    circuit: Circuit,
+    mounting: Mounting = "mixed",
+    title: str = "a board",
+    dc_trim: str = "fitted",
+    reverse_protection: str = "",
 ) -> Project:
     """The project of a circuit with everything that its board needs."""
     catalog = CATALOG.mounted(mounting)
-    choice = BoardChoice(BoardSpec(mounting=mounting, dc_trim=dc_trim))  # type: ignore[arg-type]
+    spec = BoardSpec(
+        mounting=mounting,
+        dc_trim=dc_trim,  # type: ignore[arg-type]
+        reverse_protection=reverse_protection,
+    )
+    choice = BoardChoice(spec)
     board = fitted(circuit, choice, catalog)
     found = components(board, catalog, choice)
     run = replace(RUN, initial=np.zeros(len(circuit.states)))
@@ -48,7 +60,12 @@ def project(
 @cache
 def case(name: str) -> Project:
     circuit, mounting = CASES[name]
-    return project(CIRCUITS[circuit], mounting, dc_trim="unfitted" if name == "paper" else "fitted")
+    return project(
+        CIRCUITS[circuit],
+        mounting,
+        dc_trim="unfitted" if name == "paper" else "fitted",
+        reverse_protection="1N5819" if name in PROTECTED else "",
+    )
 
 
 @cache
