@@ -14,7 +14,7 @@ import shapely
 from shapely import Geometry
 
 from designer.base.arrays import Array
-from designer.routing.board_copper import BoardCopper, grown
+from designer.routing.board_copper import BoardCopper, Copper, grown
 from designer.routing.routing_grid import EDGE
 
 THINNEST = 0.25
@@ -62,16 +62,15 @@ def ground_pour(
             if p.net != ground
         ]
     )
-    pads = [piece for piece in own if piece.relief]
-    reliefs = shapely.union_all([grown(p.shape, RELIEF + SLACK) for p in pads])
+    reliefs = shapely.union_all([grown(p.shape, RELIEF + SLACK) for p in own if p.relief])
     free = shapely.difference(border, foreign)
     half = 0.5 * THINNEST + SLACK
     open_ = grown(shapely.difference(free, reliefs), -half)
     filled = grown(open_, half)
-    bridges = [b for pad in pads for b in _bridges(pad.shape, filled, free)]
-    filled = shapely.union_all([filled, *bridges])
-    anchors = shapely.union_all([p.shape for p in own])
-    parts = [p for p in shapely.get_parts(filled) if shapely.intersects(p, anchors)]
+    parts, lone = _parts(filled, free, own)
+    while lone:
+        filled = shapely.difference(filled, shapely.union_all(lone))
+        parts, lone = _parts(filled, free, own)
     outline = max(shapely.get_parts(border), key=lambda part: float(part.area))
     parts.sort(key=lambda part: shapely.bounds(part).tolist())
     return Pour(
@@ -79,6 +78,26 @@ def ground_pour(
         shapely.get_coordinates(outline.exterior)[:-1],
         tuple(cut_open(part) for part in parts),
     )
+
+
+def _parts(
+    filled: Geometry, free: Geometry, own: Sequence[Copper]
+) -> tuple[list[Geometry], list[Geometry]]:
+    """The pieces of a fill with the thermal bridges that reach it, and those of them that one pad's
+    bridges alone hold: to KiCad these are islands, and bridges to them are none. The largest piece
+    is no island."""
+    bridges = [b for p in own if p.relief for b in _bridges(p.shape, filled, free)]
+    tree = shapely.STRtree([piece.shape for piece in own])
+    parts, lone = [], []
+    pieces = shapely.get_parts(shapely.union_all([filled, *bridges]))
+    largest = max(map(shapely.area, pieces), default=0.0)
+    for part in pieces:
+        held = tree.query(part, predicate="intersects")
+        if len(held) == 1 and own[held[0]].relief and part.area < largest:
+            lone.append(part)
+        elif len(held):
+            parts.append(part)
+    return parts, lone
 
 
 def _bridges(pad: Geometry, filled: Geometry, free: Geometry) -> list[Geometry]:

@@ -199,6 +199,12 @@ def test_a_pad_of_ground_has_thermal_bridges_and_none_where_two_find_no_room() -
     assert bridges(route_board(small(pad + walls), circuit, rules).text) == 2
     walls += walls.replace("(start 9 3) (end 9 7)", "(start 9 4) (end 11 4)")
     assert bridges(route_board(small(pad + walls), circuit, rules).text) == 0
+    corners = ((7, 2), (13, 2), (13, 8), (7, 8), (7, 2))
+    fence = "".join(
+        f'(segment (start {a} {b}) (end {x} {y}) (width 0.3) (layer "B.Cu") (net 2))'
+        for (a, b), (x, y) in itertools.pairwise(corners)
+    )
+    assert bridges(route_board(small(pad + fence), circuit, rules).text) == 0  # an island
 
 
 def test_on_four_layers_every_pad_of_ground_reaches_the_planes() -> None:

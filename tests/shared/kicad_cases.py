@@ -32,7 +32,7 @@ CASES: dict[str, tuple[str, Mounting]] = {
     "singles on the surface": ("singles", "smd"),
 }
 """Circuit and mounting."""
-PROTECTED = ("surface", "protected")
+PROTECTED = ("surface", "protected", "through-hole")
 """Cases with a diode in each rail; the others are connected straight to it."""
 
 
