@@ -157,6 +157,8 @@ class PageSection:
     """Paragraphs, tables, pictures, sections of the next level; None stands for nothing."""
     anchor: str = ""
     """Name of the section in links."""
+    entry: str = ""
+    """What the table of contents calls it; "" where it calls it by its anchor."""
 
 
 @dataclass(frozen=True)

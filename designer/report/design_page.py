@@ -216,7 +216,8 @@ def _dead_zones(data: ReportData, pictures: Pictures) -> PageSection:
     )
     drawn = [p for name, p in pictures.items() if name.startswith("stop ")]
     curves: list[Block] = [SmallPrint(note), *drawn, design_tables.stop_table(data.stops)]
-    return PageSection("DC curve of the dead zone", curves if data.stops else [], "dc")
+    blocks = curves if data.stops else []
+    return PageSection("DC curve of the dead zone", blocks, "dc", "DC curve")
 
 
 def _yields(data: ReportData, pictures: Pictures) -> PageSection:

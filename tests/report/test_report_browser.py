@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from designer.base.page import Page as ReportPage, PageSection, table
 from designer.report.write import render_html, render_page
+from designer.verdicts.verdict import Verdict
 from tests.shared.report_data import changed, plain_report
 
 pytestmark = pytest.mark.browser
@@ -61,8 +62,13 @@ def loaded(browser: Browser, html: str, file: Path) -> Loaded:
 
 @pytest.fixture(scope="module")
 def report(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
-    """A small report whose title is hostile."""
+    """A small report whose title is hostile, and whose board 1 lost the first response."""
     data = plain_report()
+    lost = {"verdict": Verdict.LOST, "response": "aperiodic", "reason": "aperiodic"}
+    answers = tuple(
+        replace(a, **lost) if (a.sample, a.question) == (1, 0) else a for a in data.study.answers
+    )
+    data = changed(data, answers=answers)
     data = changed(data, modelfile=replace(data.result.modelfile, title=HOSTILE))
     return loaded(browser, render_html(data), tmp_path_factory.mktemp("report") / "report.html")
 
@@ -168,6 +174,17 @@ def test_a_board_is_called_up_by_the_keyboard(report: Loaded) -> None:
     cell = parts.locator("tr", has_text="R50").locator("td").nth(1)
     assert float(cell.inner_text().split()[0]) == pytest.approx(drawn / 1e3, rel=1e-3)
     page.wait_for_function(BOARD)
+
+
+def test_a_board_without_a_period_is_told_of_once(report: Loaded) -> None:
+    page = report.page
+    page.get_by_label("Response", exact=True).select_option("0")
+    number = page.get_by_label("Number of the board")
+    number.fill("1")
+    number.press("Enter")
+    page.get_by_text("It shows no n-p-q: aperiodic.", exact=True).wait_for()
+    row = page.locator("#boards table").first.locator("tbody tr").first
+    assert row.locator("td").all_inner_texts()[1:4] == ["lost", "aperiodic", "–"]
 
 
 BOARD = """() => Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [...root.references()])

@@ -180,6 +180,7 @@ def test_links_lead_to_sections_and_ids_are_unique(html: str) -> None:
     used = {str(a["href"])[1:] for _, a in page.tags if "href" in a}
     used |= set(re.findall(r"url\(#([^)]+)\)", html))
     assert used == set(ids)  # of each picture its own, and none that nothing needs
+    assert '<a href="#dc">DC curve</a>\n<a href="#schematic">Schematic</a>' in html
 
 
 def test_pictures_follow_the_page(html: str) -> None:

@@ -79,7 +79,8 @@ report.ready = (async () => {
   function verdicts(k) {
     return study.responses.map((response) => {
       const [verdict, shows, reason] = answer(response, k);
-      return [response.name, verdict, shows, reason, figure(response.radius[k], 4), quantityText(response.margin[k], "V")];
+      const why = reason === shows ? NONE : reason;
+      return [response.name, verdict, shows, why, figure(response.radius[k], 4), quantityText(response.margin[k], "V")];
     });
   }
 
@@ -119,7 +120,8 @@ report.ready = (async () => {
     number.value = k;
     const [verdict, shows, reason] = answer(study.responses[response], k);
     const more = reason && reason !== `to ${shows}` && reason !== shows ? ` (${reason})` : "";
-    const why = `It shows ${shows || "nothing that was asked"}${more}.`;
+    const repeats = !shows || /^\d/.test(shows);
+    const why = `${repeats ? "It shows" : "It shows no n-p-q:"} ${shows || "nothing that was asked"}${more}.`;
     status.textContent = `Board ${name(k)}: ${verdict}`;
     shown.replaceChildren(
       element("h3", `Board ${name(k)}, ${study.responses[response].name}: ${verdict}`),
