@@ -148,6 +148,14 @@ class Verbatim:
 
 
 @dataclass(frozen=True)
+class FileLinks:
+    """Links to files that stand beside the page."""
+
+    names: tuple[str, ...]
+    """Names of the files."""
+
+
+@dataclass(frozen=True)
 class PageSection:
     """A heading with what stands below it."""
 
@@ -169,7 +177,10 @@ class Columns:
     """The sections."""
 
 
-Block = str | Table | Picture | Widget | Gallery | Items | Verbatim | PageSection | Columns | None
+Block = (
+    str | Table | Picture | Widget | Gallery | Items | Verbatim | FileLinks | PageSection | Columns
+    | None
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -241,6 +252,8 @@ def _block(block: Block, level: int) -> list[str]:
             return ["\n".join(_item(head, text) for head, text in block.items)] * bool(block.items)
         case Verbatim():
             return [_verbatim(" ".join(line.split()) for line in block.lines)]
+        case FileLinks():
+            return [f"Beside this page: {', '.join(f'[{n}]({n})' for n in block.names)}."]
         case PageSection():
             below = _texts(block.blocks, level + 1)
             return [f"{'#' * level} {plain(block.title)}", *below] if below else []

@@ -29,6 +29,13 @@ from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
 
 NONE = "–"
+UNITS = (
+    "Seconds are of one drive period of each response, for yields of one board of each. "
+    "Measured is the largest error with the uncertainty of what it is measured against, or the "
+    "number of responses with another n-p-q. Convergence is what the steps of one rung differ by, "
+    "where that rung is what the others are measured against: it is no error against anything else."
+)
+"""What the columns of ``cheapest_table`` say."""
 TITLES = {
     "rk4": "model, Runge-Kutta",
     "model": "model, exact",
@@ -161,22 +168,18 @@ def sheet(answer: Mapping[str, Any]) -> str:
         Markup(
             "The cheapest rung and setting that answers each question, for all responses together, "
             "and against what its error is measured: `board` is the nominal circuit with "
-            f"{_truth_words(answer)} in ngspice at the finest step, `equations` the exact flow of "
+            f"{truth_words(answer)} in ngspice at the finest step, `equations` the exact flow of "
             "the model, `ideal` ngspice with ideal op-amps on the same boards. Where the bound is "
             "not kept by any rung, the one that comes nearest is named. A setting of ngspice that "
             "did not pass the numerics gate is never named; the board itself is, by what its two "
             "finest steps differ by, where nothing less will do."
         ),
-        _answers(answer),
-        "Seconds are of one drive period of each response, for yields of one board of each. "
-        "Measured is the largest error with the uncertainty of what it is measured against, or the "
-        "number of responses with another n-p-q. Convergence is what the steps of one rung differ "
-        "by, where that rung is what the others are measured against: it is no error against "
-        "anything else.",
+        cheapest_table(answer),
+        UNITS,
     ]
     sections = [PageSection("By response", _by_response(answer))]
     if answer["boards"]:
-        sections.append(PageSection("Boards", _board_blocks(answer["boards"])))
+        sections.append(PageSection("Boards", board_blocks(answer["boards"])))
     if answer["left_out"]:
         rows = [f"{name(row)}: {row['reason']}" for row in answer["left_out"]]
         sections.append(PageSection("Left out", ["No boards were asked of:", bullets(rows)]))
@@ -187,14 +190,14 @@ def _boards_asked(answer: Mapping[str, Any]) -> int:
     return int(answer["provenance"]["settings"]["trade"]["boards"])
 
 
-def _truth_words(answer: Mapping[str, Any]) -> str:
+def truth_words(answer: Mapping[str, Any]) -> str:
     """The op-amps that stand for the board's."""
     vendor = any(t.get("rung") == VENDOR for t in answer["truths"])
     return "the vendor's macromodel of the op-amps" if vendor else "full op-amps"
 
 
-def _answers(answer: Mapping[str, Any]) -> Table | None:
-    """What answers each question, of all responses together."""
+def cheapest_table(answer: Mapping[str, Any]) -> Table | None:
+    """What answers each question, of all responses together. answer : the JSON object."""
     alone = len(answer["truths"]) == 1
     rows = []
     for c in answer["cheapest"]:
@@ -233,7 +236,8 @@ def _by_response(answer: Mapping[str, Any]) -> list[Block]:
     ]
 
 
-def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+def board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+    """What both engines say of the same boards. boards : of the JSON object."""
     columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "response": name,
         "boards": lambda b: str(b["boards"]),
@@ -279,7 +283,7 @@ def _bandwidth_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
 
 
 def _measured(c: Mapping[str, Any], key: str) -> str:
-    if c[key] is None:
+    if c.get(key) is None:  # earlier versions knew no convergence
         return NONE
     return f"{c[key]:.0f} wrong" if c["question"] == RESPONSE else _percent(c[key])
 

@@ -39,6 +39,7 @@ from designer.jobs.design_source import (
 )
 from designer.jobs.options import Options, stated_options
 from designer.jobs.origin import provenance
+from designer.jobs.report_sections import renew_report
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
 from designer.model.model_file import naming, need_responses
@@ -172,6 +173,7 @@ def cure_into(
             )
         _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
     answer = folder.json(CURE)
+    renew_report(folder, progress.note)
     if out is not None:
         _write_design(base, answer, out, options, progress)
     return CureResult(answer, bool(answer["reached"]), not todo)

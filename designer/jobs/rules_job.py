@@ -29,6 +29,7 @@ from designer.design_rules.kicad_program import kicad_version
 from designer.design_rules.subject import RuleSubject
 from designer.jobs.design_source import read_design
 from designer.jobs.origin import provenance
+from designer.jobs.report_sections import renew_report
 from designer.model.model_file import naming
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ def rules(
     place.decide(stages, overwrite=True, resume=False)  # refuses what is not ours
     with place.working(stages):
         place.write(NAME, dumps(answer))
+    renew_report(place, progress.note)
     if report is not None:
         text = rule_reports.junit(synthesis.modelfile.title, checks.outcomes)
         with atomic_write.appearing(report, "--junit") as partial:

@@ -25,6 +25,7 @@ from designer.jobs import design_files, kicad_files
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
+from designer.jobs.report_sections import later_sections
 from designer.jobs.study_cache import CACHE, StudyCache
 from designer.jobs.study_folder import (
     BOARDS,
@@ -232,7 +233,8 @@ class StudyStage:
 
         starts, board = design_files.starts(folder), kicad_files.own_board(folder)
         data = ReportData(result, self.command, starts, board)
-        write_report(data, *(folder / f"{prefix}{name}" for name in REPORTS))
+        html, text = (folder / f"{prefix}{name}" for name in REPORTS)
+        write_report(data, html, text, () if prefix else later_sections(folder))
 
 
 def study_of(

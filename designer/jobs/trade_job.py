@@ -28,6 +28,7 @@ from designer.jobs import folder_numbers
 from designer.jobs.design_source import grade_inputs, source
 from designer.jobs.options import Options, stated_options
 from designer.jobs.origin import provenance
+from designer.jobs.report_sections import renew_report
 from designer.jobs.rung_choice import TRADE
 from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse
@@ -247,6 +248,7 @@ def answer(
     inputs = {**runner.design_inputs, **asdict(extent), "levels": levels, "seed": options.seed}
     inputs |= {"rules": RULES, **grade_inputs(modelfile, runner.catalog)}
     if not runner.decide({"trade": (inputs, [*NAMES, PIECES])}):
+        renew_report(folder, progress.note)
         return folder.json(TRADE), True
     key = ManifestStage(inputs).hash
     unfinished = folder.state("trade", inputs) == "unfinished"
@@ -264,6 +266,7 @@ def answer(
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)
     folder.finish("trade")
+    renew_report(folder, progress.note)
     return folder.json(TRADE), False
 
 

@@ -21,6 +21,10 @@ from .comparison import (
 from .data import (
     ReportData as ReportData,
 )
+from .inserted import (
+    inserted_html as inserted_html,
+    inserted_markdown as inserted_markdown,
+)
 from .map_plots import (
     map_files as map_files,
 )
@@ -33,6 +37,9 @@ from .record_plots import (
 from .response_colours import (
     BLACK as BLACK,
     RED as RED,
+)
+from .verb_sections import (
+    SECTIONS as SECTIONS,
 )
 from .write import (
     write_report as write_report,

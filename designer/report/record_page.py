@@ -12,7 +12,7 @@ from designer.base.figure_style import to_svg
 from designer.base.page import Block, Page, PageSection, Picture, SmallPrint, Table, table_of
 from designer.base.units import format_quantity
 from designer.report.inline_svg import InlineSvg
-from designer.report.write import render_page
+from designer.report.page_html import render_page
 
 YES_NO = {True: "yes", False: "no", None: ""}
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from designer.base.page import Page as ReportPage, PageSection, table
-from designer.report.write import render_html, render_page
+from designer.report.page_html import render_page
+from designer.report.write import render_html
 from designer.verdicts.verdict import Verdict
 from tests.shared.report_data import changed, plain_report
 
@@ -64,7 +66,7 @@ def loaded(browser: Browser, html: str, file: Path) -> Loaded:
 def report(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
     """A small report whose title is hostile, and whose board 1 lost the first response."""
     data = plain_report()
-    lost = {"verdict": Verdict.LOST, "response": "aperiodic", "reason": "aperiodic"}
+    lost: dict[str, Any] = {"verdict": Verdict.LOST, "response": "aperiodic", "reason": "aperiodic"}
     answers = tuple(
         replace(a, **lost) if (a.sample, a.question) == (1, 0) else a for a in data.study.answers
     )

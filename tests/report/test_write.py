@@ -16,7 +16,7 @@ import pytest
 
 from designer.base import figure_style
 from designer.base.errors import InputError
-from designer.base.page import Table
+from designer.base.page import PageSection, Table
 from designer.board.kicad_reader import read_board
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
@@ -31,6 +31,7 @@ from designer.model.mechanics import Sides
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.report import design_tables, words
 from designer.report.data import ReportData
+from designer.report.inserted import inserted_html, inserted_markdown
 from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
 from designer.spice.pool import SpicePool
@@ -320,6 +321,25 @@ def test_the_same_data_give_the_same_bytes(whole: ReportData, html: str, tmp_pat
     assert (tmp_path / "report.html").read_bytes() == html.encode("utf-8")
     assert (tmp_path / "report.md").read_bytes() == render_markdown(whole).encode("utf-8")
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_later_sections_stand_before_the_scales_and_go_without_a_trace(
+    whole: ReportData, html: str
+) -> None:
+    section = PageSection("Later", ["A <later> answer."], "later")
+    page, text = (
+        inserted_html(html, [section]),
+        inserted_markdown(render_markdown(whole), [section]),
+    )
+    anchors = re.findall(r'<section id="(\w+)">', page)
+    assert anchors == re.findall(r'<a href="#(\w+)">', page)
+    assert anchors[anchors.index("later") + 1] == "scales"
+    assert "<p>A &lt;later&gt; answer.</p>" in page
+    places = [text.index(f"## {title}\n") for title in ("Yields", "Later", "Scales and conditions")]
+    assert places == sorted(places)
+    assert inserted_html(page, [section]) == page
+    assert inserted_html(page, []) == html
+    assert inserted_markdown(text, []) == render_markdown(whole)
 
 
 def test_no_time_and_no_path_of_this_machine_stands_in_it(whole: ReportData, html: str) -> None:

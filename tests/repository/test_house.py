@@ -29,6 +29,8 @@ LAZY = {
         ("jobs.board_files", "schematic.schematic_drawing"),
         ("jobs.cure_job", "base.figure_style"),
         ("jobs.cure_job", "centering.cure_plots"),
+        ("jobs.report_sections", "report.inserted"),
+        ("jobs.report_sections", "report.verb_sections"),
         ("jobs.study_folder", "report.map_plots"),
         ("jobs.study_stage", "report.data"),
         ("jobs.study_stage", "report.write"),

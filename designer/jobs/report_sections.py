@@ -1,0 +1,58 @@
+"""What later verbs answered, shown in the report of the study of the same folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from designer.base.design_folder import REPORTS, Folder, file_hash
+from designer.base.keyed_store import Note, quiet
+from designer.base.manifest import StageName
+from designer.base.page import PageSection
+
+SHOWN: Mapping[StageName, Sequence[str]] = {
+    "cure": ("cure.json", "cure-front.csv", "cure-front.svg"),
+    "rules": ("rules.json",),
+    "trade": ("trade.md", "trade.json", "trade.svg", "trade-numerics.svg"),
+}
+"""Stages that the report shows, in its order, each with the files that it names."""
+
+
+def later_sections(folder: Folder) -> tuple[PageSection, ...]:
+    """A section for each stage in ``SHOWN`` that is finished and as it was written."""
+    return tuple(_sections(folder))
+
+
+def _sections(folder: Folder) -> Iterator[PageSection]:
+    stages = {} if folder.manifest is None else folder.manifest.stages
+    shown = [name for name in SHOWN if name in stages and stages[name].complete]
+    if not shown:
+        return
+    from designer.report.verb_sections import SECTIONS  # matplotlib is not needed before this
+
+    for name in shown:
+        if folder.changed(name) is None:
+            yield SECTIONS[name](folder.json(f"{name}.json"), SHOWN[name])
+
+
+def renew_report(folder: Folder, note: Note = quiet) -> None:
+    """Show in the report of a folder's study what stands in the folder now; nothing is computed.
+
+    A folder without a finished study stays as it is, and so does a report that somebody changed.
+    note : told of such a report.
+    """
+    study = None if folder.manifest is None else folder.manifest.stages.get("study")
+    if study is None or not study.complete:
+        return
+    assert folder.manifest is not None
+    from designer.report.inserted import inserted_html, inserted_markdown
+
+    sections = later_sections(folder)
+    for name, insert in zip(REPORTS, (inserted_html, inserted_markdown), strict=True):
+        _, digest = folder.manifest.files.get(name, ("", None))
+        if digest is None or not (folder / name).is_file():
+            continue
+        content = (folder / name).read_bytes()
+        if file_hash(name, content) == digest:
+            folder.rewrite(name, insert(content.decode("utf-8"), sections))
+        else:
+            note(f"{name} was changed since it was written: it stays as it is")

@@ -1,0 +1,41 @@
+"""Sections put into a report that is written already.
+
+They stand between two marks, before the section on scales, and have an entry each in the table of
+contents. A report without them has no marks; what stood there before is replaced.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from designer.base.page import PageSection, paragraphs
+from designer.report.page_html import render_sections
+
+_MARKS = "<!-- later results -->\n", "<!-- end of later results -->\n"
+_BETWEEN = re.compile(f"(?ms)^{_MARKS[0]}.*?^{_MARKS[1]}")
+_HTML = '<section id="scales">\n', '<a href="#scales">'
+_MARKDOWN = "## Scales and conditions\n"
+
+
+def inserted_html(html: str, sections: Sequence[PageSection]) -> str:
+    """``report.html`` with these sections, and with no others that were put into it."""
+    entries = "".join(f'<a href="#{s.anchor}">{s.anchor.capitalize()}</a>\n' for s in sections)
+    page = _BETWEEN.sub("", html)
+    for place, text in zip(_HTML, (render_sections(sections), entries), strict=True):
+        page = _before(page, place, text)
+    return page
+
+
+def inserted_markdown(text: str, sections: Sequence[PageSection]) -> str:
+    """The same of ``report.md``."""
+    return _before(_BETWEEN.sub("", text), _MARKDOWN, paragraphs(sections) + "\n")
+
+
+def _before(text: str, place: str, new: str) -> str:
+    """A text with another one between marks before a place; as it is where there is no such place,
+    or nothing to put there."""
+    if not new.strip():
+        return text
+    before, found, after = text.partition(f"\n{place}")
+    return f"{before}\n{_MARKS[0]}{new}{_MARKS[1]}{place}{after}" if found else text

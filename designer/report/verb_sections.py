@@ -1,0 +1,155 @@
+"""Sections of a report about what other verbs answered of the same design: cure, rules, trade.
+
+Each is made from the JSON object that the verb wrote beside the report, and from nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from designer.base.page import (
+    Block,
+    FileLinks,
+    Items,
+    Lead,
+    PageSection,
+    SmallPrint,
+    bullets,
+    table,
+    table_of,
+)
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
+from designer.fidelity import trade_files
+from designer.report import words
+
+Answer = Mapping[str, Any]
+
+
+def cure_section(answer: Answer, files: Sequence[str]) -> PageSection:
+    """The cheapest cure. answer : ``cure.json`` (docs/contract.md). files : of it, for links."""
+    blocks: list[Block] = [
+        Lead(_cure_lead(answer)),
+        _upgrades(answer),
+        SmallPrint(
+            "Yields of the exact circuit on fresh boards, with their 95 % intervals. Prices are "
+            "over the design as it is, in euro by the catalogue's price classes."
+        ),
+        _cured_responses(answer),
+        PageSection("Yield against price", [_front(answer)]),
+        PageSection("Not built", [_refused(answer)]) if answer["refused"] else None,
+        FileLinks(tuple(files)),
+    ]
+    return PageSection("The cheapest cure", blocks, "cure")
+
+
+def _cure_lead(answer: Answer) -> str:
+    wanted, price = f"{100.0 * answer['target']:g} %", f"{answer['price']:.2f} €"
+    if answer["reached"]:
+        return f"Every response at {wanted} or better for {price}."
+    return f"{wanted} is not reached: {answer['why']}. The best that was measured costs {price}."
+
+
+def _upgrades(answer: Answer) -> Items | str:
+    return bullets(answer["said"]) if answer["said"] else "Nothing is changed."
+
+
+def _cured_responses(answer: Answer) -> Block:
+    columns: dict[str, Callable[[Answer], str]] = {
+        "response": _response,
+        "as it is": lambda r: _share(r["before"]),
+        "with the cure": lambda r: _share(r["after"]),
+        "limit": lambda r: r["limit"],
+    }
+    return table_of(answer["responses"], columns)
+
+
+def _front(answer: Answer) -> Block:
+    columns: dict[str, Callable[[Answer], str]] = {
+        "price": lambda t: f"{t['price']:.2f} €",
+        "worst response": lambda t: _share(min(t["measured"], key=_worst)),
+        "upgrades": lambda t: "; ".join(t["said"]) or "as it is",
+    }
+    return table_of(answer["front"], columns, ("price",))
+
+
+def _refused(answer: Answer) -> Items:
+    return bullets(f"{'; '.join(r['upgrades'])}: {r['why']}" for r in answer["refused"])
+
+
+def _response(row: Answer) -> str:
+    return f"ω = {words.number(row['omega'])}" + (f" ({row['expected']})" * bool(row["expected"]))
+
+
+def _worst(measured: Answer) -> tuple[float, float]:
+    return (measured["rate"] or 0.0, measured["low"])
+
+
+def _share(measured: Answer) -> str:
+    """A measured yield with its interval."""
+    if measured["rate"] is None:
+        return "not shown"
+    rate, low, high = (f"{100.0 * measured[key]:.4g}" for key in ("rate", "low", "high"))
+    failed = f", {measured['failed']} failed" if measured["failed"] else ""
+    return f"{rate} % ({low} to {high} %){failed}"
+
+
+def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
+    """The design rules. answer : ``rules.json`` (docs/contract.md). files : of it, for links."""
+    by: dict[str, list[Answer]] = {status: [] for status in (FAIL, PASS, NOT_RUN)}
+    for rule in answer["rules"]:
+        by[rule["status"]].append(rule)
+    board = answer["board"]
+    failing = [(r["id"], r["found"], r["limit"], r["do"]) for r in by[FAIL]]
+    holding = [(r["id"], r["found"], r["limit"]) for r in by[PASS]]
+    waiting = [(r["id"], r["found"]) for r in by[NOT_RUN]]
+    heads = ("rule", "found", "limit")
+    blocks: list[Block] = [
+        Lead(_rules_lead(answer["counts"])),
+        "No board was looked at." if board is None else f"The board that was looked at: {board}.",
+        _titled("What fails", table((*heads, "what to do"), failing)),
+        _titled("What was not run", table(("rule", "why"), waiting, names=1)),
+        _titled("What holds", table(heads, holding)),
+        FileLinks(tuple(files)),
+    ]
+    return PageSection("Design rules", blocks, "rules")
+
+
+def _rules_lead(counts: Mapping[str, int]) -> str:
+    fail = f"{words.plural(counts[FAIL], 'rule')} failed" if counts[FAIL] else "No rule failed"
+    rest = f", {counts[NOT_RUN]} not run" if counts[NOT_RUN] else ""
+    return f"{fail}; {counts[PASS]} passed{rest}."
+
+
+def trade_section(answer: Answer, files: Sequence[str]) -> PageSection:
+    """Time against error. answer : ``trade.json`` (docs/contract.md). files : of it, for links."""
+    blocks: list[Block] = [
+        "The cheapest rung and setting that answers each question, for all responses together. "
+        "What the error is measured against: board is the nominal circuit with "
+        f"{trade_files.truth_words(answer)} in ngspice at the finest step, equations the exact "
+        "flow of the model, ideal ngspice with ideal op-amps on the same boards.",
+        trade_files.cheapest_table(answer),
+        SmallPrint(trade_files.UNITS),
+        _boards(answer["boards"]),
+        FileLinks(tuple(files)),
+    ]
+    return PageSection("Time and error of the engines", blocks, "trade")
+
+
+def _boards(boards: Sequence[Answer]) -> PageSection | None:
+    if not boards:
+        return None
+    return PageSection("Yields of both engines", trade_files.board_blocks(boards))
+
+
+def _titled(title: str, block: Block) -> PageSection | None:
+    """A section of one block; None where there is none."""
+    return None if block is None else PageSection(title, [block])
+
+
+SECTIONS: Mapping[str, Callable[[Answer, Sequence[str]], PageSection]] = {
+    "cure": cure_section,
+    "rules": rules_section,
+    "trade": trade_section,
+}
+"""How the answer of a verb is shown, by the stage of the folder that holds it."""
