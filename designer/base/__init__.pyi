@@ -209,6 +209,9 @@ from .schema import (
     validated as validated,
     whole_number as whole_number,
 )
+from .script_policy import (
+    script_source as script_source,
+)
 from .seal import (
     BLANK as BLANK,
     sha256 as sha256,

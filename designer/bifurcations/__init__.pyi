@@ -94,6 +94,7 @@ from .titles import (
 from .windows import (
     NOT_LOCATED as NOT_LOCATED,
     BranchWindow as BranchWindow,
+    WindowEnd as WindowEnd,
     all_windows as all_windows,
     outside as outside,
     window as window,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
-from designer.cli.app import Output, Session, Source, option, verb
+from designer.base.defaults import SAMPLES, SEED
+from designer.cli.app import Output, Samples, Seed, Session, Source, option, verb
 
 
-@verb("Explore", "designer explore examples/paper.toml", json=False)
+@verb("Explore", "designer explore examples/paper.toml", "jobs", "overwrite", json=False)
 def explore(
     session: Session,
     model: Source,
@@ -23,12 +25,27 @@ def explore(
     browser: Annotated[
         bool, option("--browser/--no-browser", None, "Open the page in a browser.")
     ] = True,
-    **_: Any,
+    save: Annotated[
+        Path | None,
+        option("--save", "FILE", "Instead: write the page along ω as one file, for no server."),
+    ] = None,
+    samples: Samples = None,
+    seed: Seed = SEED,
+    **shared: Any,
 ) -> Output:
     """Move the model's parameters on a local page and see the response follow."""
     from designer.explorer import server
 
     server.explore(
-        model, port=port, host=host, token=token, browser=browser, progress=session.progress
+        model,
+        port=port,
+        host=host,
+        token=token,
+        browser=browser,
+        progress=session.progress,
+        save=save,
+        samples=SAMPLES if samples is None else samples,
+        seed=seed,
+        **shared,
     )
     return Output({})

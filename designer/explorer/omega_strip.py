@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -43,10 +43,11 @@ def strip(place: ModelPlace, start: np.ndarray) -> Iterator[Message]:
             for setting in subject.settings([{OMEGA: w} for w in omegas]):
                 steps.append(setting.steady(starts[side], COURSE))
                 starts[side] = next_start(steps[-1], subject.weights)
-            yield _piece(omegas, steps)
+            yield piece(omegas, steps)
 
 
-def _piece(omegas: list[float], steps: list[Steady]) -> Message:
+def piece(omegas: Sequence[float], steps: Sequence[Steady]) -> Message:
+    """Some steps of the diagram, as ``strip`` yields them."""
     counts = [len(step.minima) for step in steps]
     points = {
         "omega": np.repeat(omegas, counts),

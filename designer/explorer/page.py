@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cache
 
 from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from designer.base.script_policy import script_source
 from designer.explorer import plots
 from designer.explorer.controls import Control, controls
-from designer.explorer.place import first_place
+from designer.explorer.place import OMEGA, first_place
 from designer.explorer.response_view import shown_motions
+from designer.explorer.wire import Message
 from designer.model.model_file import ModelFile
 
 ASSETS = ("explore.css", "explore.js", "bokeh.js")
@@ -43,28 +46,61 @@ def _templates() -> Environment:
 def page(modelfile: ModelFile) -> str:
     """The page that ``server`` gives out; it loads ``ASSETS`` from beside itself."""
     css, *scripts = ("explore.css", "bokeh.js", "explore.js")
-    styles = f'<link rel="stylesheet" href="{css}">'
-    loads = "".join(f'<script src="{name}"></script>' for name in scripts)
-    return _render(modelfile, styles, loads, {})
+    return _render(
+        modelfile,
+        styles=Markup(f'<link rel="stylesheet" href="{css}">'),
+        scripts=Markup("".join(f'<script src="{name}"></script>' for name in scripts)),
+        shown=controls(modelfile),
+    )
 
 
-def _render(modelfile: ModelFile, styles: str, loads: str, more: dict[str, object]) -> str:
+def recorded_page(modelfile: ModelFile, recording: Message) -> str:
+    """The page as one file: it carries ``ASSETS``, and the answers that it shows.
+
+    recording : what ``saved_page.message_of`` makes. Only the slider of ω is there.
+    """
+    scripts = [asset("bokeh.js"), asset("explore.js")]
+    loads = "".join(f"<script>{script}</script>" for script in scripts)
+    return _render(
+        modelfile,
+        styles=Markup(f"<style>{asset('explore.css')}</style>"),
+        scripts=Markup(loads),
+        shown=tuple(each for each in controls(modelfile) if each.name == OMEGA),
+        recording=recording,
+        allowed=[script_source(script) for script in scripts],
+    )
+
+
+def _render(
+    modelfile: ModelFile,
+    *,
+    styles: Markup,
+    scripts: Markup,
+    shown: tuple[Control, ...],
+    recording: Message | None = None,
+    allowed: Sequence[str] = (),
+) -> str:
     each = controls(modelfile)
-    (omega,) = (control for control in each if control.name == "omega")
-    data = _script_text({"plots": plots.items(omega), **more})
+    (omega,) = (control for control in each if control.name == OMEGA)
+    motions = shown_motions(first_place(modelfile).model.second_order())
+    if recording is not None:
+        motions = motions[: len(recording["views"][0]["motions"])]
+    data = _script_text({"plots": plots.items(omega), "recording": recording})
     return (
         _templates()
         .get_template("explore.html.j2")
         .render(
             title=modelfile.title,
-            motions=[
-                each.label for each in shown_motions(first_place(modelfile).model.second_order())
-            ],
+            motions=[motion.label for motion in motions],
             stem=stem_for(modelfile),
             plots=plots.TITLES.items(),
-            groups=_groups(each),
-            styles=Markup(styles),
-            scripts=Markup(f'<script type="application/json" id="page">{data}</script>{loads}'),
+            groups=_groups(shown),
+            fixed=[control for control in each if control not in shown],
+            recorded=recording is not None,
+            allowed=allowed,
+            styles=styles,
+            data=Markup(data),
+            scripts=scripts,
         )
     )
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
@@ -26,10 +27,28 @@ from designer.model.relative_motion import (
 
 STEPS = 4_000_000
 """Steps that one picture may take, a fifth of ``step_budget.SETTLING``: under a second."""
-POINTS, FEWEST, MOST = 2048, 96, 768
-"""Points of a whole trace, and the fewest and the most in a drive period."""
-LONG, STROBES = 24, 160
-"""Drive periods that are drawn, and strobes, of a motion without a period."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely a motion is drawn."""
+
+    points: int = 2048
+    """Points of a whole trace."""
+    fewest: int = 96
+    """The fewest of them in a drive period."""
+    most: int = 768
+    """The most of them in a drive period."""
+    long: int = 24
+    """Drive periods that are drawn of a motion without a period."""
+    strobes: int = 160
+    """Strobes that are drawn of such a motion."""
+
+
+DETAIL = Detail()
+"""Of a page whose pictures come one by one."""
+Pack = Callable[[Mapping[str, ArrayLike]], Message]
+"""Makes columns of numbers ready for a page."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +111,6 @@ class ResponseView:
 
     def message(self) -> Message:
         """What the page draws and writes."""
-        t, x, v = self.impacts.T
         return {
             "kind": "view",
             "words": words_of(self.place),
@@ -101,12 +119,19 @@ class ResponseView:
             "period": self.orbit.n,
             "summary": summary(self.orbit),
             "facts": facts(self.orbit, self.place),
+            **self.picture(columns),
+        }
+
+    def picture(self, pack: Pack) -> Message:
+        """What of it depends on the displacement that is drawn."""
+        t, x, v = self.impacts.T
+        return {
             "axes": {"x": self.motion.motion.symbol, "v": self.motion.motion.rate},
             "stops": list(self.motion.motion.gaps),
             "data": {
-                "trace": columns({"t": self.time, "x": self.displacement, "v": self.velocity}),
-                "strobes": columns({"x": self.strobes[:, 0], "v": self.strobes[:, 1]}),
-                "impacts": columns({"t": t, "x": x, "v": v}),
+                "trace": pack({"t": self.time, "x": self.displacement, "v": self.velocity}),
+                "strobes": pack({"x": self.strobes[:, 0], "v": self.strobes[:, 1]}),
+                "impacts": pack({"t": t, "x": x, "v": v}),
             },
         }
 
@@ -122,18 +147,24 @@ def respond(place: ModelPlace) -> ResponseView:
     motions = shown_motions(system)
     if place.shown >= len(motions):
         raise InputError(None, SHOWN, place.shown, f"a whole number from 0 to {len(motions) - 1}")
+    return view_of(place, *reached(place), motions[place.shown])
+
+
+def reached(place: ModelPlace) -> tuple[Flow, Orbit]:
+    """The flow of a place, and the attractor that its start leads to."""
     flow = model_flow(place.model, place.omega)
-    orbit = settle(flow, place.state, budget=Budget(STEPS))
-    return view_of(place, flow, orbit, motions[place.shown])
+    return flow, settle(flow, place.state, budget=Budget(STEPS))
 
 
-def view_of(place: ModelPlace, flow: Flow, orbit: Orbit, shown: ShownMotion) -> ResponseView:
+def view_of(
+    place: ModelPlace, flow: Flow, orbit: Orbit, shown: ShownMotion, detail: Detail = DETAIL
+) -> ResponseView:
     """What is drawn of an orbit that is known."""
-    periods = max(orbit.n, 2) if orbit.n else LONG
-    points = int(np.clip(POINTS // periods, FEWEST, MOST))
+    periods = max(orbit.n, 2) if orbit.n else detail.long
+    points = int(np.clip(detail.points // periods, detail.fewest, detail.most))
     time, states = _trace(flow, orbit, periods, points)
     drawn = shown.motion.of(time * flow.drive.period, states, place.omega)
-    laps = orbit.n or STROBES
+    laps = orbit.n or detail.strobes
     at, where = _trace(flow, orbit, laps, 1)
     strobes = shown.motion.of(at * flow.drive.period, where, place.omega)[: max(laps, 1)]
     impacts = _impacts(flow, orbit, shown)

@@ -19,15 +19,18 @@ from tornado.ioloop import IOLoop
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from designer.base.defaults import SAMPLES, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
 from designer.explorer.questions import boards, kept, read_question, viewed
+from designer.explorer.saved_page import save_page
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
 from designer.jobs.design_source import source
+from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, read_model_file
 
 PORT = 8610
@@ -112,21 +115,33 @@ def explore(
     browser: bool = True,
     progress: Progress | None = None,
     ready: Callable[[str], None] = lambda _: None,
+    save: Path | str | None = None,
+    overwrite: bool = False,
+    samples: int = SAMPLES,
+    seed: int = SEED,
+    jobs: int | None = None,
 ) -> None:
     """The verb ``explore``: serve a page on which sliders move the model's parameters, until
-    Ctrl-C.
+    Ctrl-C; or write the page along ω as one file.
 
     model : a model file or a design folder. port : ``PORT``, or any free one where that is taken.
     host : the address to listen at. token : what a page from another machine has to know; without
     one it is drawn. browser : open the page. ready : is given the page's address. What a page asks
-    to be written goes below the folder that this was started in.
+    to be written goes below the folder that this was started in. save : the file to write;
+    nothing is served then, and the rest is of it: overwrite : whether it may replace another,
+    samples and seed : of the boards, jobs : workers at a time.
 
     Raises
     ------
-    InputError : a model that cannot be read, a port that is taken, an address that is none here.
+    InputError : a model that cannot be read, a port that is taken, an address that is none here,
+    a file that cannot be written.
     """
     progress = Progress() if progress is None else progress
     modelfile = _model(model)
+    if save is not None:
+        options = Options(seed, jobs, samples, overwrite)
+        save_page(modelfile, Path(save), options, progress)
+        return
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
     listening = _listening(host, port)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import re
 import zlib
@@ -17,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from designer.base.page import Page, PageSection
+from designer.base.script_policy import script_source
 from designer.report.design_page import FORMAT
 from designer.report.inline_svg import VARIABLES
 
@@ -30,10 +30,10 @@ def render_page(page: Page, plots: Mapping[str, str] | None = None, boards: str 
     names = ["tables.js", *["plots.js"] * bool(plots), *["boards.js"] * bool(boards)]
     scripts = [_script(name) for name in names]
     blocks: dict[str, Markup] = {}
-    allowed = [_digest(script) for script in scripts]
+    allowed = [script_source(script) for script in scripts]
     if plots:
         library = (Path(bokeh_settings.bokehjs_path()) / "js" / "bokeh.min.js").read_text("utf-8")
-        allowed.append(_digest(library))
+        allowed.append(script_source(library))
         blocks["bokeh"] = _packed(library)
         blocks["plots"] = _packed(json.dumps({"colours": VARIABLES, "items": plots}))
     if boards:
@@ -74,12 +74,6 @@ def _script(name: str) -> Markup:
     """A script of the package, as it stands in a page."""
     file = resources.files("designer.report") / "templates" / name
     return Markup(file.read_text("utf-8"))
-
-
-def _digest(script: str) -> str:
-    """What a page's policy allows a script by: nothing else runs, whatever a text holds."""
-    digest = hashlib.sha256(script.encode("utf-8")).digest()
-    return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
 def _unbroken(value: object) -> Markup:

@@ -6,10 +6,15 @@
     "#a06a00", "#7a5ccf"];
   const OPEN = "#bbbbbb";
   const STEPS = 2000;
+  const GAP = 65535; // what a column of 16-bit steps has for no number
   const BOARD = -2; // number of the question about parts
   const page = JSON.parse(document.getElementById("page").textContent);
+  const recording = page.recording;
   const by = (id) => document.getElementById(id);
   const root = document.documentElement;
+
+  const nearest = (omega) => recording.omegas.reduce((best, each, k, all) =>
+    Math.abs(Math.log(each / omega)) < Math.abs(Math.log(all[best] / omega)) ? k : best, 0);
 
   // --- controls -------------------------------------------------------------------------------
   const controls = [...document.querySelectorAll(".control")].map((box) => {
@@ -25,6 +30,11 @@
         : (value - c.low) / (c.high - c.low);
       return Math.round(STEPS * Math.min(1, Math.max(0, part)));
     };
+    if (recording) { // the slider stops at what is recorded, and nowhere else
+      c.slider.max = recording.omegas.length - 1;
+      c.at = (place) => recording.omegas[place];
+      c.place = nearest;
+    }
     c.show = (text) => {
       c.text = text;
       if (document.activeElement !== c.field) c.field.value = short(text);
@@ -62,10 +72,12 @@
     if (by("follow").checked) query.set("follow", "1");
     for (const pin of pins) query.append("pin", pin);
     const text = query.toString();
+    // A page from a file may change nothing of its address but what is behind the #.
+    if (recording) return `#${text}`;
     return text ? `?${text}` : location.pathname;
   };
   const readAddress = () => {
-    const query = new URLSearchParams(location.search);
+    const query = new URLSearchParams(recording ? location.hash.slice(1) : location.search);
     for (const c of controls) c.show(query.get(c.name) ?? c.own);
     by("shown").value = query.get("shown") ?? "0";
     by("follow").checked = query.has("follow");
@@ -105,7 +117,8 @@
       shownView = message;
       by("pin").disabled = !/^\d+-/.test(message.response);
       const typing = document.activeElement;
-      for (const [name, text] of Object.entries(message.words)) {
+      // A control that has moved on since keeps its newer value, which is asked next.
+      for (const [name, text] of wanted ? [] : Object.entries(message.words)) {
         const c = named[name];
         if (c && (c.asked || Number(c.text) !== Number(text))) {
           c.asked = false;
@@ -257,8 +270,10 @@
 
   // --- plots ----------------------------------------------------------------------------------
   const unpacked = (data) => Object.fromEntries(Object.entries(data).map(([name, packed]) => {
-    const bytes = Uint8Array.from(atob(packed.f4), (c) => c.charCodeAt(0));
-    return [name, new Float32Array(bytes.buffer)];
+    const bytes = Uint8Array.from(atob(packed.f4 ?? packed.u2), (c) => c.charCodeAt(0));
+    if (packed.u2 === undefined) return [name, new Float32Array(bytes.buffer)];
+    return [name, Float32Array.from(new Uint16Array(bytes.buffer),
+      (level) => (level === GAP ? NaN : packed.low + packed.step * level))];
   }));
   const joined = (a, b) => {
     const out = new Float32Array(a.length + b.length);
@@ -291,7 +306,7 @@
     const omega = Number(message.words.omega);
     fill("now", { at: [omega] });
     const range = views.strip.model.x_range;
-    range.setv({ start: omega * 0.84, end: omega * 1.16 });
+    if (!recording) range.setv({ start: omega * 0.84, end: omega * 1.16 });
     const label = (plot, place, text) => {
       const axis = plot[place][0];
       if (axis.axis_label !== text) axis.axis_label = text;
@@ -375,7 +390,31 @@
     line.connect = connect;
     return line;
   };
-  const line = socket();
+
+  // --- the recording, where there is no server --------------------------------------------------
+  const goTo = (omega) => { named.omega.show(String(omega)); want(); };
+  const listed = (name, rows) => document.querySelector(`#${name} ul`).replaceChildren(
+    ...rows.map((each) => row(`${each.summary}: ${each.words}`,
+      each.omega === null ? null : ["Show", () => goTo(each.omega)])));
+  const recorded = () => ({
+    open: true,
+    connect() {
+      root.dataset.line = "recorded";
+      listed("windows", recording.windows);
+      listed("yields", recording.yields.rows);
+      document.querySelector("#yields p").textContent = recording.yields.words;
+      heard({ kind: "strip", ...recording.strip, id: -1 });
+      settled();
+    },
+    ask({ id }) {
+      const answer = { id, first: true }, { text } = named.omega;
+      const view = recording.views[nearest(Number(text))];
+      setTimeout(() => heard(Number(text) > 0
+        ? { kind: "view", ...view, ...view.motions[Number(by("shown").value)], start: "", ...answer }
+        : { kind: "error", text: `omega: found ${text}; expected a number > 0`, ...answer }));
+    },
+  });
+  const line = recording ? recorded() : socket();
 
   by("shown").addEventListener("change", want);
   by("follow").addEventListener("change", want);

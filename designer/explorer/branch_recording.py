@@ -1,0 +1,190 @@
+"""The views along ω, computed beforehand: what a saved page moves through in place of a server."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from designer.base.progress import Progress
+from designer.base.threads import parallel
+from designer.bifurcations import window_ends
+from designer.bifurcations.continuation import End
+from designer.bifurcations.windows import BranchWindow, WindowEnd, window
+from designer.dynamics.orbit import Orbit
+from designer.explorer.controls import Control, controls
+from designer.explorer.omega_strip import COURSE, piece
+from designer.explorer.place import OMEGA, ModelPlace, first_place
+from designer.explorer.response_view import (
+    Detail,
+    facts,
+    reached,
+    shown_motions,
+    summary,
+    view_of,
+)
+from designer.explorer.wire import Message, short_columns
+from designer.model.model_file import ModelFile
+from designer.model.swept_model import ModelSubject
+
+DETAIL = Detail(points=512, fewest=40, most=256, long=12, strobes=120)
+"""Of a recorded picture: a page of a hundred of them can still be mailed."""
+MOTIONS = 4
+"""Displacements that are recorded, those in the clearances first."""
+ROOM, PER_VIEW, PER_MOTION = 1_250_000, 1_600, 5_000
+"""Bytes for all places, and about how many a place takes and each of its displacements."""
+MOST_PLACES = 150
+LEAST_STEPS = 2
+"""Places in a row that show a response whose window is located."""
+
+
+@dataclass(frozen=True)
+class RecordedWindow:
+    """The window of a response, and where in it the page goes."""
+
+    omega: float
+    """Drive frequency of a recorded place that shows the response."""
+    window: BranchWindow
+    """The window, its ends located by continuation."""
+
+    def message(self) -> Message:
+        """What the page writes of it."""
+        symmetry = "symmetric" if self.window.symmetric else "asymmetric"
+        return {
+            "omega": self.omega,
+            "summary": f"{self.window.response}, {symmetry}",
+            "words": f"{_end(self.window.low)} to {_end(self.window.high)}",
+        }
+
+
+def _end(end: WindowEnd) -> str:
+    why = "end of the slider" if end.why == End.LIMIT else end.why
+    return f"{end.value:.6g} ({why})"
+
+
+@dataclass(frozen=True)
+class BranchRecording:
+    """What each place along ω shows from rest."""
+
+    omegas: tuple[float, ...]
+    """Drive frequencies of the places, ascending, in the model's units."""
+    views: tuple[Message, ...]
+    """For each place the figures, and under "motions" a picture of each displacement."""
+    strip: Message
+    """The bifurcation diagram of all places."""
+    windows: tuple[RecordedWindow, ...]
+    """Windows of the responses, ascending."""
+
+
+def places(modelfile: ModelFile) -> tuple[float, ...]:
+    """Drive frequencies along the slider of ω that a page has room for, and those of the file."""
+    (control,) = (each for each in controls(modelfile) if each.name == OMEGA)
+    own = {r.omega for r in modelfile.responses if r.omega is not None}
+    own.add(first_place(modelfile).omega)
+    motions = min(len(shown_motions(modelfile.model.second_order())), MOTIONS)
+    count = min(MOST_PLACES, ROOM // (PER_VIEW + motions * PER_MOTION)) - len(own)
+    return tuple(sorted(own | set(_along(control, max(count, 2)))))
+
+
+def record(
+    modelfile: ModelFile, omegas: Sequence[float], jobs: int, progress: Progress
+) -> BranchRecording:
+    """The places from rest, in parallel, and the windows of what they show.
+
+    omegas : drive frequencies, ascending, in the model's units.
+    """
+    model = modelfile.model
+
+    def visit(omega: float) -> tuple[Orbit, Message]:
+        orbit, view = _visit(ModelPlace(model, omega))
+        step()
+        return orbit, view
+
+    step = progress.stage("what each drive frequency shows", len(omegas))
+    visits = list(parallel(visit, omegas, jobs))
+    orbits = [orbit for orbit, _ in visits]
+    settings = ModelSubject(model).settings([{OMEGA: omega} for omega in omegas])
+    drawn = [k for k, orbit in enumerate(orbits) if len(orbit.start)]
+    steps = [settings[k].steady(orbits[k].start, COURSE) for k in drawn]
+    return BranchRecording(
+        tuple(omegas),
+        tuple(view for _, view in visits),
+        piece([omegas[k] for k in drawn], steps),
+        tuple(_windows(modelfile, omegas, orbits, jobs, progress)),
+    )
+
+
+def _along(control: Control, count: int) -> list[float]:
+    """Values along a slider, with the digits that it shows."""
+    return [float(f"{w:.6g}") for w in np.geomspace(control.low, control.high, count)[1:-1]]
+
+
+def _visit(place: ModelPlace) -> tuple[Orbit, Message]:
+    flow, orbit = reached(place)
+    motions = shown_motions(place.model.second_order())[:MOTIONS]
+    views = [view_of(place, flow, orbit, motion, DETAIL) for motion in motions]
+    return orbit, {
+        "words": {OMEGA: repr(place.omega)},
+        "response": orbit.response,
+        "summary": summary(orbit),
+        "facts": facts(orbit, place),
+        "motions": [view.picture(short_columns) for view in views],
+    }
+
+
+def _windows(
+    modelfile: ModelFile,
+    omegas: Sequence[float],
+    orbits: Sequence[Orbit],
+    jobs: int,
+    progress: Progress,
+) -> list[RecordedWindow]:
+    middles = _middles(orbits)
+    step = progress.stage("windows of the responses", len(middles))
+    span = omegas[0], omegas[-1]
+
+    def locate(k: int) -> RecordedWindow | None:
+        found = _window(modelfile, omegas[k], orbits[k], span)
+        step()
+        return found
+
+    each = [found for found in parallel(locate, middles, jobs) if found is not None]
+    return _distinct(sorted(each, key=lambda found: found.window.low.value))
+
+
+def _middles(orbits: Sequence[Orbit]) -> list[int]:
+    """The middle place of each row of places that show one response of short period."""
+
+    def shown(k: int) -> tuple[str, bool | None]:
+        return orbits[k].response, orbits[k].symmetric
+
+    rows = [list(row) for _, row in groupby(range(len(orbits)), shown)]
+    rows = [row for row in rows if 0 < orbits[row[0]].n <= window_ends.LONGEST]
+    return [row[len(row) // 2] for row in rows if len(row) >= LEAST_STEPS]
+
+
+def _window(
+    modelfile: ModelFile, omega: float, orbit: Orbit, span: tuple[float, float]
+) -> RecordedWindow | None:
+    """None where continuation does not follow the orbit."""
+    family = ModelSubject(modelfile.model, omega).family(OMEGA)
+    try:
+        return RecordedWindow(omega, window(family, orbit, omega, *span))
+    except ArithmeticError:
+        return None
+
+
+def _distinct(found: Sequence[RecordedWindow]) -> list[RecordedWindow]:
+    """Of windows that were located from two of their places, the first."""
+    out: list[RecordedWindow] = []
+    for each in found:
+        low, response = each.window.low.value, each.window.response
+        if not any(
+            other.window.response == response
+            and abs(other.window.low.value - low) <= window_ends.SAME * abs(low)
+            for other in out
+        ):
+            out.append(each)
+    return out

@@ -1,0 +1,159 @@
+"""The page as one file: what it carries, and that it works from a disc without a server."""
+
+from __future__ import annotations
+
+import base64
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, sync_playwright
+
+from designer import InputError, explore
+from designer.base.progress import Progress
+from designer.explorer import branch_recording, saved_page
+from designer.explorer.branch_recording import BranchRecording, places, record
+from designer.explorer.place import ModelPlace
+from designer.explorer.recorded_yields import yields
+from designer.explorer.response_view import respond
+from designer.explorer.wire import short_column
+from designer.jobs import Options
+from designer.model.model_file import ModelFile, parse_model_file
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+
+OMEGAS = (0.82, 0.85, 0.88, 1.55, 1.6)
+TITLE = "</script><script>document.title = 'hurt'</script>"
+WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
+
+
+def unpacked(column: dict[str, object]) -> np.ndarray:
+    levels = np.frombuffer(base64.b64decode(str(column["u2"])), dtype="<u2").astype(float)
+    numbers = float(column["low"]) + float(column["step"]) * levels  # type: ignore[arg-type]
+    return np.where(levels == 65_535, np.nan, numbers)
+
+
+@pytest.fixture(scope="module")
+def modelfile() -> ModelFile:
+    text = f'format = 1\ntitle = "{TITLE}"\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}'
+    return parse_model_file(text, Path("small.toml"))
+
+
+@pytest.fixture(scope="module")
+def branch(modelfile: ModelFile) -> BranchRecording:
+    return record(modelfile, OMEGAS, 1, Progress())
+
+
+def test_a_recorded_view_is_that_of_the_live_page(
+    modelfile: ModelFile, branch: BranchRecording
+) -> None:
+    for omega, view in zip(OMEGAS, branch.views, strict=True):
+        live = respond(ModelPlace(modelfile.model, omega))
+        assert view["summary"] == live.message()["summary"]
+        assert view["facts"] == live.message()["facts"]
+        assert len(view["motions"]) == 2
+        x = unpacked(view["motions"][0]["data"]["trace"]["x"])
+        reach = live.displacement.max() - live.displacement.min()
+        assert x.min() == pytest.approx(live.displacement.min(), abs=2e-3 * reach)
+        assert x.max() == pytest.approx(live.displacement.max(), abs=2e-3 * reach)
+
+
+def test_windows_hold_the_places_that_show_them(
+    modelfile: ModelFile, branch: BranchRecording
+) -> None:
+    """The response is there just inside a located end, and another one just outside."""
+    assert [each.window.response for each in branch.windows] == ["1-2-2", "1-1-1"]
+    for each in branch.windows:
+        assert each.omega in OMEGAS
+        assert each.window.low.value <= each.omega <= each.window.high.value
+    first, words = branch.windows[0].window, branch.windows[0].message()["words"]
+    assert words.startswith("0.82 (end of the slider) to 0.92006 (fold)")
+    start = tuple(first.high.orbit.start)
+    for omega, shown in ((first.high.value - 1e-4, True), (first.high.value + 1e-4, False)):
+        view = respond(ModelPlace(modelfile.model, omega, start))
+        assert (view.orbit.response == "1-2-2") == shown
+
+
+def test_every_place_of_the_file_is_among_those_of_the_slider(modelfile: ModelFile) -> None:
+    chosen = places(modelfile)
+    assert 0.85 in chosen
+    assert list(chosen) == sorted(set(chosen))
+    assert 60 < len(chosen) <= branch_recording.MOST_PLACES
+    steps = np.diff(np.log(chosen))
+    assert steps.max() <= 2.1 * math.log(25.0) / len(chosen)
+
+
+def test_half_the_size_keeps_the_picture() -> None:
+    numbers = [-2.0, np.nan, 1.0, 0.25]
+    assert unpacked(short_column(numbers)) == pytest.approx(numbers, abs=1e-4, nan_ok=True)
+    assert unpacked(short_column([3.0, 3.0])).tolist() == [3.0, 3.0]
+    assert len(unpacked(short_column([]))) == 0
+
+
+def test_a_file_without_responses_says_why_it_has_no_yields(modelfile: ModelFile) -> None:
+    bare = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}", None)
+    assert yields(bare, Options(samples=1), Progress()).words == "the model file wants no response"
+
+
+@pytest.mark.parametrize("name", ["there.html", "nowhere/page.html"])
+def test_a_file_is_refused_before_the_work(modelfile: ModelFile, tmp_path: Path, name: str) -> None:
+    (tmp_path / "there.html").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="--save"):
+        explore(modelfile, save=tmp_path / name)
+    assert (tmp_path / "there.html").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.fixture(scope="module")
+def saved(
+    modelfile: ModelFile, branch: BranchRecording, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """The file that ``explore`` writes, with what is recorded above in it."""
+    path = tmp_path_factory.mktemp("saved") / "page.html"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(saved_page, "record", lambda *_: branch)
+        explore(modelfile, save=path, samples=2, jobs=1)
+    return path
+
+
+def opened(page: Page, path: Path) -> list[str]:
+    """What the page asked for or complained of since it was opened."""
+    heard: list[str] = []
+    page.on("pageerror", lambda error: heard.append(str(error)))
+    page.on("console", lambda m: heard.append(m.text) if m.type in ("error", "warning") else None)
+    page.on("request", lambda request: heard.append(request.url))
+    page.goto(path.as_uri())
+    page.wait_for_selector("html[data-drawn]", timeout=60_000.0)
+    return [each for each in heard if each != path.as_uri() and not each.startswith("data:")]
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [390, 1300])
+def test_the_file_works_without_a_server(saved: Path, width: int) -> None:
+    assert saved.stat().st_size < 3_000_000
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
+        )
+        page = chromium.new_page(viewport={"width": width, "height": 844})
+        assert opened(page, saved) == []
+        assert page.inner_text("h1") == TITLE
+        assert page.inner_text("#summary").startswith("1-2-2")
+        assert page.locator("#windows li").count() == 2
+        assert "keep it" in page.inner_text("#yields li")
+        page.focus("[data-name=omega] .slider")
+        for _ in range(2):
+            page.keyboard.press("ArrowRight")
+        page.wait_for_function(
+            "() => document.getElementById('summary').textContent.startsWith('1-1-1')"
+        )
+        assert page.input_value("[data-name=omega] .number") == "1.55"
+        assert page.url.endswith("#omega=1.55")
+        page.click("#windows li:first-child button")
+        page.wait_for_function(
+            "() => document.getElementById('summary').textContent.startsWith('1-2-2')"
+        )
+        results = Axe().run(page)
+        assert results.violations_count == 0, results.generate_report()
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+        chromium.close()
