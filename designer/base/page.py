@@ -225,7 +225,8 @@ def table_of(
 
 def markdown(page: Page) -> str:
     """The page as Markdown. A section of pictures alone is left out."""
-    return f"# {plain(page.title)}\n\n" + paragraphs([*page.head, *page.sections])
+    title = f"# {plain(page.title)}"
+    return "\n\n".join([title, *_texts([*page.head, *page.sections], 2)]) + "\n"
 
 
 def paragraphs(blocks: Sequence[Block]) -> str:

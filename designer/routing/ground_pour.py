@@ -6,15 +6,17 @@ thermal relief: a gap all round, and bridges that a solder joint does not lose i
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from scipy.cluster.hierarchy import DisjointSet
 from shapely import Geometry
 
 from designer.base.arrays import Array
-from designer.routing.board_copper import BoardCopper, Copper, grown
+from designer.routing.board_copper import BoardCopper, Copper, Point, grown
 from designer.routing.routing_grid import EDGE
 
 THINNEST = 0.25
@@ -40,8 +42,13 @@ class Pour:
     """Name of the layer."""
     border: Array
     """(n, 2) corners of its border [mm]."""
-    fills: tuple[Array, ...]
-    """Each piece of it as corners (n, 2) [mm]: holes are joined to the outside by a cut."""
+    pieces: tuple[Geometry, ...]
+    """What is filled, with the thermal bridges [mm]."""
+
+    @property
+    def fills(self) -> tuple[Array, ...]:
+        """Each piece as corners (n, 2) [mm]: holes are joined to the outside by a cut."""
+        return tuple(cut_open(piece) for piece in self.pieces)
 
 
 def ground_pour(
@@ -73,11 +80,28 @@ def ground_pour(
         parts, lone = _parts(filled, free, own)
     outline = max(shapely.get_parts(border), key=lambda part: float(part.area))
     parts.sort(key=lambda part: shapely.bounds(part).tolist())
-    return Pour(
-        layer,
-        shapely.get_coordinates(outline.exterior)[:-1],
-        tuple(cut_open(part) for part in parts),
-    )
+    return Pour(layer, shapely.get_coordinates(outline.exterior)[:-1], tuple(parts))
+
+
+def floating_vias(copper: BoardCopper, ground: int, pours: Sequence[Pour]) -> set[Point]:
+    """Places [mm, to 1 µm] of the vias that join pieces of the pours to each other, to no pad."""
+    own = [piece for piece in copper.pieces if piece.net == ground]
+    tree = shapely.STRtree([piece.shape for piece in own])
+    joined = DisjointSet(range(len(own)))
+    for layer in copper.names:
+        shapes = [shape for pour in pours if pour.layer == layer for shape in pour.pieces]
+        shapes += [piece.shape for piece in own if piece.on(layer)]
+        for shape in shapes:
+            first, *others = [k for k in tree.query(shape, "intersects") if own[k].on(layer)]
+            for other in others:
+                joined.merge(first, other)
+    floating = [group for group in joined.subsets() if not any(own[k].relief for k in group)]
+    return {
+        (round(middle.x, 3), round(middle.y, 3))
+        for k in itertools.chain.from_iterable(floating)
+        if own[k].pad
+        for middle in [shapely.centroid(own[k].shape)]
+    }
 
 
 def _parts(

@@ -15,6 +15,7 @@ from designer.circuit.netlist import Circuit
 from designer.routing.board_copper import (
     ALL,
     LAYERS,
+    Point,
     read_copper,
     track_item,
     via_item,
@@ -25,6 +26,7 @@ from designer.routing.ground_pour import (
     RELIEF,
     THINNEST,
     Pour,
+    floating_vias,
     ground_pour,
     pour_corners,
 )
@@ -74,8 +76,11 @@ def route_board(text: str, circuit: Circuit, rules: Sequence[CustomRule]) -> Rou
         own = list(_items(routes.grid, runs, net, name, by_name[of[net]]))
         items += own
         lengths[circuit_net(name)] = sum(_length(item) for item in own)
-    routed = Expression((*board.items, *items), board.source)
-    poured = Expression((*routed.items, *_pours(routed, kinds, of)), board.source)
+    routed, pours, floating = _poured(board, items, kinds, of)
+    if floating:
+        items = [item for item in items if item.name != "via" or _place(item) not in floating]
+        routed, pours, _ = _poured(board, items, kinds, of)
+    poured = Expression((*routed.items, *pours), board.source)
     return RoutedBoard(
         expression_text(poured),
         {circuit_net(copper.nets[net]): count for net, count in sorted(routes.open.items())},
@@ -111,21 +116,37 @@ def _straight(grid: RoutingGrid, run: Nodes) -> Iterator[list[int]]:
         yield piece
 
 
-def _pours(
-    board: Expression, kinds: Sequence[NetKind], of: Mapping[int, str]
-) -> Iterator[Expression]:
-    """A pour of ground for each side that has none, and for each inner layer without a zone."""
-    copper = read_copper(board)
+def _place(via: Expression) -> Point:
+    at = via.get("at")
+    return round(at.number(0), 3), round(at.number(1), 3)
+
+
+def _poured(
+    board: Expression, items: Sequence[Expression], kinds: Sequence[NetKind], of: Mapping[int, str]
+) -> tuple[Expression, list[Expression], set[Point]]:
+    """A board with what was laid on it; a pour of ground for each side that has none, and for each
+    inner layer without a zone; the places of vias that float with the pours."""
+    routed = Expression((*board.items, *items), board.source)
+    copper = read_copper(routed)
+    zones, floating = list[Expression](), set[Point]()
     clearance = {kind.name: kind.clearance for kind in kinds}
     clearances = {net: clearance[name] for net, name in of.items()}
     least = clearance[GROUND_KIND]
     for ground in (net for net, name in of.items() if name == GROUND_KIND):
-        zones = [z for z in board.all("zone") if z.get("net").text() == str(ground)]
-        there = {name for zone in zones for name in zone_layers(zone)}
+        there = {
+            name
+            for zone in board.all("zone")
+            if zone.get("net").text() == str(ground)
+            for name in zone_layers(zone)
+        }
         outer = [name for name in LAYERS if not there & {name, "F&B.Cu", ALL}]
-        for layer in (*outer, *copper.planes):
-            pour = ground_pour(copper, ground, layer, clearances, least)
-            yield _zone(pour, ground, copper.nets[ground], least)
+        pours = [
+            ground_pour(copper, ground, layer, clearances, least)
+            for layer in (*outer, *copper.planes)
+        ]
+        floating |= floating_vias(copper, ground, pours)
+        zones += [_zone(pour, ground, copper.nets[ground], least) for pour in pours]
+    return routed, zones, floating
 
 
 def _ours(item: object) -> bool:

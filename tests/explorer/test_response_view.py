@@ -56,8 +56,8 @@ def test_a_mass_on_a_moving_base_is_shown_as_it_moves_and_in_its_clearance() -> 
     moved = gap.displacement + base * np.sin(2.0 * np.pi * gap.time)
     assert mass.displacement == pytest.approx(moved, abs=1e-9)
     assert [each.label for each in shown_motions(modelfile.model.second_order())] == [
-        "x₁ − y (mass)",
-        "x₁ (mass)",
+        "x₁ − y (oscillator)",
+        "x₁ (oscillator)",
     ]
 
 
@@ -89,8 +89,10 @@ def test_the_strip_follows_the_branch_that_is_shown() -> None:
     for omega in sorted(set(data["omega"].tolist()))[::20]:
         here = data["omega"] == np.float32(omega)
         orbit = settle(model_flow(place.model, float(omega)), view.orbit.start)
-        assert set(data["period"][here]) == {orbit.n}
-        assert data["x"][here].min() == pytest.approx(orbit.extremes[0, 0], abs=1e-4)
+        quick = orbit.periods <= omega_strip.COURSE.settle
+        assert set(data["period"][here]) <= ({orbit.n} if quick else {orbit.n, omega_strip.OPEN})
+        if orbit.n:
+            assert data["x"][here].min() == pytest.approx(orbit.extremes[0, 0], abs=1e-4)
 
 
 def test_multipliers_are_written_once_for_each_pair() -> None:

@@ -39,7 +39,7 @@ def folder(path: Path, **stages: dict[str, Any]) -> Path:
 def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every verb on a folder ends where its work would begin."""
 
-    def study(modelfile: Any, out: Path, options: Options, *_: Any) -> Any:
+    def study(modelfile: Any, out: Path, options: Options, *_: Any, **__: Any) -> Any:
         raise _Asked(options)
 
     def cured(path: Path, **options: Any) -> Any:

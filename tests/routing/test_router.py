@@ -207,6 +207,38 @@ def test_a_pad_of_ground_has_thermal_bridges_and_none_where_two_find_no_room() -
     assert bridges(route_board(small(pad + fence), circuit, rules).text) == 0  # an island
 
 
+def test_no_via_joins_islands_of_ground_to_each_other_alone() -> None:
+    """Inside a fence on both sides no pad of ground is met: KiCad calls such a pour isolated."""
+    pad = '(net 3 "GND")' + "".join(
+        f'(footprint "g" (layer "F.Cu") (at {x} 2) (pad "1" thru_hole rect (at 0 0) (size 1 1) '
+        '(drill 0.5) (layers "*.Cu") (net 3 "GND")))'
+        for x in (8, 12)
+    )
+    corners = ((6, 6), (9, 6), (9, 9), (6, 9), (6, 6))
+    fence = "".join(
+        f'(segment (start {a} {b}) (end {x} {y}) (width 0.3) (layer "{side}") (net 2))'
+        for (a, b), (x, y) in itertools.pairwise(corners)
+        for side in ("F.Cu", "B.Cu")
+    )
+    circuit = case(NAME).circuit
+    rules = board_rules(circuit)
+    fenced = shapely.box(6, 6, 9, 9)
+
+    def inside(board: str) -> tuple[int, float]:
+        source = read(board)
+        places = [(v.get("at").number(0), v.get("at").number(1)) for v in source.all("via")]
+        fills = [f for zone in source.all("zone") for f in zone.all("filled_polygon")]
+        rings = [[(p.number(0), p.number(1)) for p in f.get("pts").all("xy")] for f in fills]
+        poured = shapely.union_all([shapely.Polygon(ring).buffer(0.0) for ring in rings])
+        vias = sum(bool(shapely.contains_xy(fenced, *place)) for place in places)
+        return vias, float(shapely.intersection(poured, fenced).area)
+
+    vias, area = inside(route_board(small(pad), circuit, rules).text)
+    assert vias == 1
+    assert area > 1.0
+    assert inside(route_board(small(pad + fence), circuit, rules).text) == (0, 0.0)
+
+
 def test_on_four_layers_every_pad_of_ground_reaches_the_planes() -> None:
     """By tracks of its own side to a via, or through the board; no track leads from pad to pad."""
     circuit = case(NAME).circuit

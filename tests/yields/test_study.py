@@ -319,7 +319,7 @@ def test_only_runs_that_are_not_on_disk_are_announced(
         tmp_path, NGSPICE, CrossCheck, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
     )
 
-    def checks_run(_plan: Any, blocks: Any, *_: Any) -> Iterator[tuple[int, CrossCheck]]:
+    def checks_run(_plan: Any, blocks: Any, *_: Any, **__: Any) -> Iterator[tuple[int, CrossCheck]]:
         for k, a in enumerate(ask for block in blocks for ask in block):
             yield k, CrossCheck(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False)
 
