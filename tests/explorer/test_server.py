@@ -45,6 +45,7 @@ def visiting(visit: Visit, tmp_path: Path, token: str = "", host: str = "127.0.0
                 WIRES.pop().close()
             server.stop()
             await server.close_all_connections()
+            await asyncio.sleep(0.05)  # a client's socket closes when it sees the server's end
             explorer.close()
 
     result = asyncio.run(both())
