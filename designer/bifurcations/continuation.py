@@ -337,8 +337,11 @@ def apart(curve: Curve, point: BranchPoint) -> Array:
 
 
 def parted(curve: Curve, point: BranchPoint) -> bool:
-    """Whether an orbit and its partner are two."""
-    return not curve.symmetric and bool(np.abs(apart(curve, point)).max() > SAME)
+    """Whether an orbit and its partner are two, or it has none: odd n without a mirror."""
+    if curve.symmetric:
+        return False
+    alone = curve.n % 2 == 1 and curve.family.flow(point.value).system.mirror is None
+    return alone or bool(np.abs(apart(curve, point)).max() > SAME)
 
 
 def joined(curve: Curve, a: BranchPoint, b: BranchPoint) -> bool:
