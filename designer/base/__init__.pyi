@@ -140,6 +140,7 @@ from .netlist_guard import (
 from .page import (
     Block as Block,
     Columns as Columns,
+    FileLinks as FileLinks,
     Gallery as Gallery,
     Items as Items,
     Lead as Lead,

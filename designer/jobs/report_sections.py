@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from designer.base.design_folder import REPORTS, Folder, file_hash
+from designer.base.design_folder import REPORTS, Folder
 from designer.base.keyed_store import Note, quiet
-from designer.base.manifest import StageName
+from designer.base.manifest import StageName, file_hash
 from designer.base.page import PageSection
 
 SHOWN: Mapping[StageName, Sequence[str]] = {
