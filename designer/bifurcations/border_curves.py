@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+import shapely
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
+from designer.bifurcations.windows import WindowEnd, window
+from designer.dynamics.orbit import Orbit
 
 BLOCKS = 8
 """Blocks that the curves are kept in: point number k belongs to block k modulo this."""
 SAME = 1e-6
 """In widths of the window: a point this near to a curve of its kind lies on it."""
+BESIDE = 1e-3
+"""The same of the straight way between two points of a curve."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,12 @@ class BorderCurve:
                 {"kind": name, "values": [a, b]} for name, a, b in self.codimension_two
             ],
         }
+
+    @property
+    def turned(self) -> BorderCurve:
+        """The same with its parameters exchanged."""
+        met = tuple((name, b, a) for name, a, b in self.codimension_two)
+        return replace(self, points=self.points[:, ::-1], codimension_two=met)
 
 
 class CurveStore(Protocol):
@@ -126,6 +137,58 @@ def run(
         if not any(_is_same(curve, other, plan.window.widths) for other in out):
             out.append(curve)
     return sorted(out, key=lambda c: (c.kind, c.response, float(c.points[0, 0])))
+
+
+def around(
+    plan: CurvePlan, orbit: Orbit, value: float, progress: Callable[[], None] = lambda: None
+) -> Iterator[BorderCurve]:
+    """The curves through both ends of the window of one stable orbit, over the first parameter and
+    over the second; each once, and each as soon as it is followed.
+
+    orbit : of period n, where the first parameter has this value and the second ``plan.at``.
+    progress : called once a point of a branch or of a curve.
+    """
+    turned = CurvePlan(
+        plan.subject,
+        plan.second,
+        plan.first,
+        value,
+        PlaneWindow(plan.window.second, plan.window.first),
+    )
+    found: list[BorderCurve] = []
+    for each, other in ((plan, turned), (turned, plan)):
+        plane = each.subject.plane(each.first, each.second)
+        for end in _ends(each, orbit, other.at, progress):
+            place = (end.value, each.at) if each is plan else (each.at, end.value)
+            if end.point is None or any(_passes(c, end, place, plan.window) for c in found):
+                continue
+            curve = continued(plane, end.point, each.at, each.window, progress=progress)
+            if curve is not None:
+                border = BorderCurve.of(curve)
+                found.append(border if each is plan else border.turned)
+                yield found[-1]
+
+
+def _ends(
+    plan: CurvePlan, orbit: Orbit, value: float, progress: Callable[[], None]
+) -> tuple[WindowEnd, ...]:
+    """Both ends of the window over the first parameter; () where the orbit cannot be followed."""
+    family = plan.subject.family(plan.first)
+    try:
+        stable = window(family, orbit, value, *plan.window.first, progress=progress)
+    except ArithmeticError:
+        return ()
+    return stable.low, stable.high
+
+
+def _passes(
+    curve: BorderCurve, end: WindowEnd, place: tuple[float, float], within: PlaneWindow
+) -> bool:
+    """Whether a curve of the kind of a window's end passes it."""
+    if curve.kind != end.why or len(curve.points) < 2:
+        return False
+    line = shapely.LineString(curve.points / within.widths)
+    return bool(line.distance(shapely.Point(np.array(place) / within.widths)) < BESIDE)
 
 
 def _is_same(one: BorderCurve, other: BorderCurve, widths: Array) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from designer.bifurcations.subject import Subject
 from designer.dynamics.counts import Pairs
 from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Course, Steady
+from designer.dynamics.step_budget import Budget
 
 COURSE = Course(settle=134, keep=16, patience=1000)
 """150 periods a point, and up to a thousand more where they leave the motion undecided."""
@@ -117,11 +118,7 @@ def run(
     def row(i: int) -> list[MapCell]:
         cells = None if store is None else store.read(i)
         if cells is None:
-            y = float(plan.ys[i])
-            settings = plan.subject.settings([{plan.x: float(x), plan.y: y} for x in plan.xs])
-            cells = [
-                cell_of(i, j, s.steady(plan.start, plan.course)) for j, s in enumerate(settings)
-            ]
+            cells = list(cells_at(plan, [(i, j) for j in range(len(plan.xs))]))
             if store is not None:
                 store.write(i, cells)
         progress()
@@ -129,6 +126,17 @@ def run(
 
     rows = parallel(row, range(len(plan.ys)), jobs)
     return ParameterMap(plan, tuple(cell for cells in rows for cell in cells))
+
+
+def cells_at(
+    plan: MapPlan, places: Sequence[tuple[int, int]], steps: float | None = None
+) -> Iterator[MapCell]:
+    """The cells at some (row, column) of the grid, one after the other. steps : of the budget of
+    each (``DrivenSystem.steady``)."""
+    changes = [{plan.x: float(plan.xs[j]), plan.y: float(plan.ys[i])} for i, j in places]
+    for (i, j), setting in zip(places, plan.subject.settings(changes), strict=True):
+        budget = None if steps is None else Budget(steps)
+        yield cell_of(i, j, setting.steady(plan.start, plan.course, budget))
 
 
 def cell_of(i: int, j: int, steady: Steady) -> MapCell:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from designer.bifurcations.branch_survey import Survey
@@ -129,8 +129,18 @@ def _on_junction(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
     return end
 
 
-def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> BranchWindow:
+def window(
+    family: Family,
+    orbit: Orbit,
+    value: float,
+    low: float,
+    high: float,
+    *,
+    progress: Callable[[], None] = lambda: None,
+) -> BranchWindow:
     """The window of a stable orbit that is known at a value, within [low, high].
+
+    progress : called once a point of the branch.
 
     Raises
     ------
@@ -140,6 +150,7 @@ def window(family: Family, orbit: Orbit, value: float, low: float, high: float) 
     counts = origin.points[0].counts
 
     def over(p: BranchPoint) -> bool:
+        progress()
         return not p.stable or p.counts != counts
 
     branch = trace(origin, low, high, until=over)

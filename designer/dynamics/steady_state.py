@@ -10,6 +10,7 @@ fit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from designer.dynamics.lyapunov_exponent import (
     until,
 )
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, Orbit, OrbitStatus
+from designer.dynamics.step_budget import Budget
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
@@ -122,8 +124,9 @@ class DrivenSystem:
     stops: Stops = UPPER
     """The stops whose impacts are noted; others than ``UPPER`` need the flow."""
 
-    def steady(self, x: Array, course: Course) -> Steady:
-        """What the start x (states,) leads to.
+    def steady(self, x: Array, course: Course, budget: Budget | None = None) -> Steady:
+        """What the start x (states,) leads to. budget : steps for a motion that the compiled engine
+        does not name; those of ``settle`` unless given.
 
         Raises
         ------
@@ -132,12 +135,17 @@ class DrivenSystem:
         if interrupt.is_set():
             raise KeyboardInterrupt
         if self.tables is None or self.stops != UPPER:
-            return by_flow(self.flow(), x, course, self.stops)
-        return _by_kernel(self.flow, self.tables, self.period, x, course)
+            flow = self.flow()
+            with nullcontext() if budget is None else flow.within(budget):
+                return by_flow(flow, x, course, self.stops, budget)
+        return _by_kernel(self.flow, self.tables, self.period, x, course, budget)
 
 
-def by_flow(flow: Flow, x: Array, course: Course, stops: Stops = UPPER) -> Steady:
-    """By the general flow, period after period. stops : whose impacts are noted, one at least."""
+def by_flow(
+    flow: Flow, x: Array, course: Course, stops: Stops = UPPER, budget: Budget | None = None
+) -> Steady:
+    """By the general flow, period after period. stops : whose impacts are noted, one at least.
+    budget : steps for settling."""
     growth, state = None, np.array(x, dtype=float)
     free = course.settle - course.tangents
     spent = course.settle + course.keep
@@ -165,7 +173,7 @@ def by_flow(flow: Flow, x: Array, course: Course, stops: Stops = UPPER) -> Stead
     if growth and chaos and course.tangents >= kernel.SPAN and not _repeats(flow, strobes):
         orbit = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
     else:
-        orbit = settle(flow, end)
+        orbit = settle(flow, end, budget=budget)
         if orbit.status is OrbitStatus.APERIODIC:
             orbit = _measured(flow, orbit)
         elif growth is not None and not np.isfinite(orbit.lyapunov):
@@ -232,7 +240,12 @@ def _nothing(status: OrbitStatus, x: Array, spent: int) -> Steady:
 
 
 def _by_kernel(
-    flow: Callable[[], Flow], tables: ModalTables, period: float, x: Array, course: Course
+    flow: Callable[[], Flow],
+    tables: ModalTables,
+    period: float,
+    x: Array,
+    course: Course,
+    budget: Budget | None,
 ) -> Steady:
     model = kernel.DrivenModel(tables, period, MAX_EVENTS)
     strobes, cursor = np.empty((course.keep + 1, 4)), np.zeros(2, dtype=np.int64)
@@ -268,7 +281,7 @@ def _by_kernel(
     found = watch.minima, watch.velocities[:entries].copy()
     spent += int(counted[kernel_orbit.SPENT])
     if code == kernel.NOT_SETTLED and course.patience:  # a long period, or none, but settled
-        return _of_orbit(settle(flow(), orbit), strobes[-1], found, spent)
+        return _of_orbit(settle(flow(), orbit, budget=budget), strobes[-1], found, spent)
     exponent = float(facts[2]) / period, float("nan")
     if code == kernel.APERIODIC:
         plain = growth > CHAOS and course.tangents >= kernel.SPAN  # else it was later that it was

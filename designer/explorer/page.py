@@ -85,7 +85,8 @@ def _render(
     motions = shown_motions(first_place(modelfile).model.second_order())
     if recording is not None:
         motions = motions[: len(recording["views"][0]["motions"])]
-    data = _script_text({"plots": plots.items(omega), "recording": recording})
+    items = plots.items(omega) | (plots.map_item() if recording is None else {})
+    data = _script_text({"plots": items, "recording": recording})
     return (
         _templates()
         .get_template("explore.html.j2")
@@ -95,6 +96,8 @@ def _render(
             stem=stem_for(modelfile),
             plots=plots.TITLES.items(),
             groups=_groups(shown),
+            axes=each,
+            upward=next(control.name for control in each if control.name != OMEGA),
             fixed=[control for control in each if control not in shown],
             recorded=recording is not None,
             allowed=allowed,

@@ -65,7 +65,7 @@ def read_place(modelfile: ModelFile, words: Mapping[str, object]) -> ModelPlace:
             continue
         if name not in subject.parameters:
             raise InputError(None, "address", str(name), one_of(str(name), subject.parameters))
-        changes[name] = _number(modelfile, name, value)
+        changes[name] = number_of(modelfile, name, name, value)
     omega = changes.pop(OMEGA, first.omega)
     for name, value in changes.items():
         subject.check(name, name, value)
@@ -91,17 +91,23 @@ def start_text(start: tuple[float, ...]) -> str:
     return ",".join(repr(float(x)) for x in start)
 
 
+def number_of(modelfile: ModelFile, field: str, name: str, value: object) -> float:
+    """A parameter's value that a page gives, in the model's units.
+
+    Raises
+    ------
+    InputError : no finite number. field : what it then names.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise InputError(None, field, repr(value), "a number")
+    number = Reader(modelfile.model, modelfile.si).value(field, name, value)
+    if not math.isfinite(number):
+        raise InputError(None, field, value, "a finite number")
+    return number
+
+
 def _own(model: MechanicalModel) -> float:
     return model.second_order().own_frequency
-
-
-def _number(modelfile: ModelFile, name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise InputError(None, name, repr(value), "a number")
-    number = Reader(modelfile.model, modelfile.si).value(name, name, value)
-    if not math.isfinite(number):
-        raise InputError(None, name, value, "a finite number")
-    return number
 
 
 def _start(text: object, size: int) -> tuple[float, ...]:

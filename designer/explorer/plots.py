@@ -13,6 +13,8 @@ from designer.explorer.controls import Control
 
 PLOTS = ("portrait", "trace", "strip")
 """Names of the plots, and of the elements of the page that take them."""
+MAP = "map"
+"""The same of the map, which only a page with a server has."""
 TITLES = {
     "portrait": "phase portrait",
     "trace": "displacement over time",
@@ -25,6 +27,10 @@ COLUMNS = {
     "stops": ("at",),
     "strip": ("omega", "x", "colour"),
     "now": ("at",),
+    "cells": ("left", "right", "bottom", "top", "colour"),
+    "borders": ("xs", "ys", "colour"),
+    "here": ("x", "y"),
+    "cursor": ("x", "y"),
 }
 """Columns of each source of data, by its name."""
 INK, FAINT, STROBE, IMPACT = "#0072b2", "#999999", "#d55e00", "#009e73"
@@ -46,6 +52,11 @@ def items(omega: Control) -> dict[str, Any]:
     """
     made = (_portrait(sources()), _trace(sources()), _strip(sources(), omega))
     return {name: json_item(plot, ID(name)) for name, plot in zip(PLOTS, made, strict=True)}
+
+
+def map_item() -> dict[str, Any]:
+    """The same of the map of responses."""
+    return {MAP: json_item(_map(sources()), ID(MAP))}
 
 
 def _empty(height: int, tools: str, **more: Any) -> figure:
@@ -96,4 +107,37 @@ def _strip(data: dict[str, ColumnDataSource], omega: Control) -> figure:
     plot.vspan(x="at", source=data["now"], color=STROBE, line_width=1)
     plot.xaxis.axis_label = f"ω [{omega.unit}]" if omega.unit else "ω"
     plot.yaxis.axis_label = "least x"
+    return plot
+
+
+def _map(data: dict[str, ColumnDataSource]) -> figure:
+    plot = _empty(
+        360, "save", x_range=Range1d(start=0.0, end=1.0), y_range=Range1d(start=0.0, end=1.0)
+    )
+    plot.quad(
+        left="left",
+        right="right",
+        bottom="bottom",
+        top="top",
+        source=data["cells"],
+        fill_color="colour",
+        line_color=None,
+    )
+    # White below the lines: colours of curves and of cells are the same ones.
+    for colour, width in (("white", 5.0), ("colour", 2.2)):
+        plot.multi_line("xs", "ys", source=data["borders"], color=colour, line_width=width)
+    for colour, width in (("white", 6.0), ("black", 2.0)):
+        plot.scatter(
+            "x",
+            "y",
+            source=data["here"],
+            marker="cross",
+            size=18,
+            line_color=colour,
+            line_width=width,
+        )
+    plot.scatter(
+        "x", "y", source=data["cursor"], marker="circle", size=12, fill_color="white", line_width=2
+    )
+    plot.grid.visible = False
     return plot

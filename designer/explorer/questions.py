@@ -14,12 +14,13 @@ from designer.explorer.job_processes import JobProcesses, JobVerb
 from designer.explorer.omega_strip import strip
 from designer.explorer.other_attractors import others
 from designer.explorer.place import read_place
+from designer.explorer.response_map import borders, mapped, read_map
 from designer.explorer.response_view import respond
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
 from designer.explorer.wire import Message
 from designer.model.model_file import MAX_BYTES, ModelFile, need_responses, parse_model_file
 
-Kind = Literal["view", "save", "run", "search", "board"]
+Kind = Literal["view", "map", "borders", "save", "run", "search", "board"]
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,15 @@ class PageQuestion:
     """What a page asks."""
 
     kind: Kind
-    """A picture; a model file to be saved, and then a verb on it; or real parts."""
+    """A picture; a map, or the borders on it; a model file to be saved, and then a verb on it; or
+    real parts."""
     number: int
     """The page's own number of the question, which the answers have as ``id``."""
     words: dict[str, object]
     """The place (``place.read_place``)."""
     more: dict[str, object]
-    """Of what is saved: ``name``, ``pins`` and ``overwrite``; of real parts ``expect``."""
+    """Of what is saved: ``name``, ``pins`` and ``overwrite``; of real parts ``expect``; of maps and
+    borders ``map``, which is None of a map that is put away."""
 
 
 def read_question(text: str | bytes) -> PageQuestion | None:
@@ -47,7 +50,8 @@ def read_question(text: str | bytes) -> PageQuestion | None:
     number, words = asked.get("id"), asked.get("words")
     if not isinstance(number, int) or not isinstance(words, dict):
         return None
-    more = {key: asked[key] for key in ("name", "pins", "overwrite", "expect") if key in asked}
+    keys = ("name", "pins", "overwrite", "expect", "map")
+    more = {key: asked[key] for key in keys if key in asked}
     return PageQuestion(cast("Kind", asked["kind"]), number, words, more)
 
 
@@ -64,6 +68,19 @@ def viewed(modelfile: ModelFile, question: PageQuestion) -> Iterator[Message]:
     if len(view.orbit.start):
         yield from strip(place, view.orbit.start)
     yield from others(place, view.orbit)
+
+
+def planes(modelfile: ModelFile, question: PageQuestion) -> Iterator[Message]:
+    """The map over two parameters around a place, or the borders on it.
+
+    Raises
+    ------
+    InputError : words that give no place or no map.
+    """
+    words = question.more.get("map")
+    if words is not None:
+        request = read_map(modelfile, read_place(modelfile, question.words), words)
+        yield from (mapped if question.kind == "map" else borders)(request)
 
 
 def boards(modelfile: ModelFile, choose: Choose, question: PageQuestion) -> Iterator[Message]:

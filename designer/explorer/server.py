@@ -25,7 +25,7 @@ from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
-from designer.explorer.questions import boards, kept, read_question, viewed
+from designer.explorer.questions import boards, kept, planes, read_question, viewed
 from designer.explorer.saved_page import save_page
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
@@ -309,6 +309,9 @@ class _Socket(WebSocketHandler, _Guarded):
         if question.kind == "view":
             answer = partial(viewed, e.modelfile, question)
             e.queue.ask(self, question.number, answer, self.send)
+        elif question.kind in ("map", "borders"):
+            answer = partial(planes, e.modelfile, question)
+            e.queue.ask(self, question.number, answer, self.send, "map")
         elif question.kind == "board":
             answer = partial(boards, e.modelfile, e.parts, question)
             e.board_queue.ask(self, question.number, answer, self.send)

@@ -1,8 +1,8 @@
 """One thread that computes for all open pages: what was asked last comes first.
 
 An answer is an iterator of messages. Its first message is what the page waits for; the others fill
-in behind it, a piece at a time, whenever no page waits. A newer question of the same page takes the
-place of the old one, so what it overtakes is never begun, or goes no further.
+in behind it, a piece at a time, whenever no page waits. A newer question of the same page on the
+same topic takes the place of the old one, so what it overtakes is never begun, or goes no further.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class WorkQueue:
     """The thread and what it has to do."""
 
     def __init__(self, report: Callable[[BaseException], None] = lambda _: None) -> None:
-        self._asked: dict[Hashable, _Question] = {}
+        self._asked: dict[tuple[Hashable, str], _Question] = {}
         self._change = threading.Condition()
         self._open = True
         self._report = report
@@ -47,19 +47,26 @@ class WorkQueue:
         self._thread = threading.Thread(target=self._work, name="explorer", daemon=True)
         self._thread.start()
 
-    def ask(self, page: Hashable, number: int, answer: Answer, send: Send) -> None:
-        """Compute this next for the page, instead of what it asked before.
+    def ask(
+        self, page: Hashable, number: int, answer: Answer, send: Send, topic: str = "view"
+    ) -> None:
+        """Compute this next for the page, instead of what it asked before on the topic. What fills
+        in on its other topics rests as after a first message.
 
         number : the ``id`` that every message then has.
         """
         with self._change:
-            self._asked[page] = _Question(number, answer, send)
+            for (whose, _), question in self._asked.items():
+                if whose == page:
+                    question.rests_until = time.monotonic() + PAUSE
+            self._asked[page, topic] = _Question(number, answer, send)
             self._change.notify()
 
     def forget(self, page: Hashable) -> None:
         """Do no more for a page."""
         with self._change:
-            self._asked.pop(page, None)
+            for key in [key for key in self._asked if key[0] == page]:
+                del self._asked[key]
 
     def close(self) -> None:
         """End the thread once what it is at is done, which is not waited for longer than 5 s."""
@@ -71,18 +78,18 @@ class WorkQueue:
 
     def _work(self) -> None:
         while (turn := self._next()) is not None:
-            page, question = turn
+            key, question = turn
             message = self._advance(question)
             with self._change:
-                current = self._asked.get(page) is question
+                current = self._asked.get(key) is question
                 if current and message is None:
-                    del self._asked[page]
+                    del self._asked[key]
             # A first message is sent even if it is overtaken: a slider that moves on and on still
             # shows pictures.
             if message is not None and (current or message["first"]):
                 question.send({**message, "id": question.number})
 
-    def _next(self) -> tuple[Hashable, _Question] | None:
+    def _next(self) -> tuple[tuple[Hashable, str], _Question] | None:
         """A question that nobody has begun, else the next piece of one that was; None at the
         end."""
         with self._change:

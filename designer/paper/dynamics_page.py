@@ -23,8 +23,7 @@ from designer.bifurcations.titles import NAMES
 from designer.bifurcations.windows import NOT_LOCATED, BranchWindow
 from designer.dynamics.orbit import Orbit
 from designer.paper.statements import Statement, main_windows
-from designer.report.bifurcation_plots import MARKS
-from designer.report.response_colours import BLACK, RED
+from designer.report.response_colours import BLACK, MARKS, RED
 
 KINDS = ("S", "AS")
 COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")

@@ -9,9 +9,6 @@ from . import (
     simulate_plots as simulate_plots,
     system_drawing as system_drawing,
 )
-from .bifurcation_plots import (
-    MARKS as MARKS,
-)
 from .comparison import (
     compare as compare,
     comparison_json as comparison_json,
@@ -36,7 +33,10 @@ from .record_plots import (
 )
 from .response_colours import (
     BLACK as BLACK,
+    MARKS as MARKS,
     RED as RED,
+    palette_legend as palette_legend,
+    response_palette as response_palette,
 )
 from .verb_sections import (
     SECTIONS as SECTIONS,

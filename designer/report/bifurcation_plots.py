@@ -17,40 +17,33 @@ from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.attractor_list import SAME
 from designer.bifurcations.basin_shares import BasinShares
 from designer.bifurcations.basins import BasinPlan, Basins
-from designer.bifurcations.parameter_map import MapCell, MapPlan, ParameterMap
+from designer.bifurcations.parameter_map import MapPlan, ParameterMap
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.bifurcations.titles import NAMES, title
-from designer.dynamics.counts import Counts, read_counts
+from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 from designer.report.response_colours import (
     BLACK,
     CHAOS,
     DOTS,
+    MARKS,
     OPEN,
     OTHERS,
     RED,
-    REST,
     SHADES,
+    palette_legend,
+    response_palette,
 )
 from designer.report.share_band import share_band
 from designer.report.si_axes import si_x, si_y
 
-NAMED = 12
-"""Responses that get a colour of their own in a map."""
 WIDE = 0.012
 """Of the sweep: narrower windows get no label."""
 SECOND_AXIS = 0.42
 """How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
-MARKS = {
-    "pitchfork": ("o", "#0072b2"),
-    "period-doubling": ("s", "#e69f00"),
-    "fold": ("^", "#009e73"),
-    "grazing": ("x", "#cc79a7"),
-    "torus": ("D", "#7f3fbf"),
-}
 Coloured = tuple[str, Array, list[Steady]]
 """Colour, values of the parameter, and the motions there."""
 SHARE_BAND = 1.6
@@ -176,17 +169,12 @@ def parameter_map(result: ParameterMap, name: str = "") -> Figure:
     """Colours name the response at every point. name : the model's title."""
     plan = result.plan
     figure, axes = _plane(7.6, 5.4, title(name, plan, 92))
-    looks = _palette(result.cells, result.counts)
+    looks = response_palette(result.counts)
     colours = list(dict.fromkeys(looks.values()))
     _cells(axes, plan, [colours.index(looks[c.response]) for c in result.cells], colours)
     _plane_axes(axes, plan)
-    named = {colour: response for response, colour in looks.items() if colour not in (REST, OPEN)}
-    handles = []
-    for colour, text in {**named, REST: "other periodic", OPEN: "not settled"}.items():
-        count = sum(result.counts[r] for r, c in looks.items() if c == colour)
-        if colour in named or count:
-            handles.append(_patch(colour, text, count / len(result.cells)))
-    _legend_beside(axes, handles)
+    legend = palette_legend(result.counts, looks)
+    _legend_beside(axes, [_patch(*each) for each in legend])
     return figure
 
 
@@ -371,20 +359,6 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
     if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
         handles.append(Patch(fc=CHAOS, label="aperiodic"))
     return handles
-
-
-def _palette(cells: Sequence[MapCell], counts: Mapping[str, int]) -> dict[str, str]:
-    """Colour by response: the most frequent ones, then one for all others."""
-    periodic = {c.response for c in cells if c.status is OrbitStatus.PERIODIC}
-    named = [r for r in counts if r in periodic][:NAMED]
-    named.sort(key=Counts.parse)
-    looks = dict(zip(named, OTHERS, strict=False))
-    for response in counts:
-        if response in periodic:
-            looks.setdefault(response, REST)
-        else:
-            looks[response] = CHAOS if response == OrbitStatus.APERIODIC else OPEN
-    return looks
 
 
 def _cells(

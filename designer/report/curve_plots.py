@@ -17,8 +17,7 @@ from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
 from designer.bifurcations.response_region import ResponseRegion
 from designer.bifurcations.titles import NAMES, curves_title
-from designer.report.bifurcation_plots import MARKS
-from designer.report.response_colours import OTHERS, SHADES
+from designer.report.response_colours import MARKS, OTHERS, SHADES
 from designer.report.si_axes import si_x, si_y
 
 MEETINGS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "*", "h", "p")

@@ -1,6 +1,11 @@
-"""Colours of responses and attractors in pictures of sweeps, maps and basins."""
+"""Colours of responses, attractors and bifurcations in pictures of sweeps, maps and basins."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+
+from designer.dynamics.counts import Counts, read_counts
+from designer.dynamics.orbit import OrbitStatus
 
 BLACK, RED = "#000000", "#d40000"
 OTHERS = (
@@ -13,3 +18,41 @@ CHAOS, REST, OPEN = "#3a3a3a", "#c9c9c9", "#ffffff"
 """Of aperiodic motions, of responses too rare for a colour, and of what is not settled."""
 SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
 """Of windows of symmetric responses and of others."""
+MARKS = {
+    "pitchfork": ("o", "#0072b2"),
+    "period-doubling": ("s", "#e69f00"),
+    "fold": ("^", "#009e73"),
+    "grazing": ("x", "#cc79a7"),
+    "torus": ("D", "#7f3fbf"),
+}
+"""Marker and colour of each kind of bifurcation."""
+NAMED = 12
+"""Responses that get a colour of their own in a map."""
+
+
+def response_palette(counts: Mapping[str, int]) -> dict[str, str]:
+    """Colour by response: the most frequent ones of a map, then one for all others.
+
+    counts : points of the map by response.
+    """
+    frequent = sorted(counts, key=lambda response: (-counts[response], response))
+    periodic = [response for response in frequent if read_counts(response)]
+    looks = dict(zip(sorted(periodic[:NAMED], key=Counts.parse), OTHERS, strict=False))
+    others = {response: REST for response in periodic if response not in looks}
+    plain = [response for response in frequent if response not in periodic]
+    return looks | others | {r: CHAOS if r == OrbitStatus.APERIODIC else OPEN for r in plain}
+
+
+def palette_legend(
+    counts: Mapping[str, int], looks: Mapping[str, str]
+) -> list[tuple[str, str, float]]:
+    """Colour, words and share of the points of each colour of a ``response_palette``; responses
+    that it does not have count among the others."""
+    named = {colour: response for response, colour in looks.items() if colour not in (REST, OPEN)}
+    points = dict.fromkeys(named, 0)
+    for response, count in counts.items():
+        colour = looks.get(response, REST)
+        points[colour] = points.get(colour, 0) + count
+    words = {**named, REST: "other periodic", OPEN: "not settled"}
+    total = sum(counts.values())
+    return [(c, text, points[c] / total) for c, text in words.items() if c in points]

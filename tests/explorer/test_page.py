@@ -242,6 +242,44 @@ def test_other_attractors_are_listed_and_one_can_be_shown(browser: Browser, addr
     page.close()
 
 
+def test_a_map_is_shown_and_a_point_of_it_gone_to(browser: Browser, address: str) -> None:
+    """By a click and by the keyboard; what is wrong is named in the page, also from an address."""
+    narrow = "?omega=1.55&map=omega~1.5~1.6~b~0.24~0.26"
+    page = opened(browser, f"{address}{narrow}")
+    page.wait_for_function("() => document.getElementById('map-done').textContent.includes(' of ')")
+    page.wait_for_function("() => document.querySelectorAll('#map-legend li').length > 0")
+    assert "1-1-1" in page.inner_text("#map-legend")
+    assert drawn(page, "cells", "left") > 10
+    assert page.input_value("#map-x-low") == "1.5"
+    page.focus("#map")
+    page.keyboard.press("Shift+ArrowRight")
+    assert page.inner_text("#map-at").endswith("1-1-1")
+    page.keyboard.press("Enter")
+    page.wait_for_function("() => new URLSearchParams(location.search).get('omega') === '1.5625'")
+    box = page.locator("#map").bounding_box()
+    assert box is not None
+    page.locator("#map").click(position={"x": 0.3 * box["width"], "y": 0.3 * box["height"]})
+    page.wait_for_function("() => Number(new URLSearchParams(location.search).get('b')) > 0.25")
+    assert 1.5 < float(query(page)["omega"][0]) < 1.55
+    assert float(page.input_value("[data-name=b] .number")) == float(query(page)["b"][0])
+    assert query(page)["map"] == ["omega~1.5~1.6~b~0.24~0.26"]
+    page.wait_for_function(
+        "() => document.getElementById('map-borders').textContent.includes('1-1-1, symmetric')",
+        timeout=5.0 * WAIT,
+    )
+    page.fill("#map-x-high", "1.2")
+    page.press("#map-x-high", "Enter")
+    page.wait_for_selector("#map-notice:not([hidden])")
+    assert "map.x" in page.inner_text("#map-notice")
+    page.click("#map-away")
+    page.wait_for_function("() => !new URLSearchParams(location.search).has('map')")
+    page.goto(f"{address}?map=omega~1~2~nothing~1~2")
+    page.wait_for_selector("#map-notice:not([hidden])")
+    assert "nothing" in page.inner_text("#map-notice")
+    summary(page, "1-1-1")
+    page.close()
+
+
 def test_real_parts_are_chosen_for_the_response(browser: Browser, address: str) -> None:
     page = opened(browser, f"{address}?omega=0.85")
     summary(page, "1-2-2")

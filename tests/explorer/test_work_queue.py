@@ -115,6 +115,27 @@ def test_two_pages_are_served_in_turn_and_first_pictures_before_the_rest(queue: 
     assert order.index("two") <= 3
 
 
+def test_a_newer_question_on_one_topic_leaves_the_other_and_comes_before_it(
+    queue: WorkQueue,
+) -> None:
+    heard, order, gate = Heard(), list[str](), threading.Event()
+
+    def of(topic: str, count: int) -> Iterator[Message]:
+        for k in range(count):
+            if topic == "map" and k == 2:
+                gate.wait(20.0)
+            order.append(topic)
+            yield {"kind": topic}
+
+    queue.ask("page", 1, lambda: of("map", 20), heard, "map")
+    heard.wait(2)
+    queue.ask("page", 2, lambda: of("view", 3), heard)
+    gate.set()
+    heard.wait(23)
+    assert order.index("view") <= 3
+    assert order.count("map") == 20
+
+
 def test_an_error_is_a_message_and_the_next_question_is_answered(queue: WorkQueue) -> None:
     heard = Heard()
 

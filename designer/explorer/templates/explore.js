@@ -5,9 +5,11 @@
   const PERIODS = ["#888888", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
     "#a06a00", "#7a5ccf"];
   const OPEN = "#bbbbbb";
+  const REST = "#c9c9c9"; // of the map's responses without a colour of their own
   const STEPS = 2000;
   const GAP = 65535; // what a column of 16-bit steps has for no number
   const BOARD = -2; // number of the question about parts
+  const MAP = -1000; // numbers of those about the map start here and fall
   const page = JSON.parse(document.getElementById("page").textContent);
   const recording = page.recording;
   const by = (id) => document.getElementById(id);
@@ -71,6 +73,7 @@
     const query = new URLSearchParams(words());
     if (by("follow").checked) query.set("follow", "1");
     for (const pin of pins) query.append("pin", pin);
+    if (map) query.set("map", MAP_WORDS.map((key) => map[key]).join("~"));
     const text = query.toString();
     // A page from a file may change nothing of its address but what is behind the #.
     if (recording) return `#${text}`;
@@ -84,6 +87,7 @@
     start = query.get("start") ?? "";
     pins = query.getAll("pin").filter((pin) => pin.split("~").length === 3);
     showPins();
+    if (!recording) readMap(query.get("map"));
   };
 
   // --- asking: one question is under way; of those behind it only the newest is kept ------------
@@ -139,6 +143,7 @@
       }
       draw(message);
       history.replaceState(null, "", address());
+      followMap();
     },
     strip(message) {
       if (stripOf !== message.id) stripData = empty();
@@ -196,7 +201,65 @@
       const old = [...by("jobs").children].find((each) => each.dataset.job === message.name);
       if (old) old.replaceWith(item); else by("jobs").append(item);
     },
+    map(message) {
+      if (message.id !== mapNumber) return;
+      mapOf = message;
+      grid = new Array(message.columns * message.rows);
+      cells = { left: [], right: [], bottom: [], top: [], response: [] };
+      cursor = null;
+      for (const key of ["x", "y"]) {
+        for (const end of ["low", "high"]) {
+          by(`map-${key}-${end}`).value = map[`${key}_${end}`] = message[key][end];
+        }
+        by(`map-${key}`).value = message[key].name;
+        const range = views.map.model[`${key}_range`];
+        range.setv({ start: +message[key].low, end: +message[key].high });
+      }
+      mapAsked = mapHeld + JSON.stringify(map); // with the ends that the server chose
+      by("map-box").hidden = by("map-away").hidden = false;
+      by("map-words").textContent = message.words;
+      by("map-borders").textContent = "";
+      axisLabel(views.map.model, "below", message.x.label);
+      axisLabel(views.map.model, "left", message.y.label);
+      fill("borders", { xs: [], ys: [], colour: [] });
+      markHere();
+      history.replaceState(null, "", address());
+    },
+    cells(message) {
+      if (message.id !== mapNumber) return;
+      const { columns, rows } = mapOf, half = message.stride / 2;
+      for (const [i, j, response] of message.cells) {
+        grid[i * columns + j] = response;
+        cells.left.push(mapValue("x", (j - half) / (columns - 1)));
+        cells.right.push(mapValue("x", (j + half) / (columns - 1)));
+        cells.bottom.push(mapValue("y", (i - half) / (rows - 1)));
+        cells.top.push(mapValue("y", (i + half) / (rows - 1)));
+        cells.response.push(response);
+      }
+      looks = message.looks;
+      mapLegend = message.legend;
+      by("map-done").textContent = message.done < message.of
+        ? `${message.done} of ${message.of} points.` : `All ${message.of} points.`;
+      laterMap();
+      if (message.done === message.of) askBorders();
+    },
+    borders(message) {
+      if (message.id !== mapNumber) return;
+      by("map-borders").textContent = message.words;
+      if (!message.curves.length && !message.done) return;
+      const lines = message.curves.map((curve) => unpacked(curve.data));
+      borderLegend = message.legend;
+      fill("borders", { xs: lines.map((each) => each.x), ys: lines.map((each) => each.y),
+        colour: message.curves.map((each) => each.colour) });
+      laterMap();
+    },
     error(message) {
+      if (message.id <= MAP) {
+        if (message.id !== mapNumber) return;
+        by("map-notice").textContent = message.text;
+        by("map-notice").hidden = false;
+        return;
+      }
       if (message.id < 0) {
         by(message.id === BOARD ? "boards" : "kept").textContent = message.text;
         return;
@@ -268,6 +331,150 @@
   });
   const settled = () => { wanted = true; pump(); };
 
+  // --- the map of responses ---------------------------------------------------------------------
+  const MAP_WORDS = ["x", "x_low", "x_high", "y", "y_low", "y_high"];
+  let map = null, mapOf = null, mapNumber = MAP, mapHeld = "", mapAsked = "", bordersAsked = "";
+  let grid = [], cells = {}, looks = {}, mapLegend = [], borderLegend = [], cursor = null, mapTimer = 0;
+  const mapPart = (key, value) => (value - mapOf[key].low) / (mapOf[key].high - mapOf[key].low);
+  const mapValue = (key, part) => Number(mapOf[key].low) + part * (mapOf[key].high - mapOf[key].low);
+  const readMap = (text) => {
+    const parts = (text ?? "").split("~");
+    map = parts.length === MAP_WORDS.length
+      ? Object.fromEntries(MAP_WORDS.map((key, k) => [key, parts[k]])) : null;
+    for (const key of map ? MAP_WORDS : []) by(`map-${key.replace("_", "-")}`).value = map[key];
+    mapAsked = "";
+    if (!map) mapAway();
+  };
+  const typedMap = () => Object.fromEntries(MAP_WORDS.map((key) =>
+    [key, by(`map-${key.replace("_", "-")}`).value.trim()]));
+  // What a map shows depends on where the other parameters are, and not on the start.
+  const held = () => {
+    const out = { ...shownView.words };
+    for (const key of [map.x, map.y, "start", "shown"]) delete out[key];
+    return JSON.stringify(out);
+  };
+  const askMap = () => {
+    mapHeld = held();
+    mapAsked = mapHeld + JSON.stringify(map);
+    bordersAsked = "";
+    by("map-notice").hidden = true;
+    line.ask({ kind: "map", id: --mapNumber, words: shownView.words, map });
+  };
+  const askBorders = () => {
+    const { shown, ...at } = shownView.words;
+    bordersAsked = JSON.stringify(at);
+    line.ask({ kind: "borders", id: --mapNumber, words: shownView.words, map });
+  };
+  const followMap = () => { // after each picture: what of the map is not of this place any more
+    if (!map || !line.open) return;
+    markHere();
+    if (mapAsked !== held() + JSON.stringify(map)) { askMap(); return; }
+    const { shown, ...at } = shownView.words;
+    if (bordersAsked && bordersAsked !== JSON.stringify(at)) askBorders();
+  };
+  const mapAway = () => {
+    if (recording) return;
+    if (mapOf && line.open) line.ask({ kind: "map", id: --mapNumber, words: {}, map: null });
+    map = mapOf = null;
+    mapAsked = "";
+    by("map-box").hidden = by("map-away").hidden = by("map-notice").hidden = true;
+  };
+  const markHere = () => {
+    const { words: at } = shownView;
+    fill("here", mapOf ? { x: [+at[mapOf.x.name]], y: [+at[mapOf.y.name]] } : { x: [], y: [] });
+  };
+  const laterMap = () => { mapTimer ||= setTimeout(showMap, 150); };
+  const showMap = () => {
+    mapTimer = 0;
+    const { response, ...corners } = cells;
+    fill("cells", { ...corners, colour: response.map((each) => looks[each] ?? REST) });
+    const item = (kind) => ([colour, words]) => {
+      const entry = document.createElement("li"), swatch = document.createElement("span");
+      swatch.className = `swatch ${kind}`;
+      swatch.style.background = colour;
+      entry.append(swatch, words);
+      return entry;
+    };
+    by("map-legend").replaceChildren(...mapLegend.map(item("")), ...borderLegend.map(item("line")));
+  };
+  // Of the points that are known, the one nearest on the coarsest grid that has it.
+  const responseAt = (i, j) => {
+    const { columns, rows } = mapOf;
+    for (const stride of [1, 2, 4, 8]) {
+      const [row, column] = [Math.round(i / stride) * stride, Math.round(j / stride) * stride];
+      const known = row < rows && column < columns && grid[row * columns + column];
+      if (known) return known;
+    }
+    return "not known yet";
+  };
+  const tellAt = (x, y) => {
+    const { columns, rows } = mapOf;
+    const response = responseAt(Math.round(mapPart("y", y) * (rows - 1)),
+      Math.round(mapPart("x", x) * (columns - 1)));
+    by("map-at").textContent = `${mapOf.x.label} = ${rounded(x)}, ${mapOf.y.label} = ${rounded(y)}: ${response}`;
+  };
+  const rounded = (value) => String(Number(value.toPrecision(6)));
+  const goToPoint = (x, y) => {
+    named[mapOf.x.name].show(rounded(x));
+    named[mapOf.y.name].show(rounded(y));
+    want();
+  };
+  const pointOf = (event) => {
+    const view = views.map, area = view.el.getBoundingClientRect();
+    const x = view.frame.x_scale.invert(event.clientX - area.left);
+    const y = view.frame.y_scale.invert(event.clientY - area.top);
+    const inside = [["x", x], ["y", y]].every(([key, value]) => {
+      const part = mapPart(key, value);
+      return part >= 0 && part <= 1;
+    });
+    return inside ? [x, y] : null;
+  };
+  const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  const onMapKey = (event) => {
+    if (!mapOf) return;
+    if (event.key === "Enter" && cursor) goToPoint(...cursor);
+    const move = MOVES[event.key];
+    if (!move) return;
+    event.preventDefault();
+    const at = cursor ?? [+shownView.words[mapOf.x.name], +shownView.words[mapOf.y.name]];
+    const fast = event.shiftKey ? 8 : 1;
+    cursor = ["x", "y"].map((key, k) => {
+      const steps = key === "x" ? mapOf.columns - 1 : mapOf.rows - 1;
+      const place = Math.round(mapPart(key, at[k]) * steps) + fast * move[k];
+      return mapValue(key, Math.min(steps, Math.max(0, place)) / steps);
+    });
+    fill("cursor", { x: [cursor[0]], y: [cursor[1]] });
+    tellAt(...cursor);
+  };
+  const wireMap = () => {
+    const place = by("map");
+    onStillClick(place, (event) => {
+      const point = mapOf && pointOf(event);
+      if (point) goToPoint(...point);
+    });
+    place.addEventListener("pointermove", (event) => {
+      const point = mapOf && pointOf(event);
+      if (point) tellAt(...point);
+    });
+    place.addEventListener("keydown", onMapKey);
+    const again = (chosen) => { map = chosen; if (shownView && line.open) askMap(); };
+    for (const key of ["x", "y"]) {
+      by(`map-${key}`).addEventListener("change", () => {
+        for (const end of ["low", "high"]) by(`map-${key}-${end}`).value = "";
+        if (map) again(typedMap());
+      });
+      for (const end of ["low", "high"]) {
+        by(`map-${key}-${end}`).addEventListener("change", () => again(typedMap()));
+      }
+    }
+    by("map-here").addEventListener("click", () => again({ x: by("map-x").value, x_low: "", x_high: "",
+      y: by("map-y").value, y_low: "", y_high: "" }));
+    by("map-away").addEventListener("click", () => {
+      mapAway();
+      history.replaceState(null, "", address());
+    });
+  };
+
   // --- plots ----------------------------------------------------------------------------------
   const unpacked = (data) => Object.fromEntries(Object.entries(data).map(([name, packed]) => {
     const bytes = Uint8Array.from(atob(packed.f4 ?? packed.u2), (c) => c.charCodeAt(0));
@@ -307,13 +514,20 @@
     fill("now", { at: [omega] });
     const range = views.strip.model.x_range;
     if (!recording) range.setv({ start: omega * 0.84, end: omega * 1.16 });
-    const label = (plot, place, text) => {
-      const axis = plot[place][0];
-      if (axis.axis_label !== text) axis.axis_label = text;
-    };
-    label(views.portrait.model, "below", message.axes.x);
-    label(views.portrait.model, "left", message.axes.v);
-    label(views.trace.model, "left", message.axes.x);
+    axisLabel(views.portrait.model, "below", message.axes.x);
+    axisLabel(views.portrait.model, "left", message.axes.v);
+    axisLabel(views.trace.model, "left", message.axes.x);
+  };
+  const axisLabel = (plot, place, text) => {
+    const axis = plot[place][0];
+    if (axis.axis_label !== text) axis.axis_label = text;
+  };
+  const onStillClick = (place, action) => { // and not at the end of a drag
+    let down = null;
+    place.addEventListener("pointerdown", (e) => { down = [e.clientX, e.clientY]; }, true);
+    place.addEventListener("pointerup", (e) => {
+      if (down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 4) action(e);
+    }, true);
   };
   const colour = () => {
     const style = getComputedStyle(root);
@@ -342,13 +556,8 @@
       const made = await Bokeh.embed.embed_item(item, name);
       views[name] = made.get_by_id?.(item.root_id) ?? [...made][0];
     }
-    const place = by("strip");
-    let down = null;
-    place.addEventListener("pointerdown", (e) => { down = [e.clientX, e.clientY]; }, true);
-    place.addEventListener("pointerup", (e) => {
-      const still = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 4;
-      if (still) goThere(views.strip, "omega", e);
-    }, true);
+    onStillClick(by("strip"), (event) => goThere(views.strip, "omega", event));
+    if (!recording) wireMap();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", colour);
     colour();
     by("palette").replaceChildren(...[1, 2, 3, 4, 5, 6, 7, 8, 0].map((n) => {
@@ -374,6 +583,7 @@
         line.open = true;
         wait = 300;
         underWay = 0;
+        mapAsked = "";
         notice("");
         root.dataset.line = "open";
         settled();
