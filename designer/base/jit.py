@@ -10,11 +10,13 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import platformdirs
+from numba.core.event import Listener, install_listener
 from numba.core.types.misc import unliteral
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -69,6 +71,32 @@ def nothing_compiled() -> bool:
     numba makes folders inside as soon as a kernel's module is imported: files decide.
     """
     return CACHE is not None and not any(path.is_file() for path in CACHE.rglob("*"))
+
+
+class _CompileWatch(Listener):  # type: ignore[misc]
+    """Tells when compilation begins and ends; a kernel's own callees are within its own."""
+
+    def __init__(self, tell: Callable[[bool], None]) -> None:
+        self._tell = tell
+        self._depth = 0
+
+    def on_start(self, event: object) -> None:
+        self._depth += 1
+        if self._depth == 1:
+            self._tell(True)
+
+    def on_end(self, event: object) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self._tell(False)
+
+
+@contextmanager
+def compilation_watched(tell: Callable[[bool], None]) -> Iterator[None]:
+    """Call ``tell`` with True whenever numba begins to compile, on the thread that does, and with
+    False when that is done; not for what is loaded from ``CACHE``."""
+    with install_listener("numba:compile", _CompileWatch(tell)):
+        yield
 
 
 OPTIONS: dict[str, Any] = {

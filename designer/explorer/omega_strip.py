@@ -22,6 +22,9 @@ TOGETHER = 3
 """Steps of a piece: at most some tens of milliseconds, after which a newer place may come first."""
 COURSE = Course(settle=80, keep=10, patience=0)
 """Drive periods of a step: what is not settled by then is drawn as it is."""
+PERIODS = COURSE.settle + COURSE.keep
+"""Drive periods within which a step has to settle. To be called aperiodic a motion is followed much
+longer: in the strip chaos is a motion that has not settled."""
 CHAOS, OPEN = 0, -1
 """In place of a period: a motion without one, and one that is not known."""
 

@@ -19,6 +19,7 @@ from tornado.ioloop import IOLoop
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from designer.base import jit
 from designer.base.defaults import SAMPLES, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
@@ -72,6 +73,8 @@ class Explorer:
     """Told of defects that a page's question met."""
     sockets: set[_Socket] = field(default_factory=set)
     """The open pages."""
+    compiling: bool = False
+    """Whether a kernel is being compiled, which a picture then waits for."""
 
     @cached_property
     def jobs(self) -> JobProcesses:
@@ -87,6 +90,11 @@ class Explorer:
     def parts(self) -> PartsProcess:
         """The process that chooses parts."""
         return PartsProcess()
+
+    def tell_compiling(self, on: bool) -> None:
+        """Tell every page, also those that open later, that kernels are compiled, or no more."""
+        self.compiling = on
+        self._tell({"kind": "compiling", "on": on})
 
     def _tell(self, message: Message) -> None:
         """What every page is told."""
@@ -159,7 +167,7 @@ def explore(
             webbrowser.open(address)
         ready(address)
 
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt), jit.compilation_watched(explorer.tell_compiling):
         asyncio.run(_serve(explorer, listening, started))
     explorer.close()
 
@@ -299,6 +307,8 @@ class _Socket(WebSocketHandler, _Guarded):
         self.explorer.sockets.add(self)
         for message in self.explorer.jobs.messages:
             self.send(message)
+        if self.explorer.compiling:
+            self.send({"kind": "compiling", "on": True, "id": -1})
 
     def on_message(self, message: str | bytes) -> None:
         question = read_question(message)

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import numba
 import pytest
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.httpserver import HTTPServer
@@ -15,6 +16,7 @@ from tornado.netutil import bind_sockets
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from designer import InputError, explore, parse_model_file, read_model_file
+from designer.base.jit import compilation_watched
 from designer.explorer.page import page
 from designer.explorer.questions import read_question
 from designer.explorer.server import Explorer, application
@@ -102,6 +104,25 @@ def test_a_question_is_answered_and_a_bad_one_too(tmp_path: Path) -> None:
     assert "k0" in error["text"]
     assert "Traceback" not in error["text"]
     assert set(strip["data"]) == {"omega", "x", "period"}
+
+
+def test_a_page_is_told_while_kernels_are_compiled(tmp_path: Path) -> None:
+    """Once for a kernel with its callees, and not where nothing is compiled."""
+    explorer = Explorer(read_model_file(EXAMPLES / "paper.toml"), WorkQueue(), tmp_path, "", "")
+    told: list[Any] = []
+
+    class Wire:
+        send = staticmethod(told.append)
+
+    explorer.sockets.add(Wire())  # type: ignore[arg-type]
+    with compilation_watched(explorer.tell_compiling):
+        inner = numba.njit(lambda x: x + 1)
+        outer = numba.njit(lambda x: inner(x) * 2)
+        assert outer(3) == 8
+        assert outer(4) == 10
+    numba.njit(lambda x: x - 1)(1)
+    explorer.close()
+    assert [(m["kind"], m["on"]) for m in told] == [("compiling", True), ("compiling", False)]
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,7 @@
     underWay = ++number;
     line.ask({ kind: "view", id: number, words: words() });
   };
+  let busyTimer = 0;
   const notice = (text) => { by("notice").textContent = text; by("notice").hidden = !text; };
 
   const heard = (message) => {
@@ -144,6 +145,13 @@
       draw(message);
       history.replaceState(null, "", address());
       followMap();
+    },
+    compiling(message) {
+      // Kernels come one after another: what is said of them stays a moment longer.
+      clearTimeout(busyTimer);
+      const say = (text) => { if (by("busy").textContent !== text) by("busy").textContent = text; };
+      if (message.on) say("The kernels are being compiled, once on this machine. It takes a minute or more.");
+      else busyTimer = setTimeout(() => say(""), 700);
     },
     strip(message) {
       if (stripOf !== message.id) stripData = empty();
@@ -560,12 +568,14 @@
     if (!recording) wireMap();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", colour);
     colour();
-    by("palette").replaceChildren(...[1, 2, 3, 4, 5, 6, 7, 8, 0].map((n) => {
+    const periods = [1, 2, 3, 4, 5, 6, 7, 8].map((n) => [PERIODS[n], String(n)]);
+    by("palette").replaceChildren(...[...periods, [PERIODS[0], "another, or none"],
+      [OPEN, `not settled within ${page.settled_within} periods`]].map(([colour, text]) => {
       const item = document.createElement("span");
       const dot = document.createElement("span");
       dot.className = "dot";
-      dot.style.background = PERIODS[n];
-      item.append(dot, n ? String(n) : "none");
+      dot.style.background = colour;
+      item.append(dot, text);
       return item;
     }));
   };
