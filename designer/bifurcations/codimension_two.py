@@ -75,6 +75,23 @@ Event = tuple[str, PointKind | None]
 """Name of a point of codimension two, and kind of the other curve."""
 
 
+@dataclass(frozen=True)
+class WatchedPoint:
+    """A point of a curve, with what tells whether something happens on the way to the next."""
+
+    point: CurvePoint
+    """The point."""
+    events: dict[Event, float]
+    """The test functions there."""
+    partner: Array
+    """(states,) from the orbit to its partner; see ``partner``."""
+
+
+def watched(system: ExtendedSystem, p: CurvePoint) -> WatchedPoint:
+    """The point with its test functions, for ``locate`` on both sides of it."""
+    return WatchedPoint(p, events(system, p), partner(system, p))
+
+
 def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
     """The test functions at a point; a change of sign from one point to the next is an event."""
     kind = p.condition.kind
@@ -127,24 +144,24 @@ def meeting(one: PointKind, other: PointKind) -> str:
 
 
 def locate(
-    system: ExtendedSystem, a: CurvePoint, b: CurvePoint, index: int
+    system: ExtendedSystem, before: WatchedPoint, after: WatchedPoint, index: int
 ) -> list[CodimensionTwo]:
     """The points between two neighbouring points of a curve, in its order.
 
     Of two events of one kind between them neither is found.
     """
     found = []
-    before, after = events(system, a), events(system, b)
-    for event, value in before.items():
-        if value * after.get(event, 0.0) < 0.0:
+    a, b = before.point, after.point
+    for event, value in before.events.items():
+        if value * after.events.get(event, 0.0) < 0.0:
             found.append((event, _root(system, a, b, event)))
     if not np.array_equal(a.impacts, b.impacts):
         kind = a.condition.kind
         event = (meeting(kind, PointKind.GRAZING), PointKind.GRAZING)
         found.append((event, _bisected(system, a, b)))
-    ended = _falls_together(system, a, b)
+    ended = _falls_together(system, before, after)
     if ended:
-        found.append(((ended, None), _nearest_to_partner(system, a, b)))
+        found.append(((ended, None), _nearest_to_partner(system, before, after)))
     out = [
         CodimensionTwo(name, root[1], index + root[0], other)
         for (name, other), root in found
@@ -244,20 +261,20 @@ def partner(system: ExtendedSystem, p: CurvePoint) -> Array:
     return np.asarray((later - x) / system.scale[: len(x)])
 
 
-def _falls_together(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> str:
+def _falls_together(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) -> str:
     """What the point is called where the orbit and its partner change places; "" elsewhere."""
-    one, other = partner(system, a), partner(system, b)
+    one, other = a.partner, b.partner
     if one @ other >= 0.0 or min(np.abs(one).max(), np.abs(other).max()) < FALLEN:
         return ""
     return ENDS[1] if system.n % 2 else ENDS[2]
 
 
-def _nearest_to_partner(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Root | None:
+def _nearest_to_partner(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) -> Root | None:
     """Where they are one: the curve's equations are singular there, so by the secant alone."""
-    one, other = partner(system, a), partner(system, b)
-    share = float(np.linalg.norm(one) / (np.linalg.norm(one) + np.linalg.norm(other)))
+    one, other = (float(np.linalg.norm(p.partner)) for p in (a, b))
+    share = one / (one + other)
     for shift in (0.0, 1e-4, -1e-4, 1e-2, -1e-2):
-        point = system.between(a, b, share + shift)
+        point = system.between(a.point, b.point, share + shift)
         if point is not None:
             return share + shift, point
     return None

@@ -20,19 +20,34 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.bifurcations.points import PointKind
-from designer.bifurcations.touch import StopTouch, height
+from designer.bifurcations.touch import StopTouch, height, height_along
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus
 from designer.dynamics.turning_points import turning_points_of
 
 Jacobian = Callable[[], Array | None]
 """Gives the (states, states) Jacobian of the map in scaled units; None where the flow fails."""
+DIFFERENCE = 3e-8
+"""In scaled units: step of the differences."""
 CLEAR = 3e-12
 """Of the displacement's peak: how far short of its stop a tip is held, and how far in it a dip. So
 the multipliers along the curve are those of the side that does not change with its square root."""
 
 SAME_PHASE = 1e-3
 """In drive periods: turning points no farther apart are one."""
+
+
+@dataclass(frozen=True)
+class MapSlopes:
+    """The derivatives of the map at a state."""
+
+    scale: Array
+    """(states,) what the states are measured in."""
+    jacobian: Array
+    """(states, states) in scaled units."""
+    change: Callable[[Array], Array | None]
+    """Gives the derivative of the Jacobian along a direction, both in scaled units; None where the
+    flow fails."""
 
 
 class Condition(Protocol):
@@ -50,6 +65,11 @@ class Condition(Protocol):
 
     def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
         """(1 + unknowns,) zero on the curve; None where the flow does not come to an end."""
+        ...
+
+    def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
+        """(1 + unknowns, states + unknowns) derivatives of the residual by the scaled state and the
+        condition's own unknowns; None where the flow does not come to an end."""
         ...
 
     def renewed(self, jacobian: Array) -> Condition:
@@ -88,15 +108,30 @@ class Multiplier:
         J = jacobian()
         if J is None:
             return None
+        try:
+            return np.linalg.solve(self._bordered(J), np.eye(len(J) + 1)[-1])[-1:]
+        except np.linalg.LinAlgError:
+            return None
+
+    def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
+        """(1, states) -v'·D²P(w, ·) with the solutions w and v of the bordered system and of its
+        transpose: second derivatives commute, so one difference along w gives them all."""
+        matrix, unit = self._bordered(image.jacobian), np.eye(len(x) + 1)[-1]
+        try:
+            right, left = np.linalg.solve(matrix, unit), np.linalg.solve(matrix.T, unit)
+        except np.linalg.LinAlgError:
+            return None
+        change = image.change(right[:-1])
+        return None if change is None else -(left[:-1] @ change)[None]
+
+    def _bordered(self, J: Array) -> Array:
+        """(states + 1, states + 1) matrix of the system that gives g."""
         size = len(J)
         matrix = np.zeros((size + 1, size + 1))
         matrix[:size, :size] = J - self.value * np.eye(size)
         matrix[:size, size] = self.left
         matrix[size, :size] = self.right
-        try:
-            return np.linalg.solve(matrix, np.eye(size + 1)[size])[size:]
-        except np.linalg.LinAlgError:
-            return None
+        return matrix
 
     def renewed(self, jacobian: Array) -> Multiplier:
         """With this Jacobian's null vectors, turned as those before."""
@@ -134,9 +169,25 @@ class MultiplierPair:
         J = jacobian()
         if J is None:
             return None
-        i, j = self._places(np.linalg.eigvals(J).astype(complex))
-        values = np.linalg.eigvals(J)
-        return np.array([np.log(abs(values[i] * values[j]))])
+        return np.array([self._logarithm(J)])
+
+    def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
+        """(1, states) by differences along each state."""
+        begun = self._logarithm(image.jacobian)
+        slopes = []
+        for direction in np.eye(len(x)):
+            change = image.change(direction)
+            if change is None:
+                return None
+            beside = self._logarithm(image.jacobian + DIFFERENCE * change)
+            slopes.append((beside - begun) / DIFFERENCE)
+        return np.array([slopes])
+
+    def _logarithm(self, jacobian: Array) -> float:
+        """Of the modulus of the pair's product."""
+        values = np.linalg.eigvals(jacobian).astype(complex)
+        i, j = self._places(values)
+        return float(np.log(abs(values[i] * values[j])))
 
     def renewed(self, jacobian: Array) -> MultiplierPair:
         """With this Jacobian's pair."""
@@ -182,6 +233,13 @@ class Grazing:
         clear = CLEAR if self.touch.tip else -CLEAR
         return np.array([found[0] / self.size + clear, found[1] / self.size])
 
+    def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
+        """(2, states + 1) of height and rate, by the linearised flow."""
+        found = height_along(flow, x, self.n, self.touch, float(extra[0]), np.diag(image.scale))
+        if found is None:
+            return None
+        return np.column_stack([found[:2, 1:], found[1:, 0]]) / self.size
+
     def curvature(self, flow: Flow, x: Array, phase: float) -> float:
         """Second derivative of the height by the phase, over the peak; negative at a tip."""
         found = height(flow, x, self.n, self.touch, phase)
@@ -224,6 +282,18 @@ class Both:
         ]
         held = [part for part in parts if part is not None]
         return np.concatenate(held) if len(held) == 2 else None
+
+    def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
+        """Those of both, each in the columns of the state and of its own unknowns."""
+        n, split = len(x), self.first.unknowns
+        one = self.first.slopes(flow, x, extra[:split], image)
+        other = self.second.slopes(flow, x, extra[split:], image)
+        if one is None or other is None:
+            return None
+        out = np.zeros((len(one) + len(other), n + self.unknowns))
+        out[: len(one), : n + split] = one
+        out[len(one) :, :n], out[len(one) :, n + split :] = other[:, :n], other[:, n:]
+        return out
 
     def renewed(self, jacobian: Array) -> Both:
         """Both, set up at a point."""

@@ -4,8 +4,9 @@ A point is z = (x, extra, λ, μ): the state at the strobe, the condition's own 
 parameters. It obeys P(x, λ, μ) - x = 0, for the period's map P or the mirrored half-period map of
 symmetric orbits, and the condition (``bifurcations.conditions``). That is one equation less than
 there are unknowns: points are solved for on a hyperplane, as in ``bifurcations.orbit_curve``, so
-that turns of the curve, in either parameter, are points like others. ∂P/∂x is exact; all other
-derivatives are differences at the guess, which Broyden's formula then keeps up.
+that turns of the curve, in either parameter, are points like others. ∂P/∂x is exact, and so are
+height and rate of a grazing by the state; all other derivatives are differences at the guess.
+Broyden's formula then keeps them up.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.bifurcations.conditions import Both, Condition
+from designer.bifurcations.conditions import DIFFERENCE, Both, Condition, MapSlopes
 from designer.bifurcations.flow_family import FlowPlane
 from designer.bifurcations.orbit_curve import CONVERGED, STALLED, MapImage, map_image
 from designer.dynamics.flow import Flow
@@ -23,8 +24,6 @@ from designer.dynamics.orbit import Complex
 
 NEWTON = 14
 """Most iterations of the corrector."""
-DIFFERENCE = 3e-8
-"""In scaled units: step of the differences."""
 MOST_FLOWS = 8
 """Flows that are kept."""
 FARTHEST = 1.0
@@ -228,15 +227,14 @@ class ExtendedSystem:
         n, total = self.states, len(z)
         rows = np.zeros((len(value.gap), total))
         rows[:n, :n] = value.jacobian - np.eye(n)
-        for i in range(total):
+        image = MapSlopes(self.scale[:n], value.jacobian, lambda d: self._change(z, value, d))
+        slopes = condition.slopes(self.flow(z), z[:n], z[n:-2], image)
+        if slopes is None:
+            return None
+        rows[n:, : total - 2] = slopes
+        for i in (total - 2, total - 1):
             beside = z.copy()
             beside[i] += DIFFERENCE * self.scale[i]
-            if i < total - 2:
-                held = self._held(beside, condition)
-                if held is None:
-                    return None
-                rows[n:, i] = (held - value.gap[n:]) / DIFFERENCE
-                continue
             sign = 1.0
             if not self.plane.contains(float(beside[-2]), float(beside[-1])):
                 sign = -1.0
@@ -247,15 +245,12 @@ class ExtendedSystem:
             rows[:, i] = (after.gap - value.gap) / (sign * DIFFERENCE)
         return rows
 
-    def _held(self, z: Array, condition: Condition) -> Array | None:
-        """The condition alone at z; the map is run only where it asks for the Jacobian."""
-
-        def jacobian() -> Array | None:
-            image = self.image(z)
-            return None if image is None else image.jacobian
-
-        n = self.states
-        return condition.residual(self.flow(z), z[:n], z[n:-2], jacobian)
+    def _change(self, z: Array, value: _Value, direction: Array) -> Array | None:
+        """Derivative of the scaled Jacobian at z along a direction of the scaled states."""
+        beside, n = z.copy(), self.states
+        beside[:n] += DIFFERENCE * self.scale[:n] * direction
+        image = self.image(beside)
+        return None if image is None else (image.jacobian - value.jacobian) / DIFFERENCE
 
 
 def hermite(a: CurvePoint, b: CurvePoint, share: float, scale: Array) -> tuple[Array, Array]:

@@ -14,7 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.bifurcations.codimension_two import ENDS, CodimensionTwo, grazing_near, locate
+from designer.bifurcations.codimension_two import (
+    ENDS,
+    CodimensionTwo,
+    grazing_near,
+    locate,
+    watched,
+)
 from designer.bifurcations.conditions import Condition, Multiplier, MultiplierPair, grazings
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem, hermite
 from designer.bifurcations.flow_family import FlowPlane
@@ -188,6 +194,7 @@ def _follow(
 ) -> _Followed:
     """From the origin on in the direction of its tangent."""
     points, met = [origin], list[CodimensionTwo]()
+    current = watched(system, origin)
     step, end = FIRST, "most points"
     while len(points) < POINTS:
         new = _step(system, points, step)
@@ -205,7 +212,8 @@ def _follow(
                 break
             continue
         new, end_here = (new, "") if edge is None else edge
-        here = locate(system, points[-1], new, len(points) - 1)
+        before, current = current, watched(system, new)
+        here = locate(system, before, current, len(points) - 1)
         last = next((c for c in here if c.name in ENDS or _pair_ends(c)), None)
         if last is not None:
             met += here[: here.index(last) + 1]

@@ -21,6 +21,8 @@ FEWEST, MOST = 32, 20_000
 """Nodes in a drive period from which the motion is taken on."""
 TERMS = 24
 """Of the Taylor series from a node on: beyond rounding for a step of the general kernel."""
+ORDERS = np.arange(float(TERMS))
+"""Of those terms."""
 
 
 @dataclass(frozen=True)
@@ -41,22 +43,33 @@ def height(flow: Flow, x: Array, n: int, touch: StopTouch, phase: float) -> Arra
 
     None where the flow does not come to an end.
     """
+    found = height_along(flow, x, n, touch, phase, np.zeros((len(x), 0)))
+    return None if found is None else found[:, 0]
+
+
+def height_along(
+    flow: Flow, x: Array, n: int, touch: StopTouch, phase: float, tangent: Array
+) -> Array | None:
+    """(3, 1 + k) the same, and its rates of change along k tangent vectors (states, k) at x."""
     period = flow.drive.period
     nodes = _nodes(flow, touch)
     place = (phase % n) * nodes
     k = int(place)
-    state = x
+    state, along = x, tangent
     if k:
-        run = flow.run(x, -(-k // nodes), points=nodes, stretches=k)
+        vectors = tangent if tangent.size else None
+        run = flow.run(x, -(-k // nodes), points=nodes, stretches=k, tangent=vectors)
         if run.status is not FlowStatus.DONE:
             return None
-        state = run.strobes[-1]
+        state, along = run.strobes[-1], along if run.tangent is None else run.tangent
     angle = 2.0 * np.pi * k / nodes
     drive = flow.drive
     u = drive.amplitude * float(np.sin(angle)) + drive.offset
     mode = _mode(flow.system, state, u, touch)
     row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive)
-    z = np.concatenate([state, [np.sin(angle), np.cos(angle), 1.0]])
+    z = np.zeros((len(x) + 3, 1 + along.shape[1]))
+    z[:, 0] = np.concatenate([state, [np.sin(angle), np.cos(angle), 1.0]])
+    z[: len(x), 1:] = along
     return _derivatives(row, augmented(mode, drive), z, (place - k) * period / nodes, period)
 
 
@@ -82,11 +95,12 @@ def _mode(system: PiecewiseLinearSystem, x: Array, u: float, touch: StopTouch) -
 
 
 def _derivatives(row: Array, M: Array, z: Array, time: float, period: float) -> Array:
-    """(3,) value and first two derivatives, by time over the period, of row · exp(M time) z."""
-    terms = np.empty(TERMS)
+    """(3, k) value and first two derivatives, by time over the period, of row · exp(M time) z."""
+    terms = np.empty((TERMS, z.shape[1]))
     for k in range(TERMS):
         terms[k] = row @ z
         z = M @ z * (period / (k + 1))
-    series = np.polynomial.Polynomial(terms)
-    share = time / period
-    return np.array([series(share), series.deriv()(share), series.deriv(2)(share)])
+    powers = (time / period) ** np.arange(TERMS)
+    first = terms[1:] * ORDERS[1:, None]
+    second = first[1:] * ORDERS[1:-1, None]
+    return np.stack([powers @ terms, powers[:-1] @ first, powers[:-2] @ second])

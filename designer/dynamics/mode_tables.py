@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import matrix_balance
@@ -35,8 +36,15 @@ def augmented_row(row: Array, drive: Drive) -> Array:
 
 def step_length(A: Array, omega: float) -> float:
     """Length of a step in a mode with the state matrix A."""
+    return STEP / max(_balanced_norm(A.tobytes(), len(A)), omega)
+
+
+@lru_cache(maxsize=256)
+def _balanced_norm(entries: bytes, size: int) -> float:
+    """Of a state matrix, after balancing; kept, for flows along a curve differ in the drive."""
+    A = np.frombuffer(entries).reshape(size, size)
     balanced, _ = matrix_balance(A, permute=False)
-    return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
+    return float(np.linalg.norm(balanced, 2))
 
 
 def fill(

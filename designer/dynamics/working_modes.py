@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,8 +17,9 @@ MOST_STATES = 12
 processor."""
 
 
+@lru_cache(maxsize=32)
 def anchors(points: int) -> Array:
-    """(points, 2) sine and cosine of the drive at the start of each stretch of a period."""
+    """(points, 2) sine and cosine of the drive at the start of each stretch of a period; kept."""
     phases = 2.0 * np.pi * np.arange(points) / points
     return np.stack([np.sin(phases), np.cos(phases)], axis=1)
 

@@ -14,11 +14,20 @@ from scipy.optimize import fsolve
 from designer.base.arrays import Array
 from designer.bifurcations.border_curves import BorderCurve, read_curve
 from designer.bifurcations.branch_survey import Survey, survey
+from designer.bifurcations.conditions import (
+    Condition,
+    Grazing,
+    MapSlopes,
+    Multiplier,
+    MultiplierPair,
+)
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.extended_system import CurvePoint
 from designer.bifurcations.flow_family import Family, FlowPlane
+from designer.bifurcations.orbit_curve import map_image
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
+from designer.bifurcations.touch import StopTouch
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -89,6 +98,42 @@ def test_torus_curve_and_its_resonances_where_damping_vanishes() -> None:
     assert np.abs(followed.values[:, 0]).max() < 1e-9
     met = {c.name: c.values[1] for c in followed.codimension_two}
     assert met == pytest.approx({"1:3 resonance": 3.0, "1:4 resonance": 4.0}, abs=1e-8)
+
+
+@pytest.mark.parametrize("kind", [PointKind.FOLD, PointKind.TORUS, PointKind.GRAZING])
+def test_slopes_of_a_condition_are_those_of_its_differences(kind: PointKind) -> None:
+    """By state and phase, at a state that is on no orbit."""
+    flow = ModelSubject(PAPER).plane("omega", "b").build(0.85, B)
+    x, extra = np.array([0.03, -0.5, 0.1, -0.2]), np.zeros(0)
+    scale = np.array([0.5, 0.4, 0.6, 0.3])
+
+    def jacobian(at: Array) -> Array:
+        image = map_image(flow, at, 1, symmetric=False)
+        assert image is not None
+        return np.asarray(image.jacobian * scale / scale[:, None])
+
+    def change(direction: Array) -> Array:
+        step = 3e-8 * scale * direction
+        return np.asarray((jacobian(x + step) - jacobian(x - step)) / 6e-8)
+
+    condition: Condition = Multiplier.at(PointKind.FOLD, jacobian(x) + 0.1 * np.eye(4))
+    if kind is PointKind.TORUS:
+        condition = MultiplierPair.at(jacobian(x))
+    if kind is PointKind.GRAZING:
+        condition, extra = Grazing(StopTouch(0, 1, True), 1, 0.5), np.array([0.31])
+    slopes = condition.slopes(flow, x, extra, MapSlopes(scale, jacobian(x), change))
+    assert slopes is not None
+    steps = np.diag(np.concatenate([scale, np.ones(len(extra))])) * 1e-5
+    for column, step in zip(slopes.T, steps, strict=True):
+        ends = []
+        for sign in (1.0, -1.0):
+            at = x + sign * step[:4]
+            ends.append(
+                condition.residual(flow, at, extra + sign * step[4:], lambda at=at: jacobian(at))  # type: ignore[misc]
+            )
+        assert ends[0] is not None
+        assert ends[1] is not None
+        assert column == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-4)
 
 
 @pytest.mark.slow
