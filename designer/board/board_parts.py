@@ -88,7 +88,7 @@ def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
     bare = replace(circuit, fittings=())
     spec = choice.spec
     parts: list[Fitting] = [*_spare(bare, catalog), *_supply(bare, choice, catalog)]
-    parts.append(Connector("J2", (bare.generator.net, GROUND), "generator"))
+    parts.append(Connector("J2", (bare.generator.net, GROUND), "generator", _series(choice)))
     parts += _probes(bare, choice)
     if spec.input_protection:
         parts += _protection(bare, choice, catalog)
@@ -210,7 +210,7 @@ def _supply(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator
 
 
 def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
-    """A resistor for each output, its pad behind it, and one connector for all."""
+    """A resistor for each output, its pad behind it, and the connectors."""
     behind = []
     for i, net in enumerate(probed_nets(circuit), start=1):
         out = f"{net}_out"
@@ -221,8 +221,17 @@ def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
             yield TestPoint(f"TP{i}", out, f"probe of {net}")
     if choice.spec.test_points:
         yield TestPoint(f"TP{len(behind) + 1}", GROUND, "ground of the probes")
+    if series := _series(choice):
+        for number, (net, out) in enumerate(zip(probed_nets(circuit), behind, strict=True), 3):
+            yield Connector(f"J{number}", (out, GROUND), f"output {net}", series)
+        return
     paired = tuple(net for out in behind for net in (out, GROUND))
     yield Connector("J3", paired if len(paired) <= WAYS else (*behind, GROUND), "outputs")
+
+
+def _series(choice: BoardChoice) -> str:
+    """The series of the jacks; "" for rows of pins."""
+    return "" if choice.spec.connectors == "pins" else choice.spec.connectors
 
 
 def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Diode]:

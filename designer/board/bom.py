@@ -39,6 +39,7 @@ KINDS = (
     "op-amp",
     "trimmer",
     "connector",
+    "jack",
     "test point",
 )
 """Kinds of components in the order of the bill."""

@@ -62,8 +62,8 @@ class Component:
     reference: str
     """Its designator on the board."""
     kind: str
-    """"resistor", "capacitor", "op-amp", "diode", "reference", "connector", "test point",
-    "trimmer"."""
+    """"resistor", "capacitor", "op-amp", "diode", "reference", "connector", "jack",
+    "test point", "trimmer"."""
     value: str
     """Its value, as people write it."""
     quantity: float | None
@@ -218,7 +218,7 @@ class _Lister:
         if isinstance(part, SupplyCapacitor):
             return self.passive(part, "capacitor", 1.0, "supply")
         if isinstance(part, Connector):
-            return self.connector(part)
+            return self.jack(part) if part.series else self.connector(part)
         if isinstance(part, TestPoint):
             return self.component(part, "test point", part.net, TEST_POINT, None)
         return self.entry(part)
@@ -268,6 +268,13 @@ class _Lister:
         bought = Bought(sold.manufacturer, sold.number(ways), rated(sold.rating), sold.price)
         value, words = f"{ways} ways", f"pin header, {ways} ways"
         return self.component(part, "connector", value, sold.place(ways), bought, description=words)
+
+    def jack(self, part: Connector) -> Component:
+        sold = self.catalog.coaxial_jack(part.series)
+        bought = Bought(sold.manufacturer, sold.part_number, rated(sold.rating), sold.price)
+        value = f"{sold.series.upper()} jack"
+        words = f"{value}, for a coaxial cable"
+        return self.component(part, "jack", value, sold.footprint, bought, description=words)
 
     def package(self, package: Package) -> Component:
         opamp, sections = package.opamp, package.sections

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 from designer.base.errors import InputError
 from designer.board.kicad_names import footprint_name
@@ -54,6 +55,8 @@ class FootprintShape:
     """Whether it is soldered; False for a bare pad, which nothing is soldered to."""
     library: str = ""
     """Library of KiCad that has a body of this name; "" where none is known."""
+    plug: float = 0.0
+    """Width of what is plugged in, beyond the part's own [mm]; 0 where nothing is."""
 
     @property
     def through_hole(self) -> bool:
@@ -89,10 +92,16 @@ class FootprintShape:
 
     @property
     def courtyard(self) -> tuple[float, float, float, float]:
-        """What nothing else may stand in: 0.25 mm round it, 0.5 mm round holes and marks."""
-        room = 0.5 if self.through_hole or self.mark else 0.25
+        """What nothing else may stand in: 0.25 mm round it and its plug, 0.5 mm round holes and
+        marks."""
+        room, half = 0.5 if self.through_hole or self.mark else 0.25, self.plug / 2.0
         left, top, right, bottom = self.extent
-        return left - room, top - room, right + room, bottom + room
+        return (
+            min(left, -half) - room,
+            min(top, -half) - room,
+            max(right, half) + room,
+            max(bottom, half) + room,
+        )
 
 
 TERMINALS = {
@@ -110,6 +119,14 @@ SMALL_DIODES = {"123": (3.7, 0.45, 0.6, (2.7, 1.6)), "323": (2.5, 0.3, 0.35, (1.
 LYING_DIODES = {"35_SOD27": ((4.0, 2.0), 1.6, 0.8), "41_SOD81": ((5.2, 2.7), 2.2, 1.1)}
 """DO-35 and DO-41: length and width of the body, pad, hole. Leads of the DO-41 are 0.71 mm to
 0.86 mm thick, its body is up to 5.21 mm by 2.72 mm (JEDEC DO-204AL)."""
+
+SQUARE_JACKS = {
+    "SMA_Wurth_60312002114503": (2.54, (2.05, 1.5), (2.25, 1.7), 7.0, 9.3),
+    "BNC_TEConnectivity_1478204": (3.175, (2.0, 1.27), (2.6, 1.524), 9.7, 14.6),
+}
+"""Upright jacks: from the middle to the legs on either axis, pad and hole of the inner conductor
+and of a leg, width of the body; of the plug, the nut of an SMA over its corners (8 mm across flats)
+and the ring of a BNC."""
 
 
 def _chip(name: str, code: str) -> FootprintShape | None:
@@ -191,6 +208,19 @@ def _header(name: str, count: str, pitch: str) -> FootprintShape:
     """A column of holes for square pins of 0.64 mm."""
     pins, step = int(count), float(pitch)
     return FootprintShape(name, _row(pins, (0.0, step), (1.7, 1.7), 1.0), (step, pins * step), True)
+
+
+def _square_jack(name: str, case: str) -> FootprintShape | None:
+    """The inner conductor in the middle of four legs, which are one pin."""
+    if case not in SQUARE_JACKS:
+        return None
+    leg, inner, outer, body, plug = SQUARE_JACKS[case]
+    legs = product((-leg, leg), repeat=2)
+    pads = (
+        PadShape("1", 0.0, 0.0, inner[0], *inner),
+        *(PadShape("2", x, y, outer[0], *outer) for x, y in legs),
+    )
+    return FootprintShape(name, pads, (body, body), plug=plug)
 
 
 def _bare_pad(name: str, diameter: str) -> FootprintShape:
@@ -285,6 +315,7 @@ _RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
     "CP_Radial_D5.0mm_P2.00mm": (rf"CP?_Radial_D{_N}mm_P{_N}mm", _can),
     "TO-92_Inline": ("TO-92_Inline", _transistor_outline),
     "PinHeader_1x03_P2.54mm_Vertical": (rf"PinHeader_1x(\d+)_P{_N}mm_Vertical", _header),
+    "SMA_Wurth_60312002114503_Vertical": (r"((?:SMA|BNC)_\w+)_Vertical", _square_jack),
     "TestPoint_Pad_D1.5mm": (rf"TestPoint_Pad_D{_N}mm", _bare_pad),
     "MountingHole_3.2mm_M3": (rf"MountingHole_{_N}mm_M\d+", _mounting_hole),
     "Potentiometer_Bourns_3296W_Vertical": ("Potentiometer_Bourns_3296W_Vertical", _bourns_3296w),

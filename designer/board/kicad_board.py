@@ -125,7 +125,7 @@ def revision(entries: Sequence[Entry]) -> str:
 
 
 def _texts(project: str, title: str, placement: Placement) -> Iterator[Expression]:
-    """The title between the lower screws, and what stands at the pins of connectors."""
+    """The title between the lower screws, and what stands at connectors."""
     box = placement.outline
     most = int((box.width - 4.0 * SCREW) / LETTER)
     at = 0.5 * (box.left + box.right), box.bottom - SCREW
@@ -137,6 +137,9 @@ def _texts(project: str, title: str, placement: Placement) -> Iterator[Expressio
             name = spot.component.reference
             place = right, spot.pad(pad.number)[1]
             yield _text(label, place, (project, name, pad.number), justify="left")
+        if spot.caption:
+            below = spot.x, spot.courtyard.bottom + 0.25 + TEXT / 2.0
+            yield _text(spot.caption, below, (project, spot.component.reference, "caption"))
 
 
 def _text(

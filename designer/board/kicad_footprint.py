@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 
@@ -31,7 +32,7 @@ def module(shape: FootprintShape) -> Expression:
         *_texts(shape, "REF**", shape.name, ids),
         _attributes(shape),
         *_drawing(shape, ids),
-        *(_pad(pad, 0, ids) for pad in shape.pads),
+        *(_pad(pad, 0, own) for pad, own in _with_ids(shape, ids)),
         *lists(embedded_fonts=False),
         *_body(shape),
     )
@@ -74,8 +75,8 @@ def on_board(
         ),
         *_drawing(shape, ids),
         *(
-            _pad(pad, spot.angle, ids, pins.get(pad.number), names.get(pad.number, ""), nets)
-            for pad in shape.pads
+            _pad(pad, spot.angle, own, pins.get(pad.number), names.get(pad.number, ""), nets)
+            for pad, own in _with_ids(shape, ids)
         ),
         *lists(embedded_fonts=False),
         *_body(shape),
@@ -268,6 +269,17 @@ def _box(
     )
 
 
+def _with_ids(
+    shape: FootprintShape, ids: tuple[str, ...]
+) -> Iterator[tuple[PadShape, tuple[str, ...]]]:
+    """Each pad with what its id is made from; pads of one number are told apart by their order."""
+    earlier: Counter[str] = Counter()
+    for pad in shape.pads:
+        again = earlier[pad.number]
+        yield pad, (*ids, "pad", pad.number, *([str(again)] if again else []))
+        earlier[pad.number] += 1
+
+
 def _pad(
     pad: PadShape,
     angle: int,
@@ -299,7 +311,7 @@ def _pad(
         net=(nets[net], net) if nets is not None and net else None,
         pinfunction=pin.name if pin is not None and placed else None,
         pintype=pin.electrical if pin is not None and placed else None,
-        uuid=identifier(*ids, "pad", pad.number),
+        uuid=identifier(*ids),
     )
 
 

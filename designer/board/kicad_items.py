@@ -100,6 +100,8 @@ def shape(component: Component) -> SymbolShape:
         return symbols.opamp(_named("", component), sections, (supply["V+"], supply["V-"]))
     if kind == "test point":
         return symbols.probe_pad()
+    if kind == "jack":
+        return symbols.coaxial_jack(_named("", component), numbers["signal"], numbers["shell"])
     pins = [(pin.number, pin.name, pin.electrical) for pin in component.pins]
     if kind == "trimmer":  # between the rails: the higher one above, where its symbol points
         pins.sort(key=lambda pin: ("high", "wiper", "low").index(pin[1]))

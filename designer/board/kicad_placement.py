@@ -1,7 +1,7 @@
 """Where the components stand on the board: a block about each op-amp package.
 
 The parts of a section stand at its pins, decoupling at the supply pins. What comes in is left of
-the blocks, what goes out is right of them. Millimetres, y downwards.
+the blocks, what goes out is right of them, coaxial jacks outermost. Millimetres, y downwards.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ BAND = 8.0
 SCREW = 4.0
 """From the middle of a mounting hole to both edges [mm]."""
 MOUNTING_HOLE = "MountingHole:MountingHole_3.2mm_M3"
+APART = 2.0
+"""Least room between jacks, so that the name below one is not read with the next [mm]."""
 PER_COLUMN = 12
 """Amplifiers whose packages stand below one another: those of the paper's circuit."""
 ORIGIN = (25.0, 25.0)
@@ -62,7 +64,12 @@ class Placement:
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     """The board; InputError for a footprint that is not known here."""
     spots = {
-        c.reference: PlacedComponent(c, footprint(c.footprint), pin_labels=_pin_labels(c, circuit))
+        c.reference: PlacedComponent(
+            c,
+            footprint(c.footprint),
+            pin_labels=_names_of_pins(c, circuit) if c.kind == "connector" else (),
+            caption=_names_of_pins(c, circuit)[0] if c.kind == "jack" else "",
+        )
         for c in components
     }
     owner = _owners(circuit, components)
@@ -78,8 +85,14 @@ def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
         blocks.append(block(spots.pop(package.reference), near, mine))
     middle = [_stack(column) for column in _columns(blocks, len(circuit.sections))]
     height = max((bounds(column).height for column in middle), default=40.0)
-    incoming, outgoing = _sides(circuit, spots.values())
-    columns = [_strip(incoming, height), *middle, _strip(outgoing, height)]
+    (inlets, incoming), (outlets, outgoing) = map(_jacks_apart, _sides(circuit, spots.values()))
+    columns = [
+        _spread(inlets, height),
+        _strip(incoming, height),
+        *middle,
+        _strip(outgoing, height),
+        _spread(outlets, height),
+    ]
     out: list[PlacedComponent] = []
     x = 0.0
     for column in filter(None, columns):
@@ -131,10 +144,8 @@ def _hole(reference: str) -> Component:
     )
 
 
-def _pin_labels(component: Component, circuit: Circuit) -> tuple[str, ...]:
+def _names_of_pins(component: Component, circuit: Circuit) -> tuple[str, ...]:
     """What is written at the pins of a connector."""
-    if component.kind != "connector":
-        return ()
     volts = f"{circuit.supply:g} V"
     names = {
         GROUND: "0 V",
@@ -221,6 +232,26 @@ def _strip(spots: Sequence[PlacedComponent], height: float) -> list[PlacedCompon
         box = bounds(column)
         out += [s.moved(x, 0.0) for s in column]
         x += box.width + ROOM
+    return out
+
+
+def _jacks_apart(
+    spots: Sequence[PlacedComponent],
+) -> tuple[list[PlacedComponent], list[PlacedComponent]]:
+    """Coaxial jacks, which stand at the edge, and all others."""
+    jacks = [s for s in spots if s.component.kind == "jack"]
+    return jacks, [s for s in spots if s.component.kind != "jack"]
+
+
+def _spread(spots: Sequence[PlacedComponent], height: float) -> list[PlacedComponent]:
+    """One column, evenly over the height; higher than that where they need more."""
+    free = height - sum(s.box.height for s in spots)
+    gap = max(APART, free / max(len(spots) - 1, 1))
+    out: list[PlacedComponent] = []
+    y = 0.0
+    for s in spots:
+        out.append(s.moved(0.0, y - s.box.top))
+        y += s.box.height + gap
     return out
 
 

@@ -164,6 +164,20 @@ def row(
     )
 
 
+def coaxial_jack(name: str, signal: str, shell: str) -> SymbolShape:
+    """A jack with its two pins below one another on the left; signal, shell : pin numbers."""
+    turns = (math.pi * k / 8.0 for k in range(17))
+    ring = tuple((1.0 + 1.6 * round(math.cos(a), 3), 1.6 * round(math.sin(a), 3)) for a in turns)
+    inner = ((-1.0, 0.0), (1.0, 0.0))
+    outer = ((-1.0, -4.0), (1.0, -4.0), (1.0, -1.6))
+    pins = (
+        ShapePin(signal, "signal", "passive", -REACH, 0, 0, 2),
+        ShapePin(shell, "shell", "passive", -REACH, -4, 0, 2),
+    )
+    unit = SymbolUnit(pins, (ring, inner, outer), filled=False)
+    return SymbolShape(name, "J", (unit,), ((4.8, 1.0), (7.6, -1.0)), numbers=True)
+
+
 def probe_pad() -> SymbolShape:
     ring = ((0.0, 0.0), (0.0, 1.0), (-0.6, 1.6), (0.0, 2.2), (0.6, 1.6), (0.0, 1.0))
     pin = ShapePin("1", "1", "passive", 0, 0, 90, 0)

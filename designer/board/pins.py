@@ -114,6 +114,9 @@ def pins(part: Fitting, circuit: Circuit, catalog: Catalog) -> tuple[Pin, ...]:
     if isinstance(part, Reference):
         reference = catalog.reference(part.model)
         return _named(reference.pins, {"cathode": part.cathode, "anode": part.anode})
+    if isinstance(part, Connector) and part.series:
+        jack = catalog.coaxial_jack(part.series)
+        return _named(jack.pins, dict(zip(("signal", "shell"), part.ways, strict=True)))
     if isinstance(part, Connector):
         numbered = enumerate(part.ways, start=1)
         return tuple(Pin(str(i), str(i), net) for i, net in numbered)

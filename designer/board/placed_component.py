@@ -37,6 +37,8 @@ class PlacedComponent:
     """Where its reference stands, as it is seen."""
     pin_labels: tuple[str, ...] = ()
     """What stands right of its pads, in their order; nothing of most."""
+    caption: str = ""
+    """What stands below it; nothing of most."""
 
     @property
     def courtyard(self) -> PlacedBox:
@@ -61,11 +63,16 @@ class PlacedComponent:
         """Its courtyard with the room for its reference."""
         box, half = self.courtyard, LETTER * len(self.component.reference) / 2.0
         x, y = self.label_at
+        below = LETTER * len(self.caption) / 2.0
         return PlacedBox(
-            min(box.left, self.x + x - half),
+            min(box.left, self.x + x - half, self.x - below),
             min(box.top, self.y + y - TEXT / 2.0 - 0.15),
-            max(box.right + LETTER * max(map(len, self.pin_labels), default=0), self.x + x + half),
-            max(box.bottom, self.y + y + TEXT / 2.0),
+            max(
+                box.right + LETTER * max(map(len, self.pin_labels), default=0),
+                self.x + x + half,
+                self.x + below,
+            ),
+            max(box.bottom + (0.25 + TEXT) * bool(self.caption), self.y + y + TEXT / 2.0),
         )
 
     def pad(self, number: str) -> tuple[float, float]:

@@ -8,6 +8,9 @@ from .catalog import (
     Catalog as Catalog,
     load_catalog as load_catalog,
 )
+from .coaxial_jack import (
+    CoaxialJack as CoaxialJack,
+)
 from .design_rule import (
     FAIL as FAIL,
     NOT_RUN as NOT_RUN,

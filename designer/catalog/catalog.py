@@ -21,6 +21,7 @@ from designer.base.eseries import SERIES, series_values
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
 from designer.catalog.build_cost import BuildCost
+from designer.catalog.coaxial_jack import CoaxialJack
 from designer.catalog.entries import (
     FORBIDDEN,
     UNITS,
@@ -72,6 +73,8 @@ class Catalog:
     """Diodes against a supply of the wrong polarity."""
     headers: tuple[Header, ...] = ()
     """Pin headers that can be bought."""
+    coaxial_jacks: tuple[CoaxialJack, ...] = ()
+    """Coaxial jacks that can be bought."""
     prices: tuple[Price, ...] = ()
     """What a part of each price class counts with."""
     build_costs: tuple[BuildCost, ...] = ()
@@ -256,6 +259,16 @@ class Catalog:
         most = max((entry.ways[1] for entry in self.headers), default=0)
         raise InputError(None, "header", ways, f"a number of ways up to {most}")
 
+    def coaxial_jack(self, series: str) -> CoaxialJack:
+        """The first jack of a series, "sma" or "bnc"; InputError where there is none."""
+        for entry in self.coaxial_jacks:
+            if entry.series == series:
+                return entry
+        listed = ", ".join(sorted({entry.series for entry in self.coaxial_jacks})) or "none"
+        raise InputError(
+            None, "board.connectors", series, f'"pins", or a jack of the catalogue: {listed}'
+        )
+
     def _cased(self, entry: _CasedT, sort: str, others: Sequence[_CasedT]) -> _CasedT:
         """The entry in the first of its cases that the board takes.
 
@@ -343,6 +356,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         trimmers=of(TrimmerEntry),
         supply_diodes=of(SupplyDiodeEntry),
         headers=of(Header),
+        coaxial_jacks=of(CoaxialJack),
         prices=of(Price),
         build_costs=of(BuildCost),
         stock=read_stock(folders, STOCK),

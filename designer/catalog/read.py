@@ -36,6 +36,7 @@ from designer.base.schema import (
 )
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.build_cost import BuildCost
+from designer.catalog.coaxial_jack import CoaxialJack
 from designer.catalog.entries import (
     UNITS,
     DiodeEntry,
@@ -52,7 +53,7 @@ from designer.catalog.supply_diode import SupplyDiodeEntry
 
 Entry = (
     PartFamily | OpAmp | DiodeEntry | ReferenceEntry | SupplyDiodeEntry | TrimmerEntry | Header
-    | Price | BuildCost
+    | CoaxialJack | Price | BuildCost
 )  # fmt: skip
 
 ENVIRONMENT = "DESIGNER_CATALOGS"
@@ -255,6 +256,7 @@ class _File(FileTable):
     supply_diode: tuple[SupplyDiodeEntry, ...] = ()
     trimmer: tuple[TrimmerEntry, ...] = ()
     header: tuple[Header, ...] = ()
+    coaxial_jack: tuple[CoaxialJack, ...] = ()
     price: tuple[Price, ...] = ()
     build_cost: tuple[BuildCost, ...] = ()
 
@@ -263,7 +265,7 @@ class _File(FileTable):
         families = (table.family for table in self.family)
         others: tuple[tuple[Entry, ...], ...] = (
             self.opamp, self.diode, self.reference, self.supply_diode, self.trimmer, self.header,
-            self.price, self.build_cost,
+            self.coaxial_jack, self.price, self.build_cost,
         )  # fmt: skip
         return (*families, *(entry for entries in others for entry in entries))
 

@@ -68,14 +68,16 @@ class SupplyDiode:
 
 @dataclass(frozen=True)
 class Connector:
-    """A pin header."""
+    """A row of pins, or a coaxial jack."""
 
     name: str
     """Its name in the circuit."""
     ways: tuple[str, ...]
-    """Nets of pins 1, 2, …."""
+    """Nets of pins 1, 2, …; of a jack the signal's and the shell's."""
     role: str
     """What it is for, in words."""
+    series: str = ""
+    """The series of a coaxial jack, "sma" or "bnc"; "" of a row of pins."""
     views: View = View.FITTED
     """Where it stands: simulated, on the board, bought."""
 

@@ -59,6 +59,8 @@ def catalog(entries: Catalog) -> None:
             for o in entries.opamps
         ),
     )
-    for kind in ("Diodes", "References", "Supply diodes", "Trimmers", "Headers"):
+    for kind in (
+        "Diodes", "References", "Supply diodes", "Trimmers", "Headers", "Coaxial jacks",
+    ):  # fmt: skip
         names = [entry.name for entry in getattr(entries, kind.lower().replace(" ", "_"))]
         say(f"{kind}: {', '.join(names) or 'none'}")

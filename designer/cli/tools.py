@@ -30,6 +30,7 @@ def catalog(
     if check is None:
         kinds = (
             "opamps", "families", "diodes", "references", "supply_diodes", "trimmers", "headers",
+            "coaxial_jacks",
         )  # fmt: skip
         names = {kind: [entry.name for entry in getattr(entries, kind)] for kind in kinds}
         answer = {"format": 1, **names, "hash": entries.hash}

@@ -20,6 +20,7 @@ from designer.catalog.entries import Mounting, PartChoice
 from designer.model.circuit_table import CircuitSpec
 
 Trim = Literal["none", "unfitted", "fitted"]
+Connectors = Literal["pins", "sma", "bnc"]
 
 
 def _layout() -> Accepts:
@@ -61,6 +62,8 @@ class BoardSpec(FileTable):
     ] = ""
     """The diode between each pin of the supply and its rail, by its name in the catalogue; "" for
     none."""
+    connectors: Annotated[Connectors, choice("pins", "sma", "bnc")] = "pins"
+    """What generator and outputs are connected by: rows of pins, or a coaxial jack each."""
     bom: Annotated[
         tuple[str, ...], several('a list of layouts such as ["kicad", "jlcpcb"]', _layout())
     ] = ("kicad", "jlcpcb")

@@ -9,7 +9,7 @@ and reads.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -63,13 +63,14 @@ class _Pin:
     """A pad of a component, as a router has to reach it."""
 
     component: str
+    number: str
     pad: PlacedPad
     net: str
     layers: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        return f"{self.component}-{self.pad.number}"
+        return f"{self.component}-{self.number}"
 
     @property
     def shape(self) -> tuple[Point, ...]:
@@ -137,14 +138,20 @@ def with_session(text: str, session: Path) -> str:
 
 
 def _pins(board: BoardFile, source: Expression, names: Sequence[str]) -> Iterator[_Pin]:
+    """Of pads of one number the second is "2@1", the third "2@2", as KiCad writes them."""
     for placed, item in zip(board.footprints, source.all("footprint"), strict=True):
+        earlier: Counter[str] = Counter()
         for pad, own in zip(placed.pads, item.all("pad"), strict=True):
             net = own.find("net")
             front, back = layers_of(own.get("layers").atoms)
             outer = (*names[:1][:front], *names[-1:][:back])
             layers = tuple(names) if front and back else outer
             if pad.number and layers:
-                yield _Pin(placed.reference, pad, "" if net is None else net.text(1), layers)
+                again = earlier[pad.number]
+                number = f"{pad.number}@{again}" if again else pad.number
+                name = "" if net is None else net.text(1)
+                yield _Pin(placed.reference, number, pad, name, layers)
+                earlier[pad.number] += 1
 
 
 def _structure(
@@ -201,7 +208,7 @@ def _library(
                 expression(
                     "pin",
                     word(padstacks[(pin.shape, pin.layers)]),
-                    pin.pad.number,
+                    pin.number,
                     *_um(pin.pad.at),
                 )
                 for pin in its

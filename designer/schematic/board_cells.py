@@ -24,6 +24,7 @@ from designer.schematic.sheet_drawing import (
     Inlet,
     Note,
     Placed,
+    Point,
     SheetCell,
     label_width,
     text_width,
@@ -43,7 +44,7 @@ def node_fittings(circuit: Circuit) -> tuple[Resistor | Diode, ...]:
 
 
 def probe_cells(circuit: Circuit, parts: SheetParts) -> Iterator[SheetCell]:
-    """The outputs with their resistors and their connector."""
+    """The outputs with their resistors and connectors."""
     at_nodes = node_fittings(circuit)
     fittings = [p for p in circuit.fittings if isinstance(p, Resistor) and p.name in parts.items]
     probes = [p for p in fittings if p not in at_nodes]
@@ -62,35 +63,42 @@ def supply_cells(circuit: Circuit, parts: SheetParts) -> Iterator[SheetCell]:
 
 
 def probe_cell(circuit: Circuit, probes: Sequence[Resistor], parts: SheetParts) -> SheetCell:
-    """Each output's resistor, its pad and its pin of the connector in one line."""
+    """Each output's resistor, its pad and its pin of a connector in one line, the connectors
+    below one another."""
     cell = SheetCell("outputs")
-    pads = {p.net: p for p in circuit.fittings if isinstance(p, TestPoint)}
+    pads = {p.net: parts.items[p.name] for p in circuit.fittings if isinstance(p, TestPoint)}
     behind = {p.b: p for p in probes}
-    connector = next(
-        p for p in circuit.fittings if isinstance(p, Connector) and set(p.ways) & set(behind)
-    )
     first = 2 + max(label_width(p.a) for p in probes)
     named = first + PART + max(map(label_width, behind))
-    pin = named + 10
-    placed = Placed(parts.items[connector.name], 1, pin + REACH, 0)
-    cell.symbols.append(placed)
-    for number, net in placed.item.pins.items():
-        at = placed.point(number)
-        probe = behind.get(net)
-        if probe is None:
-            cell.pin_end(placed, number, (at[0] - 2, at[1]))
+    y = 0
+    for connector in circuit.fittings:
+        if not isinstance(connector, Connector) or not set(connector.ways) & set(behind):
             continue
-        start = first, at[1]
-        row(cell, Chain(probe.a, net, (probe,)), start, first + PART - 2, parts)
-        cell.inlets.append(Inlet(probe.a, start, f"{probe.name}_in"))
-        cell.wire((first + PART - 2, at[1]), at)
-        cell.end(net, (first + PART - 2, at[1]), probe.name, left=False)
-        if net in pads:
-            pad = parts.items[pads[net].name]
-            cell.symbols.append(Placed(pad, 1, named + 1, at[1]))
-    cell.right = pin + REACH + 6
-    cell.bottom = max(y for _, y in map(placed.point, placed.item.pins)) + 5
+        placed = Placed(parts.items[connector.name], 1, named + 10 + REACH, y)
+        cell.symbols.append(placed)
+        for number, net in placed.item.pins.items():
+            x, y = placed.point(number)
+            if net not in behind:
+                cell.pin_end(placed, number, (x - 2, y))
+                continue
+            _probe_line(cell, behind[net], (first, y), x, parts)
+            if net in pads:
+                cell.symbols.append(Placed(pads[net], 1, named + 1, y))
+        cell.right = max(cell.right, x + REACH + (12 if connector.series else 6))
+        cell.bottom = y + 5
+        y += PART_ROW // 2
     return headed(cell, -6)
+
+
+def _probe_line(
+    cell: SheetCell, probe: Resistor, start: Point, pin: int, parts: SheetParts
+) -> None:
+    """An output, its resistor, and a wire to the connector's pin at x = ``pin``."""
+    end = start[0] + PART - 2, start[1]
+    row(cell, Chain(probe.a, probe.b, (probe,)), start, end[0], parts)
+    cell.inlets.append(Inlet(probe.a, start, f"{probe.name}_in"))
+    cell.wire(end, (pin, start[1]))
+    cell.end(probe.b, end, probe.name, left=False)
 
 
 def supply_cell(circuit: Circuit, parts: SheetParts) -> SheetCell:

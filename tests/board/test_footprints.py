@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ def catalogued() -> set[str]:
         CATALOG.opamps, CATALOG.diodes, CATALOG.references, CATALOG.supply_diodes, CATALOG.trimmers,
     ):  # fmt: skip
         found |= {case.footprint for entry in entries for case in (entry, *entry.cases)}
+    found |= {jack.footprint for jack in CATALOG.coaxial_jacks}
     return found | {CATALOG.header(ways).place(ways) for ways in range(2, 8)}
 
 
@@ -32,7 +34,8 @@ def catalogued() -> set[str]:
 def test_pads_are_apart_and_inside_the_courtyard(name: str) -> None:
     made = footprint(name)
     assert made.name == name.rpartition(":")[2]
-    assert len({pad.number for pad in made.pads}) == len(made.pads)
+    counts = Counter(pad.number for pad in made.pads)
+    assert {n for n, k in counts.items() if k > 1} == ({"2"} if made.plug else set())
     for a, b in itertools.combinations(made.pads, 2):
         across = abs(a.x - b.x) - (a.width + b.width) / 2.0
         down = abs(a.y - b.y) - (a.height + b.height) / 2.0
@@ -123,6 +126,6 @@ def test_bodies_stand_on_their_pads_as_in_kicads_libraries(name: str) -> None:
     assert kicads.get("offset").get("xyz").atoms == ("0", "0", "0")
     for pad in theirs.all("pad"):
         if pad.text(0):
-            at = pad.get("at")
-            found = pins(shape)[pad.text(0)]
-            assert found == pytest.approx((at.number(0) + x, at.number(1) - y), abs=0.15)
+            place = pad.get("at").number(0) + x, pad.get("at").number(1) - y
+            ours = [(p.x, p.y) for p in shape.pads if p.number == pad.text(0)]
+            assert any(place == pytest.approx(own, abs=0.15) for own in ours), place

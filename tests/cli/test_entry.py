@@ -428,7 +428,10 @@ def test_catalog(capfd: pytest.CaptureFixture[str]) -> None:
     said = capfd.readouterr()
     answer = _strict(said.out)
     assert "TL074C" in answer["opamps"]
-    kinds = {"opamps", "families", "diodes", "references", "supply_diodes", "trimmers", "headers"}
+    kinds = {
+        "opamps", "families", "diodes", "references", "supply_diodes", "trimmers", "headers",
+        "coaxial_jacks",
+    }  # fmt: skip
     assert set(answer) == {"format", "hash"} | kinds
     assert "Bourns 3296W 10 kΩ" in answer["trimmers"]
     assert all(answer[kind] for kind in kinds)
@@ -436,7 +439,8 @@ def test_catalog(capfd: pytest.CaptureFixture[str]) -> None:
     assert entry.status(["catalog"]) == 0
     said = capfd.readouterr()
     assert said.out == ""
-    for name in ("TL074C", *answer["supply_diodes"], *answer["trimmers"], *answer["headers"]):
+    listed = [*answer["supply_diodes"], *answer["trimmers"], *answer["headers"]]
+    for name in ("TL074C", *listed, *answer["coaxial_jacks"]):
         assert name in said.err
 
 

@@ -16,7 +16,7 @@ from designer.board.kicad_rules import board_rules, rules_text
 from designer.catalog.entries import Mounting
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import Circuit, Excitation
-from designer.model.board_table import BoardChoice, BoardSpec
+from designer.model.board_table import BoardChoice, BoardSpec, Connectors
 from designer.schematic.kicad_project import Project, files
 from designer.spice.deck import SolverSettings
 from tests.base.test_views import CIRCUITS
@@ -26,12 +26,16 @@ RUN = FirstRun(Excitation(300.0, 1.0), SolverSettings("trap", 1e-6), 0.01, np.ze
 CASES: dict[str, tuple[str, Mounting]] = {
     **{name: (name, "mixed") for name in CIRCUITS},
     "protected": ("paper", "mixed"),
+    "SMA jacks": ("paper", "mixed"),
+    "BNC jacks": ("rectifier", "mixed"),
     "through-hole": ("rectifier", "tht"),
     "surface": ("rectifier", "smd"),
     "duals on the surface": ("duals", "smd"),
     "singles on the surface": ("singles", "smd"),
 }
 """Circuit and mounting."""
+JACKS: dict[str, Connectors] = {"SMA jacks": "sma", "BNC jacks": "bnc"}
+"""Cases with coaxial jacks in the place of pins."""
 PROTECTED = ("surface", "protected", "through-hole")
 """Cases with a diode in each rail; the others are connected straight to it."""
 
@@ -42,6 +46,7 @@ def project(
     title: str = "a board",
     dc_trim: str = "fitted",
     reverse_protection: str = "",
+    connectors: Connectors = "pins",
 ) -> Project:
     """The project of a circuit with everything that its board needs."""
     catalog = CATALOG.mounted(mounting)
@@ -49,6 +54,7 @@ def project(
         mounting=mounting,
         dc_trim=dc_trim,  # type: ignore[arg-type]
         reverse_protection=reverse_protection,
+        connectors=connectors,
     )
     choice = BoardChoice(spec)
     board = fitted(circuit, choice, catalog)
@@ -65,6 +71,7 @@ def case(name: str) -> Project:
         mounting,
         dc_trim="unfitted" if name == "paper" else "fitted",
         reverse_protection="1N5819" if name in PROTECTED else "",
+        connectors=JACKS.get(name, "pins"),
     )
 
 
