@@ -27,11 +27,15 @@ def _sections(folder: Folder) -> Iterator[PageSection]:
     shown = [name for name in SHOWN if name in stages and stages[name].complete]
     if not shown:
         return
-    from designer.report.verb_sections import SECTIONS  # matplotlib is not needed before this
+    from designer.report.verb_sections import SECTIONS, older_section  # they need matplotlib
 
     for name in shown:
         if folder.changed(name) is None:
-            yield SECTIONS[name](folder.json(f"{name}.json"), SHOWN[name])
+            answer = folder.json(f"{name}.json")
+            try:
+                yield SECTIONS[name](answer, SHOWN[name])
+            except KeyError:  # earlier versions wrote less
+                yield older_section(name, SHOWN[name])
 
 
 def renew_report(folder: Folder, note: Note = quiet) -> None:

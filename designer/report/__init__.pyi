@@ -40,6 +40,7 @@ from .response_colours import (
 )
 from .verb_sections import (
     SECTIONS as SECTIONS,
+    older_section as older_section,
 )
 from .write import (
     write_report as write_report,

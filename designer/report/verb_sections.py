@@ -147,6 +147,19 @@ def _titled(title: str, block: Block) -> PageSection | None:
     return None if block is None else PageSection(title, [block])
 
 
+COMMANDS: Mapping[str, str] = {
+    "cure": "search DIR --yield Y --overwrite",
+    "rules": "rules DIR",
+    "trade": "trade DIR --overwrite",
+}
+
+
+def older_section(verb: str, files: Sequence[str]) -> PageSection:
+    """In place of what an earlier version answered, with fewer figures than are shown now."""
+    text = f"An earlier version made {files[0]}. `designer {COMMANDS[verb]}` makes it anew."
+    return PageSection(verb.capitalize(), [text, FileLinks(tuple(files))], verb)
+
+
 SECTIONS: Mapping[str, Callable[[Answer, Sequence[str]], PageSection]] = {
     "cure": cure_section,
     "rules": rules_section,

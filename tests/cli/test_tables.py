@@ -35,7 +35,14 @@ def test_whether_the_width_was_reached(
 def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
     def attractor(response: str, ends: tuple[float | None, float | None], share: float) -> Any:
         reach = dict(zip(("x1_min", "x1_max"), ends, strict=True))
-        return {"response": response, "on_twin": None, "share": share, **reach}
+        return {
+            "response": response,
+            "on_twin": None,
+            "share": share,
+            "low": 0.0,
+            "high": 1.0,
+            **reach,
+        }
 
     starts = {
         "attractors": [
@@ -51,5 +58,7 @@ def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
         "asked": 16,
     }
     text = tables.coexisting(starts)
-    assert "1-1-0 (x1 -1.2 to 0.9) 50 %; 1-1-0 (x1 -0.31 to 0.52) 25 %; 2-2-1 12.5 %" in text
+    ends = "% (0 to 100)"
+    first, second = f"1-1-0 (x1 -1.2 to 0.9) 50 {ends}", f"1-1-0 (x1 -0.31 to 0.52) 25 {ends}"
+    assert f"{first}; {second}; 2-2-1 12.5 {ends}" in text
     assert text.count("aperiodic 6.25 %") == 2

@@ -116,8 +116,8 @@ def test_a_cut_off_file_is_named(
 def quick_reports(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports are files of one word: their pictures take longer than all else."""
 
-    def write(_data: object, *paths: Path) -> None:
-        for path in paths:
+    def write(_data: object, html: Path, text: Path, _sections: object) -> None:
+        for path in (html, text):
             path.write_text("report")
 
     monkeypatch.setattr("designer.report.write.write_report", write)

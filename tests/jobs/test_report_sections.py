@@ -111,6 +111,13 @@ def test_every_answer_stands_in_both_files(path: Path) -> None:
         assert f"[{name}]({name})" in text
 
 
+def test_of_an_answer_with_fewer_figures_the_report_says_how_it_is_made_anew(path: Path) -> None:
+    answered(path, "trade", {"format": 1, "cheapest": [{"question": "n-p-q"}]})
+    for text in reports(path):
+        assert "An earlier version made trade.md" in text
+        assert "designer trade DIR --overwrite" in text
+
+
 def test_a_second_time_changes_nothing_and_the_manifest_knows_the_report(path: Path) -> None:
     bare = reports(path)
     answered(path, "cure", CURE)

@@ -61,7 +61,7 @@ def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = 
         folder.finish(stage)
     folder.begin({"trade": ({}, ["trade.json"])}, {})
     row = {"question": SHARE, "of": IDEAL, "rung": rung, "measured": 0.005, "bound": 0.01}
-    said = {"format": 1, "cheapest": [row], "rungs": [], "truths": []}
+    said = {"format": 1, "cheapest": [row], "rungs": [], "truths": []}  # as the first version wrote
     folder.write("trade.json", dumps(said))
     folder.finish("trade")
     return folder

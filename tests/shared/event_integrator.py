@@ -120,13 +120,16 @@ class Entry:
 
 
 def integrate(
-    system: Mechanism, start: Array, end: float, *, rtol: float = 1e-12
+    system: Mechanism, start: Array, end: float, *, rtol: float = 1e-12, shorter: float = 1.0
 ) -> tuple[Array, list[Entry]]:
-    """State at time ``end`` from (2n,) displacements and velocities at time 0, and the contacts."""
+    """State at time ``end`` from (2n,) displacements and velocities at time 0, and the contacts.
+
+    shorter : how many times shorter than usual the steps are, for contacts in quick succession.
+    """
     t, y = 0.0, np.array(start, dtype=float)
     past = [[d > 0.0 for d in row] for row in system.distances(t, y)]
     entries: list[Entry] = []
-    step = min(2.0 * math.pi / system.omega / 40.0, 0.3 / system.fastest())
+    step = min(2.0 * math.pi / system.omega / 40.0, 0.3 / system.fastest()) / shorter
     while t < end:
         places = [(i, k) for i, gap in enumerate(system.gaps) for k in range(len(gap.thresholds))]
         run = solve_ivp(
