@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from designer import read_model_file, synthesise
+from designer.board.board_parts import board_circuit
+from designer.board.component import Component, components
 from designer.board.kicad_reader import read_board
-from designer.board.kicad_rules import board_rules
+from designer.board.kicad_rules import CustomRule, board_rules
 from designer.catalog.design_rule import PASS
 from designer.design_rules import on_board
+from designer.jobs.board_routing import board_file
+from designer.jobs.kicad_files import texts
 from designer.routing.board_layers import with_layers
 from designer.routing.routed_board import route_board
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 OFTEN = [("paper", 4), ("surface", 2)]
 """Boards of every run and their layers; the others are routed with the slow tests."""
 SELDOM = [("through-hole", 4), *((name, 2) for name in CASES if name != "surface")]
@@ -34,13 +41,40 @@ def test_kicad_and_the_rules_find_nothing_on_a_routed_board(
     routed = route_board(with_layers(made[board], layers), project.circuit, rules)
     assert routed.open == {}
     folder = written({**made, board: routed.text}, tmp_path / "project")
+    nothing_is_found(folder / board, project.components, rules)
+
+
+@pytest.mark.kicad
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["backlash", "hammer-base"])
+def test_nothing_is_found_on_the_board_of_another_system(name: str, tmp_path: Path) -> None:
+    """From its model file: clearances between masses, and a base that is struck."""
+    design = synthesise(read_model_file(EXAMPLES / f"{name}.toml")).synthesis
+    circuit, choice = board_circuit(design)
+    files, board = texts(design), board_file(design)
+    rules = board_rules(circuit, design.modelfile.rules)
+    routed = route_board(files[board], circuit, rules)
+    assert routed.open == {}
+    own = {key.removeprefix("kicad/"): text for key, text in {**files, board: routed.text}.items()}
+    folder = written(own, tmp_path / "project")
+    place = folder / board.removeprefix("kicad/")
+    nothing_is_found(place, components(circuit, design.catalog, choice), rules)
+    sheet = place.with_suffix(".kicad_sch").name
+    kicad(folder, "sch", "erc", "--severity-all", "--format", "json", "-o", "erc.json", sheet)
+    pages = json.loads((folder / "erc.json").read_text())["sheets"]
+    assert [each for page in pages for each in page["violations"]] == []
+
+
+def nothing_is_found(board: Path, parts: Sequence[Component], rules: Sequence[CustomRule]) -> None:
+    """Neither by KiCad, parity with the sheet included, nor by the rules on a board."""
+    folder = board.parent
     kicad(
         folder, "pcb", "drc", "--severity-all", "--schematic-parity", "--format", "json",
-        "-o", "drc.json", board,
+        "-o", "drc.json", board.name,
     )  # fmt: skip
     found = json.loads((folder / "drc.json").read_text())
     assert found["violations"] == []
     assert found["unconnected_items"] == []
     assert found["schematic_parity"] == []
-    outcomes = on_board.checked(read_board(folder / board), project.components, rules, {})
+    outcomes = on_board.checked(read_board(board), parts, rules, {})
     assert {o.rule.id: o.found for o in outcomes if o.status != PASS} == {}
