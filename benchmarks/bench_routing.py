@@ -166,7 +166,7 @@ def report(rows: Sequence[Row], seconds: float) -> str:
         "rules on the board (KiCad 9)",
     ]  # fmt: skip
     lines = [
-        "# Routing of ten boards",
+        "# Routing of eleven boards",
         "",
         "Made by `python -m benchmarks routing`; the data are in `routing.json`.",
         "",
