@@ -11,6 +11,7 @@ from designer.check.synthesis_result import synthesise
 from designer.dynamics.orbit import OrbitStatus
 from designer.explorer.wire import Message
 from designer.jobs.options import Options
+from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import Answer, StudyPlan
@@ -72,7 +73,7 @@ def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> Reco
         if each in asked:
             question = asked.index(each)
             words = _words(count(a for a in answers if a.question == question))
-        rows.append(RecordedYield(each.model.omega, str(each.model.spec.expect), words))
+        rows.append(RecordedYield(each.model.omega, _summary(each.model), words))
     if len(asked) == len(checked) > 1:
         rows.append(RecordedYield(None, "all of them on one board", _words(all_on_one(answers))))
     words = f"{plan.samples} boards under the spread of the file, seed {plan.seed}"
@@ -87,6 +88,11 @@ def _answers(plan: StudyPlan, options: Options, progress: Progress) -> list[Answ
         for _ in indices:
             step()
     return answers
+
+
+def _summary(response: ModelResponse) -> str:
+    shown = "any response" if response.spec.expect is None else str(response.spec.expect)
+    return f"{shown} at ω = {response.omega:.6g}"
 
 
 def _words(counted: Yield) -> str:

@@ -146,7 +146,7 @@ def borders(request: MapRequest) -> Iterator[Message]:
     if hindrance:
         yield _borders_message([], hindrance, done=True)
         return
-    (x, y), whose = request.at, f"borders of {summary(orbit)}"
+    (x, y), whose = request.at, f"Borders of {summary(orbit)}"
     plan = CurvePlan(request.subject, request.x.name, request.y.name, y, request.window)
     found: list[BorderCurve] = []
 
@@ -242,9 +242,9 @@ def _cells_message(
 def _hindrance(request: MapRequest, orbit: Orbit) -> str:
     """Why no borders are looked for; "" where they are."""
     if orbit.status is not OrbitStatus.PERIODIC:
-        return f"no borders are looked for: the motion here is {orbit.response}"
+        return f"No borders are looked for: the motion here is {orbit.response}"
     if not request.window.holds(*request.at):
-        return "no borders are looked for: the present place lies outside the map"
+        return "No borders are looked for: the present place lies outside the map"
     return ""
 
 

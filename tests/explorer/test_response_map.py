@@ -68,7 +68,7 @@ def test_an_orbit_changes_at_its_borders() -> None:
     """Inside each border 1-2-2 stands; a little past the fold it is gone, past the pitchfork it is
     not symmetric any more."""
     last = list(borders(asked(x_low="0.78", x_high="0.93", y_low="0.245", y_high="0.255")))[-1]
-    assert last["words"] == "borders of 1-2-2, symmetric"
+    assert last["words"] == "Borders of 1-2-2, symmetric"
     kinds = [text for _, text in last["legend"]]
     assert kinds == ["pitchfork", "fold"]
     orbit = settle(model_flow(PLACE.model, 0.85), np.zeros(4))
