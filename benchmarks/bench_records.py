@@ -142,7 +142,7 @@ def _figure(wanted: Sequence[str], counts: Sequence[Counter[str]]) -> Figure:
         left += values
     axes.invert_yaxis()
     axes.set_xlabel("records")
-    axes.legend(loc="outside lower center", ncols=len(OUTCOMES), frameon=False)
+    figure.legend(loc="outside lower center", ncols=len(OUTCOMES), frameon=False)
     return figure
 
 

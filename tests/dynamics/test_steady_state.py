@@ -222,7 +222,7 @@ def test_only_periodic_motions_are_counted(
     settled: OrbitStatus, shown: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     orbit = replace(attractors.settle(flow(1.55), np.zeros(4)), status=settled)
-    monkeypatch.setattr(steady_state, "settle", lambda *_: orbit)
+    monkeypatch.setattr(steady_state, "settle", lambda *_, **__: orbit)
     got = by_flow(flow(1.55), orbit.start, Course(4, 2))
     assert got.response == shown
     if shown == "1-1-1":
