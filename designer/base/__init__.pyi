@@ -93,6 +93,9 @@ from .guarded_reading import (
     read_text as read_text,
     reading as reading,
 )
+from .html_templates import (
+    page_templates as page_templates,
+)
 from .jit import (
     callee as callee,
     compiled as compiled,

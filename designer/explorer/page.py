@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from functools import cache
 
 from bokeh.resources import Resources
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
+from designer.base.html_templates import page_templates
 from designer.base.script_policy import script_source
 from designer.explorer import plots
 from designer.explorer.controls import Control, controls
@@ -33,15 +34,7 @@ def asset(name: str) -> str:
 
 @cache
 def _templates() -> Environment:
-    loader = PackageLoader("designer.explorer", "templates")
-    return Environment(
-        loader=loader,
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    return page_templates("designer.explorer")
 
 
 def page(modelfile: ModelFile) -> str:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
+from designer.base.html_templates import page_templates
 from designer.board.bom import Line
 from designer.board.kicad_reader import BoardFile
 from designer.fabrication.board_picture import board_svg
@@ -16,14 +15,6 @@ from designer.fabrication.board_picture import board_svg
 
 def bom_page(title: str, board: BoardFile, bought: Sequence[Line]) -> str:
     """The page as HTML. title : of the model file, as it is."""
-    templates = Environment(
-        loader=PackageLoader("designer.fabrication", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
     sides = [("From above", board_svg(board, "top")), ("From below", board_svg(board, "bottom"))]
-    page = templates.get_template("bom_page.html.j2")
+    page = page_templates("designer.fabrication").get_template("bom_page.html.j2")
     return page.render(title=" ".join(title.split()), sides=sides, lines=bought)

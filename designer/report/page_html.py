@@ -12,9 +12,10 @@ from importlib import resources
 from pathlib import Path
 
 from bokeh.settings import settings as bokeh_settings
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup, escape
 
+from designer.base.html_templates import page_templates
 from designer.base.page import Page, PageSection
 from designer.base.script_policy import script_source
 from designer.report.design_page import FORMAT
@@ -53,14 +54,7 @@ def render_sections(sections: Sequence[PageSection]) -> str:
 
 @cache
 def _templates() -> Environment:
-    templates = Environment(
-        loader=PackageLoader("designer.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    templates = page_templates("designer.report")
     templates.filters["text"] = _unbroken
     return templates
 
