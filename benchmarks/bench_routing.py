@@ -28,8 +28,8 @@ from designer.board.kicad_rules import board_rules
 from designer.catalog.design_rule import FAIL, NOT_RUN
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board
+from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
-from designer.jobs.kicad_files import texts
 from designer.model.model_file import parse_model_file
 from designer.routing.board_copper import BACK, FRONT, read_copper
 from designer.routing.board_layers import with_layers

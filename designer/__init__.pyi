@@ -20,6 +20,9 @@ from .check.synthesis_result import (
 from .explorer.server import (
     explore as explore,
 )
+from .folders.design_source import (
+    read_design as read_design,
+)
 from .jobs.bench_job import (
     BenchAnswer as BenchAnswer,
     bench as bench,
@@ -31,9 +34,6 @@ from .jobs.bifurcation_job import (
 from .jobs.cure_job import (
     CureResult as CureResult,
     cure as cure,
-)
-from .jobs.design_source import (
-    read_design as read_design,
 )
 from .jobs.export_job import (
     ExportResult as ExportResult,

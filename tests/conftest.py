@@ -108,7 +108,7 @@ def pytest_make_collect_report(
 
 @pytest.fixture(scope="module")
 def figures_are_blank() -> Iterator[None]:
-    """For modules that ask nothing of pictures; ``tests/report`` and ``tests/board`` look at
-    them."""
+    """For modules that ask nothing of pictures; ``tests/plots``, ``tests/report`` and
+    ``tests/board`` look at them."""
     with blank_figures():
         yield

@@ -253,6 +253,7 @@ from .units import (
     encode_value as encode_value,
     format_quantity as format_quantity,
     parse_quantity as parse_quantity,
+    spaced_quantity as spaced_quantity,
 )
 from .version import (
     __version__ as __version__,

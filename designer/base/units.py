@@ -86,6 +86,15 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
 
 
+def spaced_quantity(value: float, unit: str, digits: int = 4) -> str:
+    """``format_quantity`` as pages and pictures write it, "22.1 kΩ": the space does not break."""
+    if unit == "kg":  # it has a prefix already
+        return f"{value:.{digits}g}\u00a0kg"
+    text = format_quantity(value, unit, digits).removesuffix(unit)
+    figure = text.rstrip("fpnµmkMGT")
+    return f"{figure}\u00a0{text[len(figure) :]}{unit}"
+
+
 def distinct_texts(values: Sequence[float], digits: int, most: int = 12) -> list[str]:
     """Each value in ``digits`` significant digits, or in as many more as tell those that differ in
     ``most`` digits apart."""

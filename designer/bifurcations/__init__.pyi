@@ -7,7 +7,6 @@ from . import (
     point_captions as point_captions,
     response_region as response_region,
     sweep as sweep,
-    titles as titles,
     window_ends as window_ends,
 )
 from .attractor_list import (
@@ -17,14 +16,17 @@ from .basin_shares import (
     AttractorShare as AttractorShare,
     BasinShares as BasinShares,
     SharePlan as SharePlan,
+    Step as Step,
 )
 from .basins import (
     BasinPlan as BasinPlan,
     Basins as Basins,
 )
 from .border_curves import (
+    BLOCKS as BLOCKS,
     BorderCurve as BorderCurve,
     CurvePlan as CurvePlan,
+    read_curve as read_curve,
 )
 from .branch_survey import (
     Survey as Survey,
@@ -33,10 +35,6 @@ from .branch_survey import (
 from .continuation import (
     Branch as Branch,
     End as End,
-)
-from .curve_store import (
-    CurveBlocks as CurveBlocks,
-    curves_csv as curves_csv,
 )
 from .doubling_cascade import (
     Cascade as Cascade,
@@ -64,16 +62,6 @@ from .points import (
 from .response_region import (
     ResponseRegion as ResponseRegion,
 )
-from .share_store import (
-    ShareBlocks as ShareBlocks,
-    shares_csv as shares_csv,
-)
-from .store import (
-    GridStore as GridStore,
-    SweepStore as SweepStore,
-    work_hash as work_hash,
-    write_sweep as write_sweep,
-)
 from .subject import (
     ShownStop as ShownStop,
     Subject as Subject,
@@ -85,11 +73,6 @@ from .sweep import (
     SweepPlan as SweepPlan,
     Window as Window,
     next_start as next_start,
-)
-from .titles import (
-    NAMES as NAMES,
-    curves_title as curves_title,
-    title as title,
 )
 from .windows import (
     NOT_LOCATED as NOT_LOCATED,

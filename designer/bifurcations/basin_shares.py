@@ -27,10 +27,10 @@ from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import describe, shoot
 from designer.dynamics.counts import Pairs
 from designer.dynamics.flow import Flow, FlowStatus
-from designer.dynamics.kernel_orbit import CHAOS
-from designer.dynamics.kernel_sweep import ALIGN, SPAN
 from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import UPPER, Course, DrivenSystem, stopped
+from designer.kernels.kernel_orbit import CHAOS
+from designer.kernels.kernel_sweep import ALIGN, SPAN
 
 BLOCK = 16
 """Values of a block."""

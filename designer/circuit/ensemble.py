@@ -1,7 +1,7 @@
 """The attractors of many boards of one circuit: what every study of yields is made of.
 
 Boards are reduced together, and the usual way to an answer (settle, shoot, check) is compiled
-(``dynamics.kernel_boards``). What is unusual on that way goes to ``dynamics.attractors.settle``,
+(``kernels.kernel_boards``). What is unusual on that way goes to ``dynamics.attractors.settle``,
 which it must equal.
 """
 
@@ -19,12 +19,13 @@ from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.reduction import FloatingCircuit, Reduction
-from designer.dynamics import attractors, kernel_boards as kernel, working_modes
+from designer.dynamics import attractors, working_modes
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
-from designer.dynamics.kernel_orbit import CHAOS, FOUND
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
+from designer.kernels import kernel_boards as kernel
+from designer.kernels.kernel_orbit import CHAOS, FOUND
 
 CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""

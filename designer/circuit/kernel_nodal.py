@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.jit import compiled
-from designer.dynamics.kernel_algebra import factor, substitute
+from designer.kernels.kernel_algebra import factor, substitute
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

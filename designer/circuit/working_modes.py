@@ -14,9 +14,9 @@ from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.circuit.nodal_bandwidth import LaggingEquations
-from designer.dynamics import kernel_mode_tables as kernel
 from designer.dynamics.piecewise_linear import ModeKey, motion_of_states
 from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
+from designer.kernels import kernel_mode_tables as kernel
 
 
 def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:

@@ -2,8 +2,8 @@
 on.
 
 A system is its modes, guards and drive; nothing here knows of a circuit, a mechanism or a file, so
-the package is usable alone. ``Flow`` moves a state, ``settle`` finds an attractor, ``Orbit`` says
-it.
+the package is usable alone with its ``kernels``. ``Flow`` moves a state, ``settle`` finds an
+attractor, ``Orbit`` says it.
 """
 
 import lazy_loader

@@ -1,9 +1,6 @@
 from . import (
     attractors as attractors,
     harmonics as harmonics,
-    kernel_boards as kernel_boards,
-    kernel_modal as kernel_modal,
-    kernel_mode_tables as kernel_mode_tables,
     modal_tables as modal_tables,
     step_budget as step_budget,
     working_modes as working_modes,
@@ -42,31 +39,6 @@ from .flow import (
     Flow as Flow,
     FlowResult as FlowResult,
     FlowStatus as FlowStatus,
-)
-from .kernel_algebra import (
-    factor as factor,
-    substitute as substitute,
-)
-from .kernel_boards import (
-    POINTS as POINTS,
-)
-from .kernel_crossing import (
-    BLOCK_STEP as BLOCK_STEP,
-    LAST as LAST,
-    NODES as NODES,
-    PARTS as PARTS,
-    TERMS as TERMS,
-)
-from .kernel_modal import (
-    ModalTables as ModalTables,
-)
-from .kernel_orbit import (
-    CHAOS as CHAOS,
-    FOUND as FOUND,
-)
-from .kernel_sweep import (
-    ALIGN as ALIGN,
-    SPAN as SPAN,
 )
 from .modal_tables import (
     WORST_RESONANCE as WORST_RESONANCE,

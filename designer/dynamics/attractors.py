@@ -22,17 +22,17 @@ from designer.base.errors import InputError
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult, FlowStatus
-from designer.dynamics.kernel_orbit import (
+from designer.dynamics.lyapunov_exponent import BLOCK, Bound, LyapunovExponent, lyapunov
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import ModeKey
+from designer.dynamics.step_budget import Budget
+from designer.kernels.kernel_orbit import (
     CHAOS,
     CLOSING,
     NEAR,
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     WORTH,
 )
-from designer.dynamics.lyapunov_exponent import BLOCK, Bound, LyapunovExponent, lyapunov
-from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.dynamics.piecewise_linear import ModeKey
-from designer.dynamics.step_budget import Budget
 
 STAGES = (20, 20, 100, 660, 3200)
 LONG_PERIOD = 4 * MAX_PERIOD

@@ -2,10 +2,10 @@
 
 The general engine: any number of states and modes, constant terms, guards that see the drive. Each
 step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
-absent or found (see ``dynamics.kernel_general``). Four states with one stop pair take the modal
+absent or found (see ``kernels.kernel_general``). Four states with one stop pair take the modal
 fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
 every other system of few states, and a circuit that keeps to its working modes, takes that of
-``dynamics.kernel_propagators``.
+``kernels.kernel_propagators``.
 """
 
 from __future__ import annotations
@@ -22,21 +22,19 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.threads import heed
-from designer.dynamics import (
+from designer.dynamics import modal_tables, mode_tables, working_modes
+from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.step_budget import Budget
+from designer.dynamics.working_modes import MOST_STATES, TabulatedModes
+from designer.kernels import (
     kernel_general as kernel,
     kernel_modal,
     kernel_orbit,
     kernel_propagators,
-    modal_tables,
-    mode_tables,
-    working_modes,
 )
-from designer.dynamics.kernel_general import Log, ModeTables
-from designer.dynamics.kernel_modal import ModalTables
-from designer.dynamics.kernel_propagators import RunTrail
-from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
-from designer.dynamics.step_budget import Budget
-from designer.dynamics.working_modes import MOST_STATES, TabulatedModes
+from designer.kernels.kernel_general import Log, ModeTables
+from designer.kernels.kernel_modal import ModalTables
+from designer.kernels.kernel_propagators import RunTrail
 
 MAX_EVENTS = 10_000
 """Mode changes in one drive period past which the flow stops: chattering ends with a status."""

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
-from designer.dynamics import kernel_modal as kernel
-from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
-from designer.dynamics.kernel_modal import ModalTables
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+from designer.kernels import kernel_modal as kernel
+from designer.kernels.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
+from designer.kernels.kernel_modal import ModalTables
 
 Complex = NDArray[np.complex128]
 WORST_CONDITION = 1e4

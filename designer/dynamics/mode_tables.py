@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from designer.base.arrays import Array
-from designer.dynamics import kernel_general as kernel
 from designer.dynamics.piecewise_linear import Drive, Mode
+from designer.kernels import kernel_general as kernel
 
 STEP = 0.5
 """‖A h‖ of one step, after balancing."""

@@ -2,7 +2,7 @@
 
 A transient is run and left out; over the periods kept after it the least displacement of each and
 every impact on the stops of interest are noted, and the motion is named n-p-q by the rules of
-``dynamics.attractors``. Two engines: the compiled one for models (``dynamics.kernel_sweep``), and
+``dynamics.attractors``. Two engines: the compiled one for models (``kernels.kernel_sweep``), and
 the general flow, which is slow and obvious, and serves boards and whatever the fast path does not
 fit.
 """
@@ -17,12 +17,10 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import interrupt
-from designer.dynamics import attractors, kernel_orbit, kernel_sweep as kernel
+from designer.dynamics import attractors
 from designer.dynamics.attractors import peaks_near, settle
 from designer.dynamics.counts import MAX_PERIOD, Pairs
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
-from designer.dynamics.kernel_modal import ModalTables, Watch
-from designer.dynamics.kernel_orbit import CHAOS, WORTH
 from designer.dynamics.lyapunov_exponent import (
     BLOCK,
     Bound,
@@ -32,6 +30,9 @@ from designer.dynamics.lyapunov_exponent import (
 )
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
+from designer.kernels import kernel_orbit, kernel_sweep as kernel
+from designer.kernels.kernel_modal import ModalTables, Watch
+from designer.kernels.kernel_orbit import CHAOS, WORTH
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics import kernel_mode_tables as kernel
-from designer.dynamics.kernel_boards import POINTS, Anchors
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+from designer.kernels import kernel_mode_tables as kernel
+from designer.kernels.kernel_boards import POINTS, Anchors
 
 MOST_STATES = 12
 """States up to which the fast path is compiled: beyond, its tables are too large for the cache of a

@@ -27,7 +27,8 @@ from designer.jobs.rules_job import rules
 from designer.jobs.study_job import run
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.relative_motion import relative_motions
-from designer.report import comparison, orbit_plots
+from designer.plots import orbit_plots
+from designer.report import comparison
 from designer.spice.pool import SpicePool
 
 FOLDER = "design"

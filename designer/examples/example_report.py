@@ -33,12 +33,12 @@ from designer.examples import (
 from designer.examples.board_part import board_part
 from designer.examples.evidence import Evidence, Example, figure_block
 from designer.examples.frequency_sweep import frequency_sweep
-from designer.jobs.origin import provenance
+from designer.folders.origin import provenance
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.system_equations import equations_of, number_of
 from designer.paper.report_files import make_report, write_files
-from designer.report import system_drawing
+from designer.plots import system_drawing
 
 FORMAT = 1
 SAMPLES, SEED = 100, 71

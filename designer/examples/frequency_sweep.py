@@ -11,7 +11,7 @@ from designer.dynamics.steady_state import Course
 from designer.examples.evidence import Evidence, figure_block
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
-from designer.report import bifurcation_plots
+from designer.plots import bifurcation_plots
 
 STEPS = 240
 COURSE = Course(settle=240, keep=16)

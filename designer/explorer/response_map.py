@@ -15,7 +15,6 @@ from designer.bifurcations import border_curves, parameter_map
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
 from designer.bifurcations.parameter_map import MapCell, MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
-from designer.bifurcations.titles import title
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.explorer.controls import Control, controls
 from designer.explorer.place import OMEGA, ModelPlace, number_of
@@ -24,7 +23,8 @@ from designer.explorer.stepped_call import stepped
 from designer.explorer.wire import Message, columns
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
-from designer.report.response_colours import MARKS, palette_legend, response_palette
+from designer.plots.response_colours import MARKS, palette_legend, response_palette
+from designer.plots.titles import title
 
 COLUMNS, ROWS = 65, 49
 """Points of the finest grid, its ends included."""

@@ -31,10 +31,10 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity import runge_kutta, system_runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
+from designer.kernels.kernel_boards import POINTS
 from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import MechanicalModel

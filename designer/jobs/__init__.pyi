@@ -3,19 +3,12 @@ from . import (
     bifurcation_job as bifurcation_job,
     cure_job as cure_job,
     export_job as export_job,
-    origin as origin,
     rules_job as rules_job,
     search_job as search_job,
     simulate_job as simulate_job,
     study_job as study_job,
     synthesise_job as synthesise_job,
     trade_job as trade_job,
-)
-from .design_files import (
-    load as load,
-)
-from .design_source import (
-    source as source,
 )
 from .export_job import (
     export as export,
@@ -26,17 +19,11 @@ from .job_outcome import (
 from .options import (
     Options as Options,
 )
-from .origin import (
-    provenance as provenance,
-)
 from .rules_job import (
     rules as rules,
 )
 from .search_job import (
     search_into as search_into,
-)
-from .study_folder import (
-    FolderStores as FolderStores,
 )
 from .study_job import (
     run as run,

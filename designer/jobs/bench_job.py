@@ -17,8 +17,8 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.circuit.design import GeneratorSetting
-from designer.jobs.design_source import read_design
-from designer.jobs.origin import provenance
+from designer.folders.design_source import read_design
+from designer.folders.origin import provenance
 from designer.workbench.advice import Advice
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
@@ -319,8 +319,8 @@ def _row(record: Mapping[str, Any]) -> dict[str, Any]:
 def _write(place: Path, names: Sequence[str], result: BenchAnswer) -> None:
     """The answer, its page and the picture of each record."""
     from designer.base.figure_style import to_png  # matplotlib is not needed but for them
+    from designer.plots.record_plots import record_figure
     from designer.report.record_page import record_page_html
-    from designer.report.record_plots import record_figure
 
     try:
         place.mkdir(parents=True, exist_ok=True)

@@ -20,14 +20,14 @@ from designer.base.version import __version__
 from designer.bifurcations import basins, parameter_map
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
-from designer.bifurcations.store import GridStore
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
+from designer.folders.design_source import read_design, source
+from designer.folders.sweep_store import GridStore
 from designer.jobs.bifurcation_request import Request, Swept, plan_of
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
-from designer.jobs.design_source import read_design, source
 from designer.jobs.options import Options
 from designer.jobs.sweep_answer import sweep_answer, sweep_files
 from designer.model.model_file import ModelFile, read_model_file
@@ -231,7 +231,7 @@ def _make(
 
 
 def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan, folder: Folder | None) -> Made:
-    from designer.report import bifurcation_plots
+    from designer.plots import bifurcation_plots
 
     kind, progress, jobs = work.request.kind, work.progress, work.jobs
     store = None

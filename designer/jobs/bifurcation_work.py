@@ -10,11 +10,11 @@ from designer.base.progress import Progress
 from designer.base.si_unit import Unit
 from designer.bifurcations.basin_shares import SharePlan
 from designer.bifurcations.border_curves import CurvePlan
-from designer.bifurcations.store import work_hash
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
+from designer.folders.origin import provenance
+from designer.folders.sweep_store import work_hash
 from designer.jobs.bifurcation_request import Plan, Request, curve_plan, region_at, share_plan
-from designer.jobs.origin import provenance
 from designer.model.model_file import ModelFile
 
 Files = dict[str, str | bytes]

@@ -16,7 +16,7 @@ from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import check_belongs, read_board
 from designer.board.kicad_rules import board_rules
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import kicad_files
+from designer.folders import kicad_files
 from designer.jobs.options import Options
 from designer.routing.board_layers import layer_count, with_layers
 from designer.routing.routed_board import RoutedBoard, route_board

@@ -29,17 +29,17 @@ from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import folder_numbers, rung_choice
-from designer.jobs.design_source import (
+from designer.folders.design_source import (
     design_inputs,
     design_inputs_of,
     design_stage,
     grade_inputs,
     read_design,
 )
+from designer.folders.origin import provenance
+from designer.folders.report_sections import renew_report
+from designer.jobs import folder_numbers, rung_choice
 from designer.jobs.options import Options, stated_options
-from designer.jobs.origin import provenance
-from designer.jobs.report_sections import renew_report
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
 from designer.model.model_file import naming, need_responses

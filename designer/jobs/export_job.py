@@ -34,10 +34,10 @@ from designer.fabrication.order_refusal import (
     not_checked,
     refusals,
 )
-from designer.jobs import board_files, kicad_files
+from designer.folders import board_files, kicad_files
+from designer.folders.design_files import design_provenance
+from designer.folders.design_source import design_inputs_of, source
 from designer.jobs.board_routing import route_in_folder, write_design
-from designer.jobs.design_files import design_provenance
-from designer.jobs.design_source import design_inputs_of, source
 from designer.jobs.options import Options
 from designer.jobs.rules_job import checked
 from designer.jobs.stage_runner import StageRunner

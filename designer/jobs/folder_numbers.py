@@ -16,7 +16,7 @@ from typing import Any
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.manifest import StageName
 from designer.jobs.options import Options
-from designer.jobs.study_folder import blame_budget, blamed
+from designer.jobs.study_layers import blame_budget, blamed
 from designer.model.model_file import ModelFile
 
 RUNG = "rung"

@@ -12,7 +12,7 @@ from designer.base.frames import flat_frame, table_html
 from designer.board.bom import bill_of_materials
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.jobs.study_stage import RANDOM, Place, read_study
 from designer.yields.study import RunResult, Study
 

@@ -27,9 +27,9 @@ from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board as rule_board, rule_reports, run_rules
 from designer.design_rules.kicad_program import kicad_version
 from designer.design_rules.subject import RuleSubject
-from designer.jobs.design_source import read_design
-from designer.jobs.origin import provenance
-from designer.jobs.report_sections import renew_report
+from designer.folders.design_source import read_design
+from designer.folders.origin import provenance
+from designer.folders.report_sections import renew_report
 from designer.model.model_file import naming
 
 if TYPE_CHECKING:

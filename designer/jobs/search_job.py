@@ -21,14 +21,15 @@ from designer.centering.limiting_parts import limitings
 from designer.centering.ngspice_check import LEVELS, RUNG
 from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, folder_numbers, rung_choice
-from designer.jobs.design_source import design_inputs_of, grade_inputs, source
+from designer.folders import design_files
+from designer.folders.design_source import design_inputs_of, grade_inputs, source
+from designer.folders.origin import provenance
+from designer.folders.study_stores import FolderStores
+from designer.jobs import folder_numbers, rung_choice
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options, stated_options
-from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.search_stage import RULES as RULES, searched_into
-from designer.jobs.study_folder import FolderStores
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import RANDOM, SPICE_TIMEOUT, StudyHelp, study_of
 from designer.model.model_file import ModelFile

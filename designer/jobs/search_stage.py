@@ -23,10 +23,10 @@ from designer.centering.design_search import look, search as design_search
 from designer.centering.ngspice_check import Listener
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import search_json
+from designer.folders.design_source import design_inputs, design_stage, model_file
+from designer.folders.origin import provenance
 from designer.jobs import rung_choice
-from designer.jobs.design_source import design_inputs, design_stage, model_file
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import SEARCH
 from designer.jobs.stage_runner import write_design
 from designer.jobs.study_stage import SPICE_TIMEOUT

@@ -17,10 +17,10 @@ from designer.catalog.catalog import load_catalog
 from designer.check import simulation
 from designer.check.simulation import Engine, Simulated
 from designer.check.synthesis_result import Synthesis
-from designer.jobs.design_source import model_file, read_design, source
-from designer.jobs.json_answers import simulate_json
+from designer.folders.design_source import model_file, read_design, source
+from designer.folders.json_answers import simulate_json
+from designer.folders.origin import provenance
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
 from designer.model.model_file import ModelFile
 from designer.model.si_units import Reader, units_of
 from designer.spice.opamp_model import Rung
@@ -103,7 +103,7 @@ def simulate(
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
     names: tuple[str, ...] = ()
     if plots is not None:
-        from designer.report import simulate_plots  # matplotlib is not needed but for them
+        from designer.plots import simulate_plots
 
         digits = simulate_plots.DIGITS if modelfile.si is None else DIGITS
         names = simulate_plots.names([w for w in wanted if w is not None], digits)

@@ -17,9 +17,9 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, kicad_files
+from designer.folders import design_files, kicad_files
+from designer.folders.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.compile_ahead import compiling_ahead
-from designer.jobs.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, naming
 

@@ -17,14 +17,15 @@ from designer.catalog.catalog import Catalog
 from designer.check import synthesis_result
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, folder_numbers, kicad_files, rung_choice, search_stage
+from designer.folders import design_files, kicad_files
+from designer.folders.design_source import bills_are_of_old, design_inputs, source
+from designer.folders.json_answers import run_json
+from designer.jobs import folder_numbers, rung_choice, search_stage
 from designer.jobs.board_routing import route_own_board
-from designer.jobs.design_source import bills_are_of_old, design_inputs, source
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import StageRunner
-from designer.jobs.study_folder import merged
+from designer.jobs.study_layers import merged
 from designer.jobs.study_stage import (
     BUILT,
     RANDOM,

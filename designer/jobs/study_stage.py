@@ -21,21 +21,14 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, kicad_files
-from designer.jobs.json_answers import run_json
+from designer.folders import design_files, kicad_files, study_json
+from designer.folders.json_answers import run_json
+from designer.folders.origin import provenance
+from designer.folders.report_sections import later_sections
+from designer.folders.study_cache import CACHE, StudyCache
+from designer.folders.study_stores import BOARDS, PIECES, FolderStores, map_files
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
-from designer.jobs.report_sections import later_sections
-from designer.jobs.study_cache import CACHE, StudyCache
-from designer.jobs.study_folder import (
-    BOARDS,
-    PIECES,
-    FolderStores,
-    layers_of,
-    map_files,
-    study_files,
-)
-from designer.jobs.study_json import study_json
+from designer.jobs.study_layers import layers_of, study_files
 from designer.linear_network.milp import SOLVER
 from designer.report import measured_table
 from designer.spice import equation_check
@@ -363,7 +356,7 @@ def run_result(
 
 def result_json(result: RunResult) -> dict[str, Any]:
     """What ``tolerance.json`` holds."""
-    return study_json(
+    return study_json.study_json(
         result.study,
         result.provenance,
         result.cost,

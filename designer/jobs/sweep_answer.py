@@ -16,20 +16,20 @@ from designer.bifurcations import (
     point_captions,
     response_region,
     sweep,
-    titles,
     window_ends,
 )
 from designer.bifurcations.basin_shares import BasinShares
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
-from designer.bifurcations.curve_store import CurveBlocks, curves_csv
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.response_region import ResponseRegion
-from designer.bifurcations.share_store import ShareBlocks, shares_csv
-from designer.bifurcations.store import SweepStore
 from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
+from designer.folders.curve_store import CurveBlocks, curves_csv
+from designer.folders.share_store import ShareBlocks, shares_csv
+from designer.folders.sweep_store import SweepStore
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
+from designer.plots import titles
 
 CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
 """Tables and pictures of bifurcation curves."""
@@ -107,7 +107,7 @@ def _diagram(
     shares: BasinShares | None,
 ) -> Files:
     """Pictures of the sweep."""
-    from designer.report import bifurcation_plots
+    from designer.plots import bifurcation_plots
 
     values = swept.plan.values
     marks = bifurcation_plots.marks(points, float(values[0]), float(values[-1]))
@@ -121,7 +121,7 @@ def _curve_files(
     region: ResponseRegion | None,
 ) -> Files:
     """Table and pictures of the curves."""
-    from designer.report import curve_plots
+    from designer.plots import curve_plots
 
     assert work.curves is not None
     labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]

@@ -18,10 +18,11 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import Catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, search_stage
-from designer.jobs.design_source import source
+from designer.folders import design_files
+from designer.folders.design_source import source
+from designer.folders.json_answers import cost_of
+from designer.jobs import search_stage
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.json_answers import cost_of
 from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile, read_model_file

@@ -24,11 +24,11 @@ from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, VENDOR, Truths
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
+from designer.folders.design_source import grade_inputs, source
+from designer.folders.origin import provenance
+from designer.folders.report_sections import renew_report
 from designer.jobs import folder_numbers
-from designer.jobs.design_source import grade_inputs, source
 from designer.jobs.options import Options, stated_options
-from designer.jobs.origin import provenance
-from designer.jobs.report_sections import renew_report
 from designer.jobs.rung_choice import TRADE
 from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics import kernel_modal as kernel, modal_tables
-from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
-from designer.dynamics.kernel_modal import ModalTables
+from designer.dynamics import modal_tables
 from designer.dynamics.modal_tables import WORST_RESONANCE, Oscillators
+from designer.kernels import kernel_modal as kernel
+from designer.kernels.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
+from designer.kernels.kernel_modal import ModalTables
 from designer.model.mechanics import POSITIONS, MechanicalModel
 from designer.model.model import Dimensionless
 

@@ -20,10 +20,10 @@ from designer.base.arrays import Array
 from designer.circuit.ensemble import displacement
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_boards import POINTS
 from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.fidelity.runge_kutta import PAPERS_STEP
+from designer.kernels.kernel_boards import POINTS
 from designer.model.find_responses import ModelResponse
 from designer.paper.circuits import Built, SettledResponse, model_flow
 from designer.spice import numerics_gate

@@ -10,7 +10,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.circuit.dead_zone_place import OUTPUT
 from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section, nominal_board
-from designer.dynamics.kernel_boards import POINTS
+from designer.kernels.kernel_boards import POINTS
 from designer.paper.circuits import Built, SettledResponse
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings

@@ -19,11 +19,11 @@ from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.continuation import Branch, End
 from designer.bifurcations.doubling_cascade import Cascade
 from designer.bifurcations.points import Bifurcation
-from designer.bifurcations.titles import NAMES
 from designer.bifurcations.windows import NOT_LOCATED, BranchWindow
 from designer.dynamics.orbit import Orbit
 from designer.paper.statements import Statement, main_windows
-from designer.report.response_colours import BLACK, MARKS, RED
+from designer.plots.response_colours import BLACK, MARKS, RED
+from designer.plots.titles import NAMES
 
 KINDS = ("S", "AS")
 COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")

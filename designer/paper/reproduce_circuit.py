@@ -26,7 +26,7 @@ from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.dynamics.flow import Flow
-from designer.jobs.origin import provenance
+from designer.folders.origin import provenance
 from designer.model.find_responses import ModelResponse, find
 from designer.paper import circuit_clock, circuit_ngspice, misprints, offsets
 from designer.paper.circuit_ngspice import FINE

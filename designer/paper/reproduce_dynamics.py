@@ -26,13 +26,13 @@ from designer.base.report_pieces import check_report_folder
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.point_captions import caption
-from designer.bifurcations.store import write_sweep
 from designer.bifurcations.windows import all_windows, outside
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import coexisting, settle, starts, twin
 from designer.dynamics.orbit import Orbit
-from designer.jobs import origin
+from designer.folders import origin
+from designer.folders.sweep_store import write_sweep
 from designer.model import swept_model
 from designer.model.find_responses import scale_of
 from designer.model.model_file import parse_model_file
@@ -49,7 +49,7 @@ from designer.paper.report_files import README, write_files
 from designer.paper.response_borders import SECOND, response_borders
 from designer.paper.response_order import gaps
 from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
-from designer.report import bifurcation_plots
+from designer.plots import bifurcation_plots
 
 FORMAT = 1
 COMMAND = "designer reproduce dynamics --out reports/paper-dynamics"

@@ -22,15 +22,15 @@ from designer.base.page import paragraphs
 from designer.base.progress import Progress
 from designer.bifurcations import border_curves
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
-from designer.bifurcations.curve_store import curves_csv
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.windows import BranchWindow, window
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import settle
+from designer.folders.curve_store import curves_csv
 from designer.model.swept_model import ModelSubject
 from designer.paper.dynamics_page import shown
 from designer.paper.report_files import README, make_report
-from designer.report import curve_plots
+from designer.plots import curve_plots
 
 OMEGA = (0.15, 1.8)
 """Of ω: where borders are followed."""

@@ -31,12 +31,12 @@ from designer.catalog.catalog import Catalog, load_catalog
 from designer.centering.limiting_parts import limitings
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
+from designer.folders.design_files import load
+from designer.folders.origin import provenance
+from designer.folders.study_stores import FolderStores
 from designer.jobs import search_job
-from designer.jobs.design_files import load
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
 from designer.jobs.search_job import search_into
-from designer.jobs.study_folder import FolderStores
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file

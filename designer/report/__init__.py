@@ -1,4 +1,4 @@
-"""Pages, tables and pictures of what was found."""
+"""Pages and tables of what was found."""
 
 import lazy_loader
 

@@ -36,10 +36,11 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.relative_motion import RelativeMotion
-from designer.report import design_tables, orbit_plots, words
+from designer.plots import orbit_plots
+from designer.plots.study_plots import VERDICTS, stop_curve
+from designer.report import design_tables, words
 from designer.report.data import ReportData
 from designer.report.plot_names import portrait_name, stop_name
-from designer.report.study_plots import VERDICTS, stop_curve
 from designer.verdicts.verdict import Verdict
 from designer.workbench.prediction import PredictedStop
 from designer.yields.yield_count import Yield

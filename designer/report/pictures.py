@@ -16,13 +16,19 @@ from designer.fabrication.board_picture import Side, board_svg
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.relative_motion import relative_motions
-from designer.report import blame_plots, design_tables, map_plots, orbit_plots, study_plots, words
+from designer.plots import (
+    blame_plots,
+    map_plots,
+    model_drawing,
+    orbit_plots,
+    study_plots,
+    system_drawing,
+)
+from designer.report import design_tables, words
 from designer.report.data import ReportData
 from designer.report.design_page import Pictures
 from designer.report.inline_svg import InlineSvg
-from designer.report.model_drawing import model_drawing
 from designer.report.plot_names import portrait_name, stop_name
-from designer.report.system_drawing import system_drawing
 from designer.schematic import schematic_drawing
 
 INTRO = (
@@ -63,10 +69,12 @@ def pictures(data: ReportData) -> Pictures:
     parameters = data.parameters
     out: dict[str, Picture | Gallery] = {}
     if isinstance(parameters, Dimensionless | Mechanical):
-        drawing = element(model_drawing(parameters), _drawing_label(data))
+        drawing = element(model_drawing.model_drawing(parameters), _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     elif isinstance(parameters, LumpedSystem):
-        drawing = element(system_drawing(parameters, si=data.si is not None), _drawing_label(data))
+        drawing = element(
+            system_drawing.system_drawing(parameters, si=data.si is not None), _drawing_label(data)
+        )
         out["model"] = Picture(svg=drawing)
     if data.checked:
         out["portraits"] = _portraits(data, element)

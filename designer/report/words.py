@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import replace
 
-from designer.base.units import format_quantity
+from designer.base.units import spaced_quantity
 from designer.check.checked_design import CheckedResponse
 from designer.check.trust import WORDS
 from designer.circuit.coefficients import EXACT
@@ -143,10 +143,4 @@ def deviation(value: float) -> str:
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    if not math.isfinite(value):
-        return NONE
-    if unit == "kg":  # it has a prefix already
-        return f"{value:.{digits}g}\u00a0kg"
-    text = format_quantity(value, unit, digits).removesuffix(unit)
-    figure = text.rstrip("fpnµmkMGT")
-    return f"{figure}\u00a0{text[len(figure) :]}{unit}"
+    return spaced_quantity(value, unit, digits) if math.isfinite(value) else NONE

@@ -11,8 +11,8 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import Excitation
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.kernels.kernel_boards import POINTS
 from designer.spice.numerics_gate import GateSubject
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, rounded
 

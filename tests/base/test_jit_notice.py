@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from numba.core import event
 
 from designer.base.jit_notice import MOTION, PARTS, announced
-from designer.dynamics import kernel_general, kernel_modal, kernel_propagators
+from designer.kernels import kernel_general, kernel_modal, kernel_propagators
 from tests.shared.house import HOUSE
 
 
@@ -36,7 +36,7 @@ def test_each_part_is_announced_once_and_by_name() -> None:
             _compile(module)
         with event.trigger_event("numba:compile", {"dispatcher": _dispatcher(kernel_general)}):
             _compile("designer.linear_network.kernel_linear")  # a callee: no part of its own
-    _compile("designer.dynamics.kernel_sweep")
+    _compile("designer.kernels.kernel_sweep")
     assert len(said) == 2
     assert MOTION in said[0]
     assert PARTS["kernel_propagators"] in said[1]
@@ -44,6 +44,6 @@ def test_each_part_is_announced_once_and_by_name() -> None:
 
 
 def test_every_kernel_that_is_not_of_motion_is_named() -> None:
-    """What stands outside ``dynamics`` is no motion between the stops."""
-    kernels = [path for path in HOUSE.glob("*/kernel_*.py") if path.parent.name != "dynamics"]
+    """What stands outside ``kernels`` is no motion between the stops."""
+    kernels = [path for path in HOUSE.glob("*/kernel_*.py") if path.parent.name != "kernels"]
     assert {path.stem for path in kernels} <= PARTS.keys()

@@ -17,11 +17,11 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.point_captions import caption
 from designer.bifurcations.points import PointKind, locate
-from designer.bifurcations.store import GridStore, SweepStore
 from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course
+from designer.folders.sweep_store import GridStore, SweepStore
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate

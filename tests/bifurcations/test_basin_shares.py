@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from designer.bifurcations import basin_shares
 from designer.bifurcations.basin_shares import BasinShares, SharePlan
-from designer.bifurcations.share_store import ShareBlocks
+from designer.folders.share_store import ShareBlocks
 from designer.model.swept_model import ModelSubject
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.oracles import Array, Plain

@@ -14,7 +14,6 @@ from designer.bifurcations import (
     parameter_map,
     point_captions,
     sweep,
-    titles,
     window_ends,
 )
 from designer.bifurcations.basins import BasinPlan
@@ -28,7 +27,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course
 from designer.model.swept_model import ModelSubject
-from designer.report import bifurcation_plots
+from designer.plots import bifurcation_plots, titles
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.figure_text import clipped, overlapping
 

@@ -16,7 +16,6 @@ from designer.base.errors import InputError
 from designer.bifurcations import basins, parameter_map, sweep, window_ends
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
-from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics import attractors
@@ -24,8 +23,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course, Steady, by_flow
+from designer.folders.sweep_store import GridStore, SweepStore, work_hash
 from designer.model.swept_model import ModelSubject
-from designer.report import bifurcation_plots, response_colours
+from designer.plots import bifurcation_plots, response_colours
 from tests.dynamics.test_modal_tables import PAPER
 
 SHORT, QUICK = Course(200, 20, 2000), Course(40, 16, 400)

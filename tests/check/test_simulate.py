@@ -19,7 +19,7 @@ from designer.dynamics import flow
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.report import simulate_plots
+from designer.plots import simulate_plots
 from tests.shared.model_text import PAPER_TABLE
 
 BASE = "format = 1\n" + PAPER_TABLE

@@ -17,7 +17,7 @@ from designer.circuit.dead_zone_parts import idle_limits
 from designer.circuit.netlist import Circuit, Excitation, Section, nominal_board
 from designer.circuit.packing import assignment, packed
 from designer.circuit.reduction import Reduction
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.model.board_table import BoardChoice
 from designer.spice import deck
 from designer.spice.deck import SolverSettings

@@ -30,7 +30,8 @@ from designer.catalog.design_rules import RULES
 from designer.design_rules import drc_specimen, kicad_drc, on_board
 from designer.design_rules.kicad_drc import DesignRuleCheck
 from designer.design_rules.kicad_program import KicadFailed
-from designer.jobs import kicad_files, rules_job
+from designer.folders import kicad_files
+from designer.jobs import rules_job
 from tests.circuit.test_reduction import EXACT
 from tests.shared.rule_cases import base
 from tests.shared.stages import stage

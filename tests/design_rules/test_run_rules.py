@@ -28,10 +28,10 @@ from designer.catalog.design_rule import (
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.cli import entry
 from designer.design_rules import rule_reports, run_rules
+from designer.folders.design_source import design_inputs
+from designer.folders.json_answers import synthesis_json
+from designer.folders.origin import provenance
 from designer.jobs import rules_job
-from designer.jobs.design_source import design_inputs
-from designer.jobs.json_answers import synthesis_json
-from designer.jobs.origin import provenance
 from designer.model.model_file import parse_model_file
 from tests.cli.test_entry import _tree
 from tests.design_rules import test_rules_board

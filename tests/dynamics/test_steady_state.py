@@ -11,20 +11,14 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
-from designer.dynamics import (
-    attractors,
-    kernel_algebra,
-    kernel_orbit,
-    kernel_sweep,
-    modal_tables,
-    steady_state,
-)
+from designer.dynamics import attractors, modal_tables, steady_state
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
-from designer.dynamics.kernel_modal import CHANGE, WIDTH
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course, DrivenSystem, Steady, by_flow
+from designer.kernels import kernel_algebra, kernel_orbit, kernel_sweep
+from designer.kernels.kernel_modal import CHANGE, WIDTH
 from designer.model.model import Dimensionless
 from designer.model.swept_model import ModelSubject
 from designer.model.swept_tables import ModalBatch

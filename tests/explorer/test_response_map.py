@@ -16,7 +16,7 @@ from designer.explorer.place import read_place
 from designer.explorer.response_map import COLUMNS, ROWS, borders, mapped, read_map
 from designer.explorer.wire import Message
 from designer.model.driven import model_flow
-from designer.report.response_colours import response_palette
+from designer.plots.response_colours import response_palette
 from tests.explorer.served import EXAMPLES
 
 PAPER = read_model_file(EXAMPLES / "paper.toml")

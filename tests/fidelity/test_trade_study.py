@@ -26,7 +26,6 @@ from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
-from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity import pieces, rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
@@ -54,6 +53,7 @@ from designer.jobs import rung_choice
 from designer.jobs.options import Options
 from designer.jobs.rung_choice import choose, with_rung
 from designer.jobs.trade_job import NAMES
+from designer.kernels.kernel_boards import POINTS
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import BOUND, RELTOL

@@ -10,9 +10,9 @@ import pytest
 
 from designer.base import jit
 from designer.circuit import kernel_nodal
-from designer.dynamics import kernel_boards, kernel_propagators
 from designer.jobs import compile_ahead
 from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
+from designer.kernels import kernel_boards, kernel_propagators
 
 
 class Process:

@@ -16,8 +16,8 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
 from designer.centering.cure_measure import plan_of, questions_of
+from designer.folders.design_source import read_design
 from designer.jobs.cure_job import cure_into
-from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.study_job import run_into
 from designer.jobs.synthesise_job import synthesise_into

@@ -21,7 +21,7 @@ from designer.base.plain_json import dumps
 from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.jobs.options import Options
 from designer.model.model_file import read_model_file
 from tests.shared.paper_cases import PAPER, synthesised

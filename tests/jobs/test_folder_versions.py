@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from designer.cli import entry as cli
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.jobs.study_stage import Place, read_study
 from tests.shared.stopped_work import work_stopped
 
@@ -52,7 +52,7 @@ def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 @pytest.fixture
 def later(monkeypatch: pytest.MonkeyPatch) -> None:
     """This version is a later one than wrote any folder."""
-    monkeypatch.setattr("designer.jobs.design_source.__version__", "99.0")
+    monkeypatch.setattr("designer.folders.design_source.__version__", "99.0")
 
 
 @pytest.fixture(scope="module")

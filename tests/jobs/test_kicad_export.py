@@ -19,7 +19,7 @@ from designer.catalog.catalog import load_catalog
 from designer.catalog.read import ENVIRONMENT
 from designer.check.synthesis_result import Synthesis
 from designer.cli import entry
-from designer.jobs import kicad_files
+from designer.folders import kicad_files
 from designer.schematic.kicad_project import Project
 from tests.catalog.test_catalog import own_opamp
 from tests.shared.paper_cases import PAPER

@@ -11,7 +11,7 @@ import pytest
 
 import designer
 from designer.cli import entry
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.jobs.folder_numbers import of_study
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file, read_model_file

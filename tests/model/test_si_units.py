@@ -16,8 +16,8 @@ from designer.base.si_unit import prefixed, value_text
 from designer.base.units import distinct_texts
 from designer.bifurcations.parameter_map import MapPlan
 from designer.cli import entry, tables
+from designer.folders.bench_tables import COLUMNS, MECHANISM
 from designer.jobs import bifurcation_request
-from designer.jobs.bench_tables import COLUMNS, MECHANISM
 from designer.jobs.bifurcation_request import Request
 from designer.model.model import Dimensionless, SiScales
 from designer.model.model_file import parse_model_file
@@ -30,7 +30,7 @@ from designer.model.si_units import (
     units_of,
 )
 from designer.model.swept_model import ModelSubject
-from designer.report import bifurcation_plots, simulate_plots
+from designer.plots import bifurcation_plots, simulate_plots
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 

@@ -45,7 +45,7 @@ from designer.paper.statements import (
     _touches,
     main_windows,
 )
-from designer.report import bifurcation_plots
+from designer.plots import bifurcation_plots
 
 SMALL = DynamicsExtent(
     low=1.29, high=1.6, depth=2, figures=(), borders=(), shared=(1.55,), chatter=(0.2, 0.05)

@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.arrays import Array
 from designer.circuit.ensemble import Ensemble
-from designer.dynamics.kernel_boards import POINTS
+from designer.kernels.kernel_boards import POINTS
 from designer.report import board_columns
 from designer.report.board_columns import boards_json, shown_boards
 from designer.report.data import ReportData

@@ -25,7 +25,7 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
-from designer.jobs.origin import provenance
+from designer.folders.origin import provenance
 from designer.model.ascii_sketch import sketch
 from designer.model.mechanics import Sides
 from designer.model.model_file import parse_model_file, read_model_file

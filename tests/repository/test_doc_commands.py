@@ -164,7 +164,7 @@ def _run_python(snippet: Snippet, scratch: Path) -> None:
         text = text.replace(old, new)
     if "_made" in text:  # the page speaks of the result of synthesise()
         text = (
-            "from pathlib import Path\nfrom designer.jobs.design_source import read_design\n"
+            "from pathlib import Path\nfrom designer.folders.design_source import read_design\n"
             f'_made = read_design(Path("out/paper"))\n{text}'
         )
     script = scratch / "snippet.py"

@@ -14,8 +14,9 @@ from designer.board.bom_layouts import file_of
 from designer.centering import ngspice_check, operating_points
 from designer.cli import command_line
 from designer.dynamics.steady_state import Course
-from designer.jobs import bifurcation_request, board_files, trade_job
-from designer.jobs.study_cache import CACHE
+from designer.folders import board_files
+from designer.folders.study_cache import CACHE
+from designer.jobs import bifurcation_request, trade_job
 from designer.model import mechanics, si_units
 from designer.model.board_table import BoardSpec
 from designer.spice import numerics_gate

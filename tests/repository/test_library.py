@@ -22,8 +22,8 @@ import designer
 from designer.base.frames import MOST_ROWS, frame, table_html
 from designer.board.bom import bill_csv
 from designer.cli.app import VERBS
+from designer.folders.board_files import bills
 from designer.jobs import cure_job, search_job, trade_job
-from designer.jobs.board_files import bills
 from designer.model.measured_values import MeasuredBoards
 from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
 from designer.verdicts.verdict import Verdict

@@ -15,8 +15,8 @@ from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import CustomRule, board_rules
 from designer.catalog.design_rule import PASS
 from designer.design_rules import on_board
+from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
-from designer.jobs.kicad_files import texts
 from designer.routing.board_layers import with_layers
 from designer.routing.routed_board import route_board
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written

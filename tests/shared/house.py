@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HOUSE = ROOT / "designer"
 ORDER = (
     "base",
+    "kernels",
     "dynamics",
     "bifurcations",
     "catalog",
@@ -32,7 +33,9 @@ ORDER = (
     "centering",
     "fidelity",
     "workbench",
+    "plots",
     "report",
+    "folders",
     "jobs",
     "explorer",
     "paper",

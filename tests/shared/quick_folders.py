@@ -9,7 +9,7 @@ import pytest
 
 from designer.base.progress import Progress
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files
+from designer.folders import design_files
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file

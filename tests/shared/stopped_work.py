@@ -9,17 +9,17 @@ from pathlib import Path
 import pytest
 
 from designer.check import simulation
+from designer.folders import design_files
+from designer.folders.design_source import read_design
 from designer.jobs import (
     bench_job,
     bifurcation_job,
     cure_job,
-    design_files,
     rules_job,
     study_stage,
     synthesise_job,
     trade_job,
 )
-from designer.jobs.design_source import read_design
 
 
 @contextmanager

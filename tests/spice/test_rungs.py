@@ -20,8 +20,8 @@ from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.piecewise_linear import Drive
+from designer.kernels.kernel_boards import POINTS
 from designer.model.model_file import parse_model_file
 from designer.spice import deck
 from designer.spice.deck import SolverSettings

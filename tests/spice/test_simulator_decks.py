@@ -17,7 +17,7 @@ from designer.check.deck_runs import response_runs
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import nominal_board
 from designer.circuit.nominal import nominal_reduction, on_circuit
-from designer.jobs import design_files
+from designer.folders import design_files
 from designer.jobs.export_job import deck_text
 from designer.model.find_responses import find
 from designer.model.response_table import Response
@@ -26,8 +26,8 @@ from designer.spice.read_orbit import Read
 from designer.spice.simulator import Waveforms
 from designer.spice.simulator_decks import DIALECTS, Dialect
 from designer.spice.worker import open_simulator
+from tests.folders.test_stage_files import made
 from tests.jobs.test_kicad_export import MODEL, designer, snapshot
-from tests.jobs.test_stage_files import made
 
 WAVE_BOUND = 1e-3
 """Root mean square of the difference, of each state's peak: what docs/ngspice.md states."""

@@ -23,8 +23,9 @@ from designer.centering.design_search import look
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Circuit
 from designer.cli import entry, tables
-from designer.jobs import board_files, design_files, study_job, study_stage
-from designer.jobs.design_source import bills_are_of_old, design_inputs
+from designer.folders import board_files, design_files
+from designer.folders.design_source import bills_are_of_old, design_inputs
+from designer.jobs import study_job, study_stage
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.report.data import ReportData
@@ -35,7 +36,7 @@ from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.yields.study import RunResult, Study, plan_study
 from tests.circuit.test_reduction import EXACT, circuit_of
-from tests.jobs.test_stage_files import design_of
+from tests.folders.test_stage_files import design_of
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import bought as nearest_sold, rectifier, stage

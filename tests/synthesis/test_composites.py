@@ -18,7 +18,7 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.resistors import effective
-from designer.jobs.design_source import read_design
+from designer.folders.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.board_table import BoardChoice

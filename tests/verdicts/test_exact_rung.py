@@ -14,8 +14,8 @@ from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
+from designer.kernels.kernel_boards import POINTS
 from designer.spread.spread import draw, draw_many
 from designer.verdicts import exact_rung
 from tests.circuit.test_ensemble import FEW, STAGES, nominal

@@ -24,8 +24,8 @@ from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.cli import entry
-from designer.jobs import design_source, study_json
-from designer.jobs.study_folder import NGSPICE, PIECES
+from designer.folders import design_source, study_json
+from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
 from designer.verdicts import exact_rung, ngspice_runs
@@ -38,7 +38,7 @@ from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.tolerance_study import Stores, Work, tolerance
-from tests.jobs.test_study_cache import MAP
+from tests.folders.test_study_cache import MAP
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan

@@ -22,7 +22,7 @@ from designer.circuit.reduction import Reduction
 from designer.circuit.working_modes import at_rest
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
-from designer.jobs.study_json import study_json
+from designer.folders.study_json import study_json
 from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw, draw_many
 from designer.verdicts import exact_rung

@@ -14,7 +14,7 @@ from designer.circuit.netlist import Resistor
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.jobs.study_json import tuned_json
+from designer.folders.study_json import tuned_json
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw
 from designer.verdicts.verdict import Answer, Question, Verdict, judge

@@ -18,7 +18,7 @@ from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.model.response_table import Response
-from designer.report.map_plots import map_chart, map_files
+from designer.plots.map_plots import map_chart, map_files
 from designer.spread.spread import Spread, draw
 from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
 from designer.yields import yield_maps

@@ -1,0 +1,180 @@
+"""The files of the design stage: what is written of a design, and how it is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from designer.base.defaults import cores
+from designer.base.design_folder import DESIGN, MODEL, Folder
+from designer.base.errors import InputError
+from designer.base.guarded_reading import csv_rows, read_text, reading
+from designer.base.plain_json import dumps
+from designer.board.board_check import check_board
+from designer.catalog.catalog import Catalog
+from designer.check.checked_design import CheckedResponse
+from designer.check.deck_runs import circuit_notes, first_run
+from designer.check.synthesis_result import Synthesis
+from designer.circuit import build
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.dead_zone_parts import dead_zone_stage
+from designer.circuit.design import Certificate, ConditionCheck, Design
+from designer.circuit.netlist import nominal_board
+from designer.fabrication.board_cost import cost_or_none
+from designer.folders import board_files
+from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes
+from designer.folders.json_answers import synthesis_json
+from designer.folders.origin import provenance
+from designer.linear_network.milp import SOLVER
+from designer.model.find_responses import find, peaks
+from designer.model.measured_values import MEASURED
+from designer.model.model_file import ModelFile, naming
+from designer.spice import deck
+from designer.spread.part_grades import better_grades
+
+SETUP = "setup.csv"
+
+
+def check(modelfile: ModelFile, catalog: Catalog) -> None:
+    """Refuse what no design folder could be written for, before any part is chosen
+    (``board_check.check_board``)."""
+    with naming(modelfile):
+        check_board(modelfile, catalog)
+
+
+def texts(synthesis: Synthesis) -> dict[str, str]:
+    """Every file of the design stage but ``design.json``; made before the folder is touched."""
+    modelfile, design = synthesis.modelfile, synthesis.design
+    return {
+        MODEL: modelfile.text,
+        "circuit.cir": circuit_deck(synthesis),
+        SETUP: setup_csv(
+            design, synthesis.model_responses, start_recipes(synthesis, cores()), modelfile.si
+        ),
+        "scales.csv": scales_csv(modelfile, design, synthesis.model_responses),
+        **board_files.texts(synthesis),
+    }
+
+
+def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:
+    """Write the stage. files : its ``texts``."""
+    for name, text in files.items():
+        folder.write(name, text)
+    folder.write(board_files.PICTURE, board_files.picture(synthesis))
+    if synthesis.modelfile.measured is not None:
+        folder.write(MEASURED, synthesis.modelfile.measured.content)
+    folder.write(DESIGN, dumps(answer(synthesis)))
+
+
+def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
+    """Write the bills of a finished design anew, as its parts are bought now."""
+    assert folder.manifest is not None
+    for name, text in board_files.bills(synthesis).items():
+        if name in folder.manifest.files:
+            folder.rewrite(name, text)
+
+
+def answer(synthesis: Synthesis) -> dict[str, Any]:
+    """The JSON object of ``design.json``."""
+    cost = cost_or_none(synthesis)
+    found = synthesis_json(
+        synthesis.modelfile,
+        synthesis.design,
+        synthesis.model_responses,
+        design_provenance(synthesis),
+        synthesis.seconds,
+        better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
+    )
+    return {**found, "board_cost": None if cost is None else cost.as_dict()}
+
+
+def design_provenance(synthesis: Synthesis) -> dict[str, Any]:
+    return provenance(synthesis.modelfile, synthesis.catalog.hash, settings={"highs": SOLVER})
+
+
+def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
+    """The design of a folder, rebuilt from its model and the values of its parts.
+
+    Nothing is chosen again; the errors are computed afresh and must be those that were written.
+    """
+    document, file = folder.json(DESIGN), folder / DESIGN
+    model, spec = modelfile.model, modelfile.circuit
+    responses = find(model, modelfile.responses)
+    catalog = modelfile.choices(catalog)
+    with naming(modelfile):
+        opamp = catalog.opamp(spec.opamp, spec.supply)
+    with reading(file, "the design of this folder's model", "parts"):
+        values = {name: _size(value, file, name) for name, value in document["parts"].items()}
+        circuit = build.circuit_of(
+            model,
+            values,
+            opamp,
+            supply=float(document["circuit"]["supply"]),
+            saturation=spec.saturation,
+            stage=dead_zone_stage(model, spec, catalog),
+            composites=document.get("composites", {}),
+        )
+        gain, bias, limit = (float(document["circuit"][k]) for k in ("gain", "bias", "saturation"))
+        circuit = replace(circuit, gain=gain, bias=bias, saturation=limit)
+        largest = peaks(model, responses).states
+        volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
+        swing = (float((volts * largest).max()), largest)
+        errors = coefficient_errors(circuit, model.second_order(), swing=swing)
+        if abs(errors.max_error - float(document["max_error"])) > 1e-9:
+            raise ValueError("parts and max_error do not belong together")
+        conditions = document["conditions"]
+        listed = {key: conditions.get(key, ()) for key in ("checked", "at_limit", "binding")}
+        design = Design(
+            model=model,
+            circuit=circuit,
+            errors=errors,
+            certificate=Certificate(**document["certificate"]),
+            conditions={k: float(v) for k, v in conditions.items() if k not in listed},
+            solver=dict(document["solver"]),
+            seconds=float(document["cost"]["synthesis_seconds"]),
+            checks=tuple(ConditionCheck(**check) for check in listed["checked"]),
+            binding=dict(listed["binding"]),
+        )
+    return Synthesis(modelfile, catalog, responses, design)
+
+
+def _size(value: object, file: Path, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0.0:
+        raise InputError(file, f"parts.{name}", value, "a number > 0, in ohm or farad")
+    return float(value)
+
+
+def starts(folder: Folder) -> tuple[str, ...]:
+    """How to start each response, by the folder's ``setup.csv``."""
+    path = folder / SETUP
+    rows = csv_rows(read_text(path, "the setup table of this design (CSV)"), path)
+    _, header = next(rows, (1, []))
+    if "start" not in header:
+        text = ", ".join(header) or "nothing"
+        raise InputError(path, "line 1", text, "a header with a column start")
+    at = header.index("start")
+    return tuple(row[at] if len(row) > at else "" for _, row in rows if row)
+
+
+def circuit_deck(synthesis: Synthesis, checked: CheckedResponse | None = None) -> str:
+    """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
+
+    checked : of the first response; its gate's settings are used.
+    """
+    design, run = synthesis.design, first_run(synthesis, checked)
+    text = deck.write(
+        design.circuit,
+        nominal_board(design.circuit),
+        run.excitation,
+        run.settings,
+        title=synthesis.modelfile.title,
+        stop_time=run.stop_time,
+        initial=run.initial,
+        notes=circuit_notes(synthesis, run),
+    )
+    # Without such a line the plain program runs nothing.
+    return text.replace("\n.end\n", f"\n.print tran {deck.voltages(design.circuit)}\n.end\n")

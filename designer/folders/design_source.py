@@ -1,0 +1,152 @@
+"""A verb's argument: the model file in it, the folder to write into, the design that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, Folder, is_design_folder
+from designer.base.errors import MISSING, InputError
+from designer.base.manifest import Stages
+from designer.base.progress import Progress
+from designer.base.version import __version__
+from designer.catalog.catalog import Catalog, load_catalog
+from designer.check.synthesis_result import Synthesis
+from designer.folders import board_files
+from designer.folders.design_files import load
+from designer.model.measured_values import MEASURED
+from designer.model.model_file import ModelFile, read_model_file
+from designer.spread.part_grades import once_otherwise
+
+GRADES = "grades"
+"""Among a design's inputs where the bill once held other grades than the study drew."""
+
+
+def model_file(path: Path) -> ModelFile:
+    """Read a model file; a design folder's has its measured values from the folder's own copy, and
+    where it states no title that of the file it was copied from."""
+    if path.name != MODEL or not is_design_folder(path.parent):
+        return read_model_file(path)
+    modelfile = read_model_file(path, measured=path.parent / MEASURED)
+    if modelfile.title != path.stem or not (path.parent / DESIGN).is_file():
+        return modelfile
+    title = Folder(path.parent).json(DESIGN).get("title")
+    if not isinstance(title, str) or len(title.splitlines()) != 1:
+        return modelfile
+    return replace(modelfile, title=title)
+
+
+def source(model: Path | str | ModelFile, out: Path | str | None) -> tuple[ModelFile, Path]:
+    """The model file of a verb's argument (one that was read, its path, or a design folder), and
+    the folder to write into.
+
+    Raises
+    ------
+    InputError : none of these, or a model file without ``out``.
+    """
+    place = None if out is None else Path(out)
+    if isinstance(model, ModelFile) or not Path(model).is_dir():
+        modelfile = model if isinstance(model, ModelFile) else model_file(Path(model))
+        if place is None:
+            stem = "model" if isinstance(model, ModelFile) else Path(model).stem
+            expected = f"a folder to write the design into, such as --out out/{stem}"
+            raise InputError(None, "--out", MISSING, expected)
+        return modelfile, place
+    path = Path(model)
+    if not is_design_folder(path):
+        expected = "a model file (TOML) or a design folder"
+        raise InputError(path, "the folder", "no manifest.json", expected)
+    modelfile = model_file(path / MODEL)
+    if design_inputs_of(Folder(path)).get("model") != modelfile.sha256:
+        raise InputError(
+            path / MODEL,
+            "its sha256",
+            modelfile.sha256[:12] + "…",
+            "the model that this folder was made from; a changed model needs a folder of its own "
+            "(give the file and --out)",
+        )
+    return modelfile, place or path
+
+
+def read_design(
+    path: Path | str, catalog: Catalog | None = None, progress: Progress | None = None
+) -> Synthesis:
+    """The design in a design folder; ``progress`` is told of another catalogue or version."""
+    modelfile, place = source(Path(path), path)
+    folder, catalog = Folder(place), load_catalog() if catalog is None else catalog
+    if progress is not None:
+        standing_design(folder, modelfile, catalog, progress)
+    return load(folder, modelfile, catalog)
+
+
+def design_inputs_of(folder: Folder) -> dict[str, Any]:
+    """Inputs of the folder's design; empty where there is none."""
+    design = folder.manifest.stages.get("design") if folder.manifest else None
+    return {} if design is None else design.inputs
+
+
+def design_inputs(modelfile: ModelFile, catalog: Catalog) -> dict[str, Any]:
+    """What decides the design of a model file."""
+    inputs = {"model": modelfile.sha256, "catalogue": catalog.hash, "version": __version__}
+    listed = modelfile.measured
+    return (
+        inputs
+        | grade_inputs(modelfile, catalog)
+        | ({} if listed is None else {"measured": listed.sha256})
+    )
+
+
+def grade_inputs(modelfile: ModelFile, catalog: Catalog) -> dict[str, str]:
+    """What tells the boards of this file, and its bill, from those of folders that bought other
+    grades than they drew; empty where none did."""
+    return {GRADES: "drawn as bought"} if once_otherwise(modelfile, catalog) else {}
+
+
+def design_stage(modelfile: ModelFile, inputs: dict[str, Any]) -> Stages:
+    """The stage of a design, with the names of its files."""
+    files = [*DESIGN_FILES, *board_files.names(modelfile)]
+    files += [MEASURED] if modelfile.measured is not None else []
+    return {"design": (inputs, files)}
+
+
+def standing_design(
+    folder: Folder, modelfile: ModelFile, catalog: Catalog, progress: Progress
+) -> Stages:
+    """The stage of the design; a design that stands in the folder is not made anew.
+
+    A folder may come from another machine: where the model file is the folder's own, its parts
+    stand, whatever catalogue or version they were chosen with, and a note names these.
+    """
+    inputs, origin = design_inputs(modelfile, catalog), design_inputs_of(folder)
+    stands = (
+        modelfile.source == folder / MODEL
+        and folder.state("design", inputs) == "other"
+        and all(origin.get(key) == inputs.get(key) for key in ("model", "measured"))
+    )
+    if not stands:
+        return design_stage(modelfile, inputs)
+    progress.note(
+        f"this design was made with catalogue {_short(origin, 'catalogue')} and version "
+        f"{_short(origin, 'version')}; here are catalogue {_short(inputs, 'catalogue')} and "
+        f"version {_short(inputs, 'version')}: its parts stand as they are"
+    )
+    if bills_are_of_old(origin, inputs):
+        progress.note(
+            "it is of a version whose bill of materials bought better grades than its study "
+            "drew: a study that is made now writes the bill anew"
+        )
+    return design_stage(modelfile, origin)
+
+
+def bills_are_of_old(origin: Mapping[str, Any], inputs: Mapping[str, Any]) -> bool:
+    """Whether a folder's bill may list other grades than a study draws now.
+
+    origin, inputs : inputs of its design, as it was made and as it would be made now.
+    """
+    return GRADES in inputs and GRADES not in origin
+
+
+def _short(inputs: Mapping[str, Any], key: str) -> str:
+    return str(inputs.get(key, "not known"))[:12]

@@ -1,0 +1,134 @@
+"""The stores of a study in a design folder: its folders of blocks, its blame, its maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from designer.base.keyed_store import Vouch, nobody
+from designer.folders.study_cache import StudyCache
+from designer.verdicts.verdict import StudyPlan
+from designer.yields.blame_analysis import Blame
+from designer.yields.layers import LAYERS, LayerName
+from designer.yields.row_store import BlockStore
+from designer.yields.stored_parts import StoredParts
+from designer.yields.study import Study
+from designer.yields.study_identity import blame_hash, study_hash
+from designer.yields.tolerance_study import Stores
+
+SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
+TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
+BLOCK_FOLDERS: dict[LayerName, str] = {
+    "samples": SAMPLES,
+    "ngspice": NGSPICE,
+    "tuned": TUNED,
+    "trimmed": TRIMMED,
+    "reached": REACHED,
+}
+"""Folder of blocks by layer."""
+MAPS = "maps.json"
+BOARDS = "boards.csv"
+"""A row for each measured board."""
+PIECES = "study-pieces.npz"
+"""What is known of a blame and of maps that are not whole."""
+
+
+class FolderStores(Stores):
+    """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
+    is told of blocks that are damaged or of another study. kept : where the blame is; pieces :
+    where what is known of one that is not whole. prefix : of the names in the folder, "" or ending
+    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``)."""
+
+    def __init__(
+        self,
+        root: Path,
+        guard: Callable[[], None],
+        note: Callable[[str], None] = lambda _: None,
+        cache: StudyCache | None = None,
+        pieces: StudyCache | None = None,
+        prefix: str = "",
+        vouch: Vouch = nobody,
+    ) -> None:
+        self._vouch = vouch
+        self._root, self._guard, self._note, self._cache = root, guard, note, cache
+        self._pieces, self._prefix = pieces, prefix
+        self._stores: dict[str, BlockStore[Any]] = {}
+
+    def rows(
+        self, layer: LayerName, plan: StudyPlan, more: Mapping[str, Any] | None = None
+    ) -> BlockStore[Any]:
+        folder, (row, size) = BLOCK_FOLDERS[layer], LAYERS[layer]
+        if folder not in self._stores:
+            self._stores[folder] = BlockStore(
+                self._root,
+                self._prefix + folder,
+                row,
+                study_hash(plan, layer, more),
+                omegas=[q.spec.omega for q in plan.questions],
+                labels=plan.labels,
+                size=size,
+                guard=self._guard,
+                note=self._note,
+                vouch=self._vouch,
+            )
+        return self._stores[folder]
+
+    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+        if self._cache is None:
+            return None
+        result: Blame | None = self._cache.get("blame", blame_hash(plan))
+        if result is None or (result.share < 1.0 and (result.budget or 0) < budget):
+            return None
+        return result
+
+    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+        if self._cache is not None:
+            self._guard()
+            self._cache.put("blame", blame_hash(plan), replace(blame, seconds=0.0))
+
+    def blame_parts(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(blame_hash(plan))
+
+    def maps(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(study_hash(plan, "maps"))
+
+    def _pieces_of(self, key: str) -> StoredParts:
+        if self._pieces is None:
+            return StoredParts()
+        return _FolderPieces(self._pieces, key, self._guard)
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Every file of a block, relative to the folder."""
+        return sorted({name for store in self._stores.values() for name in store.names})
+
+
+class _FolderPieces(StoredParts):
+    """Pieces of what ``key`` decides, in a file."""
+
+    def __init__(self, file: StudyCache, key: str, guard: Callable[[], None]) -> None:
+        self._file, self._key, self._guard = file, key, guard
+
+    def get(self, name: str) -> Any | None:
+        return self._file.get(name, self._key)
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        if values:
+            self._guard()
+            self._file.put_all(values, self._key)
+
+
+def map_files(study: Study, provenance: Mapping[str, Any]) -> dict[str, bytes]:
+    """``maps.json`` and a picture of each map, by name; none where there are no maps. Times are in
+    ``tolerance.json``."""
+    if not study.maps:
+        return {}
+    from designer.plots.map_plots import map_files as files  # Matplotlib takes a while to import
+
+    labels = [
+        f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
+    ]
+    timeless = [replace(each, seconds=0.0) for each in study.maps]
+    return files(timeless, labels, {"provenance": provenance})

@@ -1,0 +1,84 @@
+"""The layers of a study: what is asked for, what the folder has, and which files they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from designer.base.design_folder import REPORTS, TOLERANCE, Folder
+from designer.base.manifest import StageName
+from designer.folders.study_cache import CACHE
+from designer.folders.study_stores import BLOCK_FOLDERS, BOARDS, MAPS, PIECES
+from designer.jobs.options import Options
+from designer.yields.yield_maps import OVERS
+
+MAP = "map:"
+ALL_IN_NGSPICE = "ngspice of every board"
+WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
+
+
+def layers_of(options: Options) -> list[str]:
+    """Names of the layers that are asked for, sorted."""
+    budget = options.blame_budget if options.blamed else None
+    names = {
+        "samples": True,
+        "ngspice": options.rung != "exact",
+        ALL_IN_NGSPICE: options.rung == "ngspice",
+        "tuned": options.tuned,
+        "trimmed": options.trimmed,
+        "reached": options.reached,
+        WITHOUT_BLAME: not options.blamed,
+        f"{BLAME_BUDGET}{budget}": budget is not None,
+        **{f"{MAP}{over}": True for over in options.maps},
+    }
+    return sorted(name for name, wanted in names.items() if wanted)
+
+
+def blamed(layers: Iterable[str]) -> bool:
+    """Whether a study of these layers has a blame."""
+    return WITHOUT_BLAME not in layers
+
+
+def blame_budget(layers: Iterable[str]) -> int | None:
+    """The largest budget among these layers; None where none is stated."""
+    budgets = [int(n.removeprefix(BLAME_BUDGET)) for n in layers if n.startswith(BLAME_BUDGET)]
+    return max(budgets, default=None)
+
+
+def merged(
+    folder: Folder, inputs: Mapping[str, Any], options: Options, name: StageName = "study"
+) -> Options:
+    """The options with every layer that the folder's study has already, if it is one of the same
+    inputs otherwise: a study gets more layers, it loses none. name : of the study's stage."""
+    stage = folder.manifest.stages.get(name) if folder.manifest else None
+    stored = {} if stage is None else stage.inputs
+    if {k: v for k, v in stored.items() if k != "layers"} != dict(inputs):
+        return options
+    names = {*stored.get("layers", ()), *layers_of(options)}
+    rung = options.rung
+    if "ngspice" in names and rung != "bandwidth":
+        rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
+    has_blame = stage is not None and stage.complete and blamed(stored["layers"])
+    with_blame = options.blamed or has_blame
+    return replace(
+        options,
+        rung=rung,
+        tuned="tuned" in names,
+        reached="reached" in names,
+        maps=tuple(over for over in OVERS if f"{MAP}{over}" in names),
+        blamed=with_blame,
+        blame_budget=blame_budget(names) if with_blame else None,
+    )
+
+
+def study_files(options: Options, responses: int, census: bool) -> list[str]:
+    """What the stage writes; a name that ends in "/" is a folder of blocks. census : whether it is
+    of all the boards of a list."""
+    names = layers_of(options)
+    blocks = [f"{folder}/" for name, folder in BLOCK_FOLDERS.items() if name in names]
+    boards = [BOARDS] if census else []
+    pieces = [PIECES] if options.blamed or options.maps else []
+    maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
+    maps += [MAPS] if maps else []
+    return [TOLERANCE, *REPORTS, CACHE, *boards, *pieces, *maps, *blocks]

@@ -1,0 +1,401 @@
+"""Pictures of sweeps, of maps of n-p-q and of basins of attraction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from designer.base.arrays import Array
+from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.bifurcations.attractor_list import SAME
+from designer.bifurcations.basin_shares import BasinShares
+from designer.bifurcations.basins import BasinPlan, Basins
+from designer.bifurcations.parameter_map import MapPlan, ParameterMap
+from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.subject import Subject
+from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
+from designer.dynamics.counts import read_counts
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Steady
+from designer.plots.response_colours import (
+    BLACK,
+    CHAOS,
+    DOTS,
+    MARKS,
+    OPEN,
+    OTHERS,
+    RED,
+    SHADES,
+    palette_legend,
+    response_palette,
+)
+from designer.plots.share_band import share_band
+from designer.plots.si_axes import si_x, si_y
+from designer.plots.titles import NAMES, title
+
+WIDE = 0.012
+"""Of the sweep: narrower windows get no label."""
+SECOND_AXIS = 0.42
+"""How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
+Coloured = tuple[str, Array, list[Steady]]
+"""Colour, values of the parameter, and the motions there."""
+SHARE_BAND = 1.6
+"""Height of the band of counted basins [inch]."""
+STOP_PANEL = 1.8
+"""Height of the panel of each stop past the first [inch]."""
+STRIPS = {DOWN: "↓", UP: "↑"}
+
+
+def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Bifurcation]:
+    """Those of stable orbits between two values."""
+    return [p for p in points if (p.stable[0] or p.stable[1]) and low <= p.value <= high]
+
+
+@styled
+def diagram(
+    sweep: Sweep,
+    points: Sequence[Bifurcation] = (),
+    name: str = "",
+    shares: BasinShares | None = None,
+) -> Figure:
+    """The paper's Fig. 2: least displacement of each period, impact velocity on each stop that the
+    subject shows, largest Lyapunov exponent, over the swept parameter; windows named above.
+
+    points : to be marked. name : the model's title. shares : counted basins, as a band below.
+    """
+    plan = sweep.plan
+    strips = list(plan.tracks) if plan.followed else ["starts"]
+    more = len(plan.subject.stops) - 1
+    band = [] if shares is None else [SHARE_BAND]
+    figure = new_figure(9.6, 7.6 + 0.24 * len(strips) + STOP_PANEL * more + sum(band))
+    heights = [0.24] * len(strips) + [2.4, 2.4, *[STOP_PANEL] * more, 1.6, *band]
+    _head(figure, title(name, plan, 120))
+    rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    for axes, track in zip(rows, strips, strict=False):
+        track_windows = [w for w in sweep.windows if w.track == track or not plan.followed]
+        _strip(axes, track_windows, plan.values, track if len(strips) > 1 else "")
+    coloured = _coloured(sweep)
+    panels = rows[len(strips) : len(rows) - len(band)]
+    _clouds(panels, sweep, coloured)
+    _diagram_axes(panels, plan)
+    if shares is not None:
+        share_band(rows[-1], shares)
+    _swept_axis(rows[-1], plan)
+    handles = _key(sweep, coloured) + _marked(panels, points)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
+    return figure
+
+
+def _clouds(panels: Sequence[Axes], sweep: Sweep, coloured: Sequence[Coloured]) -> None:
+    """Every step of the sweep in the panels, and limits for the exponent."""
+    least, *speeds, growth = panels
+    size = min(3.2, max(1.5, 1000.0 / len(sweep.plan.values)))
+    for colour, values, steps in coloured:
+        ink: dict[str, Any] = {"color": colour, "ls": "", "rasterized": True, "ms": size}
+        _cloud(least, values, [s.minima for s in steps], ink)
+        for k, speed in enumerate(speeds):
+            _cloud(speed, values, [_met(s, k) for s in steps], ink)
+        growth.plot(values, [s.lyapunov for s in steps], marker=".", mew=0, **ink)
+    growth.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
+    finite = np.array([s.lyapunov for steps in sweep.steps.values() for s in steps])
+    finite = finite[np.isfinite(finite)]
+    if len(finite):
+        low, high = float(np.quantile(finite, 0.05)), float(finite.max())
+        margin = 0.08 * max(high - low, 1e-12)
+        growth.set_ylim(min(low, 0.0) - margin, max(high, 0.0) + margin)
+
+
+def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
+    least, *speeds, growth = panels
+    units, si = plan.subject.units, plan.subject.si
+    symbol = plan.subject.states[0][0]
+    labels = plan.subject.labels
+    name = labels.get("displacement", f"{symbol}₁")
+    least.set_ylabel(
+        _label(
+            f"least {name}\nin each period" if labels else f"least {name} in each period",
+            units.get("x", ""),
+        )
+    )
+    for speed, stop in zip(speeds, plan.subject.stops, strict=True):
+        text = f"impact velocity {stop.velocity}\non {stop.name}"
+        speed.set_ylabel(_label(text, units.get("v", "")))
+        si_y(speed, si.get("x1'"))
+    growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
+    for axes in panels:
+        axes.grid(True, color=GRID, lw=0.5)
+    si_y(least, si.get("x1"))
+
+
+def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
+    """The axis of the swept parameter, below the lowest panel."""
+    span = float(plan.values[-1] - plan.values[0])
+    lowest.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
+    lowest.set_xlabel(_axis(plan.subject, plan.parameter))
+    si_x(lowest, plan.subject.si.get(plan.parameter), below=SECOND_AXIS)
+
+
+def _met(step: Steady, stop: int) -> Array:
+    """Impact velocities on one of the shown stops; none of a step that did not come to an end."""
+    each = (step.velocities, *step.further)
+    return each[stop] if stop < len(each) else np.zeros(0)
+
+
+def _marked(panels: Sequence[Axes], points: Sequence[Bifurcation]) -> list[Any]:
+    """Bifurcation points as lines through the panels; their legend."""
+    handles = []
+    top = panels[-1].get_xaxis_transform()
+    for kind in dict.fromkeys(str(p.kind) for p in points):
+        marker, colour = MARKS.get(kind, ("|", INK))
+        at = [p.value for p in points if p.kind == kind]
+        for axes in panels:
+            for value in at:
+                axes.axvline(value, color=colour, lw=0.7, ls=(0, (4, 3)), zorder=0.5)
+        look: dict[str, Any] = {"ls": "", "marker": marker, "color": colour, "ms": 5}
+        panels[-1].plot(at, [1.0] * len(at), transform=top, clip_on=False, zorder=6, **look)
+        handles.append(Line2D([], [], label=kind, **look))
+    return handles
+
+
+@styled
+def parameter_map(result: ParameterMap, name: str = "") -> Figure:
+    """Colours name the response at every point. name : the model's title."""
+    plan = result.plan
+    figure, axes = _plane(7.6, 5.4, title(name, plan, 92))
+    looks = response_palette(result.counts)
+    colours = list(dict.fromkeys(looks.values()))
+    _cells(axes, plan, [colours.index(looks[c.response]) for c in result.cells], colours)
+    _plane_axes(axes, plan)
+    legend = palette_legend(result.counts, looks)
+    _legend_beside(axes, [_patch(*each) for each in legend])
+    return figure
+
+
+@styled
+def basins(result: Basins, name: str = "") -> Figure:
+    """Colours name the attractor that each start goes to; dots are the attractors' strobes.
+    name : the model's title."""
+    plan = result.plan
+    figure, axes = _plane(7.2, 5.2, title(name, plan, 86))
+    colours = _attractor_colours(result)
+    _cells(axes, plan, [c.attractor for c in result.cells], colours)
+    handles: list[Any] = []
+    column = (plan.subject.states.index(plan.x), plan.subject.states.index(plan.y))
+    flow = plan.subject.settings([plan.changes])[0].flow()
+    for a, colour in zip(result.attractors, colours, strict=True):
+        text = a.response + (" symmetric" if a.symmetric else "")
+        if a.twin is not None and a.twin < a.number:
+            text += f", twin of {result.attractors[a.twin].response}"
+        handles.append(_patch(colour, text, a.share))
+        counts = read_counts(a.response)
+        if counts is None:
+            continue
+        strobes = flow.run(np.array(a.strobe), counts.n).strobes[:-1]
+        axes.plot(*strobes[:, column].T, ls="", marker="o", ms=6, mfc=colour, mec="white", mew=1.2)
+    axes.set_xlim(plan.xs[0], plan.xs[-1])
+    axes.set_ylim(plan.ys[0], plan.ys[-1])
+    _plane_axes(axes, plan, " at the start")
+    dot: dict[str, Any] = {"marker": "o", "ms": 6, "mfc": MUTED, "mec": "white"}
+    handles.append(Line2D([], [], ls="", label="its strobes", **dot))
+    _legend_beside(axes, handles)
+    return figure
+
+
+def _plane(width: float, height: float, text: str) -> tuple[Figure, Axes]:
+    figure = new_figure(width, height)
+    axes = figure.subplots()
+    _head(figure, text)
+    return figure, axes
+
+
+def _plane_axes(axes: Axes, plan: MapPlan | BasinPlan, ending: str = "") -> None:
+    axes.set_xlabel(_axis(plan.subject, plan.x) + ending)
+    axes.set_ylabel(_axis(plan.subject, plan.y) + ending)
+    si_x(axes, plan.subject.si.get(plan.x))
+    si_y(axes, plan.subject.si.get(plan.y))
+
+
+def _patch(colour: str, text: str, share: float) -> Patch:
+    return Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{text}: {share:.1%}")
+
+
+def _head(figure: Figure, text: str) -> None:
+    figure.suptitle(text, x=0.012, ha="left", fontsize=8.5, color=INK)
+
+
+def _legend_beside(axes: Axes, handles: Sequence[Any]) -> None:
+    """A legend at the right of the axes, below the heading, which takes the whole width."""
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def _coloured(sweep: Sweep) -> list[Coloured]:
+    """(colour, values, steps): followed tracks one each; of fixed starts the attractor from the
+    first start black, its mirror twin red, the others by response."""
+    plan = sweep.plan
+    if plan.followed:
+        colours = dict(zip(plan.tracks, (BLACK, OTHERS[0]), strict=False))
+        return [(colours[t], plan.values, list(sweep.steps[t])) for t in plan.tracks]
+    names: dict[str, str] = {}
+    out: dict[str, tuple[list[float], list[Steady]]] = {}
+    for i, value in enumerate(plan.values):
+        distinct: list[Steady] = []
+        for track in plan.tracks:
+            step = sweep.steps[track][i]
+            if any(_same(step, other) for other in distinct):
+                continue
+            distinct.append(step)
+            if len(distinct) == 1:
+                colour = BLACK
+            elif _twins(plan, float(value), distinct[0], step):
+                colour = RED
+            else:
+                colour = names.setdefault(_family(step), DOTS[len(names) % len(DOTS)])
+            values, steps = out.setdefault(colour, ([], []))
+            values.append(float(value))
+            steps.append(step)
+    return [(c, np.array(v), s) for c, (v, s) in out.items()]
+
+
+def _family(step: Steady) -> str:
+    """The response up to its mirror image."""
+    return str(step.counts.family) if step.status is OrbitStatus.PERIODIC else step.response
+
+
+def _twins(plan: SweepPlan, value: float, a: Steady, b: Steady) -> bool:
+    """Whether b is the mirror image of a: one of a's strobes half a period on, reflected."""
+    alike = a.status is OrbitStatus.PERIODIC and a.counts == b.counts.mirrored
+    if not alike or a.symmetric or b.symmetric:
+        return False
+    flow = plan.subject.settings([{plan.parameter: value}])[0].flow()
+    if flow.system.mirror is None:
+        return False
+    trace = flow.run(a.start, a.n, points=2).strobes
+    image = trace[1:-1:2] @ flow.system.mirror.T
+    return bool((np.abs(image - b.start).max(axis=1) <= SAME * np.abs(image).max()).any())
+
+
+def _same(a: Steady, b: Steady) -> bool:
+    if a.response != b.response or a.symmetric is not b.symmetric:
+        return False
+    if a.status is not OrbitStatus.PERIODIC:
+        return True
+    size = max(float(np.abs(a.minima).max()), 1e-300)
+    return bool(abs(a.minima.min() - b.minima.min()) < 1e-4 * size)
+
+
+def _cloud(axes: Axes, values: Array, clouds: Sequence[Array], ink: Mapping[str, Any]) -> None:
+    """Different dots at each value alone: many periods that show the same are one dot."""
+    every = np.concatenate(clouds) if clouds else np.zeros(0)
+    if not len(every):
+        return
+    fine = max(float(np.ptp(every)), 1e-12) * 2e-4
+    x, y = [], []
+    for value, cloud in zip(values, clouds, strict=True):
+        dots = np.unique(np.round(cloud / fine)) * fine
+        x.append(np.full(len(dots), value))
+        y.append(dots)
+    axes.plot(np.concatenate(x), np.concatenate(y), marker=".", mew=0, **ink)
+
+
+def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> None:
+    """Windows as bars with their names: symmetric or not by colour, aperiodic stretches dark."""
+    span = float(values[-1] - values[0])
+    half = 0.5 * span / (len(values) - 1)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_yticks([])
+    axes.tick_params(bottom=False)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    if name:
+        axes.set_ylabel(STRIPS.get(name, name), rotation=0, ha="right", va="center")
+    for window in windows:
+        if window.response == OrbitStatus.APERIODIC:
+            # Beside what coexists with it, where several starts share the strip.
+            top = 1.0 if window.track in (DOWN, UP) else 0.3
+            ends = (window.low - half, window.high + half)
+            axes.axvspan(*ends, ymax=top, color=CHAOS, lw=0, zorder=1.5)
+    named = [w for w in windows if read_counts(w.response)]
+    last = -np.inf
+    for window in sorted(named, key=lambda w: w.low):
+        low, high = window.low - half, window.high + half
+        axes.axvspan(low, high, color=SHADES[bool(window.symmetric)], lw=0)
+        centre = 0.5 * (low + high)
+        text = window.response
+        wide = len(text) * 0.0068 * span
+        if high - low >= wide and centre - 0.5 * wide > last:
+            axes.text(centre, 0.5, text, ha="center", va="center", fontsize=7, color=INK)
+            last = centre + 0.5 * wide
+        elif high - low >= WIDE * span / 2 and centre - 0.004 * span > last:
+            tilt: dict[str, Any] = {"rotation": 60, "ha": "left", "va": "bottom"}
+            axes.text(centre - 0.004 * span, 1.1, text, fontsize=6.5, color=INK, **tilt)
+            last = centre + 0.008 * span
+
+
+def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
+    plan = sweep.plan
+    dot: dict[str, Any] = {"ls": "", "marker": ".", "ms": 7}
+    handles: list[Any] = []
+    if plan.followed:
+        for track, colour in zip(plan.tracks, (BLACK, OTHERS[0]), strict=False):
+            handles.append(Line2D([], [], color=colour, label=f"followed {track}", **dot))
+    else:
+        handles.append(Line2D([], [], color=BLACK, label="from rest", **dot))
+        if RED in [c for c, _, _ in coloured]:
+            handles.append(Line2D([], [], color=RED, label="its mirror twin", **dot))
+        for colour, _, steps in coloured:
+            if colour not in (BLACK, RED):
+                families = list(dict.fromkeys(_family(s) for s in steps))
+                some = ", ".join(families[:3]) + (" …" if len(families) > 3 else "")
+                handles.append(Line2D([], [], color=colour, label=f"also {some}", **dot))
+    handles.append(Patch(fc=SHADES[True], label="symmetric"))
+    handles.append(Patch(fc=SHADES[False], label="not symmetric"))
+    if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
+        handles.append(Patch(fc=CHAOS, label="aperiodic"))
+    return handles
+
+
+def _cells(
+    axes: Axes, plan: MapPlan | BasinPlan, numbers: Sequence[int], colours: Sequence[str]
+) -> None:
+    axes.pcolormesh(
+        plan.xs,
+        plan.ys,
+        np.array(numbers).reshape(len(plan.ys), len(plan.xs)),
+        cmap=ListedColormap(list(colours)),
+        vmin=-0.5,
+        vmax=len(colours) - 0.5,
+        shading="nearest",
+        rasterized=True,
+    )
+
+
+def _attractor_colours(result: Basins) -> list[str]:
+    """The most frequent one black, its twin red; twins of others in the next colour."""
+    out: list[str] = []
+    free = iter(OTHERS * (1 + len(result.attractors) // len(OTHERS)))
+    for a in result.attractors:
+        if a.number == 0:
+            out.append(BLACK)
+        elif a.twin == 0:
+            out.append(RED)
+        elif a.response == OrbitStatus.APERIODIC:
+            out.append("#8c8c8c")
+        else:
+            out.append(OPEN if a.response == OrbitStatus.NOT_SETTLED else next(free))
+    return out
+
+
+def _axis(subject: Subject, name: str) -> str:
+    text = subject.labels.get(name) or NAMES.get(name, name)
+    return _label(text, subject.units.get(name, ""))
+
+
+def _label(text: str, unit: str) -> str:
+    return f"{text} [{unit}]" if unit else text

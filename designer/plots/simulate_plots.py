@@ -1,0 +1,288 @@
+"""Pictures of ``simulate --plots``: phase portrait, time trace, Poincaré section and power spectrum
+of each response, the last two as tables too.
+
+Each has a panel for the displacement in each clearance. Black is the orbit that was found, red its
+mirror twin where it is not its own; shaded is contact with a stop. The names are fixed by the
+frequencies, so that what would be replaced is known before anything is computed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from designer.base.arrays import Array
+from designer.base.atomic_write import appearing
+from designer.base.errors import InputError
+from designer.base.figure_style import (
+    CONTACT,
+    INK,
+    MUTED,
+    axis_limits,
+    new_figure,
+    picture,
+    shade_stops,
+    styled,
+)
+from designer.base.si_unit import Unit
+from designer.base.units import distinct_texts
+from designer.check.simulation import Simulated
+from designer.circuit.nominal import Trace
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.relative_motion import RelativeMotion
+from designer.model.si_units import NO_UNITS
+from designer.plots.response_colours import BLACK, RED
+from designer.plots.section_plots import (
+    section_csv,
+    section_figure,
+    spectrum_csv,
+    spectrum_figure,
+)
+from designer.plots.si_axes import si_x, si_y
+
+DIGITS = 12
+"""Of a frequency in a file's name, at most."""
+FORMATS = ("png", "svg")
+FOLDER = "a directory that can be written"
+LEAST_PERIODS = 2
+"""A time trace shows at least so many drive periods."""
+MOST_PERIODS = 8
+"""And of a response without a period so many."""
+CROWD = 8
+"""Impacts on a stop above which their marks are small."""
+MOST_PORTRAIT = 30
+"""Drive periods of a response without a period in its phase portrait."""
+
+
+def names(omegas: Sequence[float], digits: int = DIGITS) -> tuple[str, ...]:
+    """What the files of each response begin with; a frequency that comes again gets a number.
+
+    digits : significant ones of a frequency, or as many more as tell those of this run apart.
+    """
+    out: list[str] = []
+    for text in distinct_texts(omegas, digits, DIGITS):
+        stem = name = f"omega-{text}"
+        count = 1
+        while name in out:
+            count += 1
+            name = f"{stem}-{count}"
+        out.append(name)
+    return tuple(out)
+
+
+def check(folder: Path, stems: Sequence[str], overwrite: bool) -> None:
+    """InputError where pictures cannot be written or would replace a file; writes nothing."""
+    above = folder
+    while not above.exists() and above != above.parent:
+        if above.is_symlink():
+            raise InputError(above, "--plots", "a link to nothing", "a directory")
+        above = above.parent
+    if not above.is_dir():
+        raise InputError(above, "--plots", "a file", FOLDER)
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(above, "--plots", "no right to write", FOLDER)
+    kinds = [(k, f) for k in KINDS for f in FORMATS] + [(k, "csv") for k in TABLES]
+    for name in (_file(s, *kind) for s in stems for kind in kinds):
+        path = folder / name
+        if path.is_dir() and not path.is_symlink():
+            raise InputError(path, "--plots", "a directory", "a name that is free")
+        if (path.exists() or path.is_symlink()) and not overwrite:
+            raise InputError(path, "--plots", "a file", "a name that is free, or --overwrite")
+
+
+def write(
+    folder: Path,
+    stems: Sequence[str],
+    simulated: Sequence[Simulated],
+    overwrite: bool,
+    units: Mapping[str, Unit] = NO_UNITS,
+) -> list[str]:
+    """Write the pictures of each response that has an orbit; their names, in order.
+
+    units : SI units of the model's quantities, shown beside the dimensionless values.
+    """
+    check(folder, stems, overwrite)
+    names: list[str] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(folder, "--plots", error.strerror or str(error), FOLDER) from None
+    for stem, response in zip(stems, simulated, strict=True):
+        for kind, draw in KINDS.items() if response.traces else ():
+            figure = draw(response, units)
+            for form in FORMATS:
+                names.append(_file(stem, kind, form))
+                with appearing(folder / names[-1], "--plots", FOLDER) as partial:
+                    partial.write_bytes(picture(figure, form, 200.0))
+        for kind, table in TABLES.items() if response.traces else ():
+            names.append(_file(stem, kind, "csv"))
+            with appearing(folder / names[-1], "--plots", FOLDER) as partial:
+                partial.write_text(table(response), encoding="utf-8")
+    return names
+
+
+@styled
+def portrait(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
+    """The orbit and its twin in the plane (x1, x1'), and likewise in each further clearance;
+    triangles where an impact begins."""
+    count = len(response.motions)
+    figure = new_figure(4.2 * count, 4.0)
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    for number, axes in enumerate(panels):
+        _portrait(axes, response, number, units)
+    _finish(figure, panels[0], response, units)
+    return figure
+
+
+def _portrait(axes: Axes, response: Simulated, number: int, units: Mapping[str, Unit]) -> None:
+    """The plane of the motion in one clearance."""
+    motion = response.motions[number]
+    period = 2.0 * np.pi / response.omega
+    last = MOST_PORTRAIT * period * (1.0 + 1e-9)
+    curves = [_curve(motion, response.omega, t, t.time <= last) for t in response.traces]
+    every = np.concatenate(curves)
+    xlim, ylim = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
+    shade_stops(axes, motion.stops, xlim)
+    for orbit, curve, look in zip(_traced_orbits(response), curves, _LOOKS, strict=False):
+        axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
+        for side, gap in motion.stops:
+            speeds = orbit.impact_velocities[_at_stop(orbit, number, side)]
+            _impacts(axes, np.full(len(speeds), gap), speeds, side, look)
+    axes.set_xlim(*xlim)
+    axes.set_ylim(*ylim)
+    axes.set_xlabel(motion.label)
+    axes.set_ylabel(motion.rate)
+    si_x(axes, units.get("x1"))
+    si_y(axes, units.get("x1'"))
+
+
+def _curve(motion: RelativeMotion, omega: float, trace: Trace, keep: Any) -> Array:
+    return motion.of(trace.time[keep], trace.states[keep], omega)
+
+
+def _at_stop(orbit: Orbit, clearance: int, side: int) -> Any:
+    """Which of the impacts are on one stop."""
+    return (orbit.impact_clearances == clearance) & (orbit.impact_sides == side)
+
+
+@styled
+def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
+    """x1 over drive periods, orbit and twin, and likewise in each further clearance; triangles
+    where an impact begins."""
+    count = len(response.motions)
+    figure = new_figure(6.4, 3.0 + 2.0 * (count - 1))
+    panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
+    for number, axes in enumerate(panels):
+        _time_panel(axes, response, number, units)
+    panels[-1].set_xlabel("drive periods t / T")
+    _finish(figure, panels[0], response, units)
+    return figure
+
+
+def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str, Unit]) -> None:
+    """The displacement in one clearance over time."""
+    motion = response.motions[number]
+    period = 2.0 * np.pi / response.omega
+    n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
+    span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
+    curves = []
+    for orbit, trace, look in zip(_traced_orbits(response), response.traces, _LOOKS, strict=False):
+        cycles = trace.time / period
+        x = motion.of(trace.time, trace.states, response.omega)[:, 0]
+        impacts = {side: _at_stop(orbit, number, side) for side, _ in motion.stops}
+        times = {side: orbit.impact_times[at] / period for side, at in impacts.items()}
+        if 0 < n < span:  # again, to fill what is shown
+            laps = -(-span // n)
+            cycles = np.concatenate([cycles + k * n for k in range(laps)])
+            x = np.tile(x, laps)
+            again = n * np.arange(laps)[:, None]
+            times = {side: (at + again).ravel() for side, at in times.items()}
+        keep = cycles <= span * (1.0 + 1e-9)
+        axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
+        curves.append(x[keep])
+        for side, gap in motion.stops:
+            at = times[side][times[side] <= span]
+            _impacts(axes, at, np.full(len(at), gap), side, look)
+    limits = axis_limits(np.concatenate(curves), motion.gaps)
+    shade_stops(axes, motion.stops, limits, across=True)
+    axes.set_xlim(0.0, span)
+    axes.set_ylim(limits)
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
+    axes.set_ylabel(motion.label)
+    si_y(axes, units.get("x1"))
+
+
+KINDS: dict[str, Callable[[Simulated, Mapping[str, Unit]], Figure]] = {
+    "phase": portrait,
+    "time": time_trace,
+    "section": section_figure,
+    "spectrum": spectrum_figure,
+}
+TABLES: dict[str, Callable[[Simulated], str]] = {"section": section_csv, "spectrum": spectrum_csv}
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": BLACK, "zorder": 3, "ls": "-"},
+    {"color": RED, "zorder": 2, "ls": "-"},
+)
+
+
+def _file(stem: str, kind: str, form: str) -> str:
+    return f"{stem}-{kind}.{form}"
+
+
+def _traced_orbits(response: Simulated) -> list[Orbit]:
+    """The orbits of the traces: the one that was found, then its twin."""
+    return [o for o in (response.orbit, response.twin) if o is not None]
+
+
+def _width(orbit: Orbit) -> float:
+    """A response without a period in thin lines, or it is a blot."""
+    return 1.3 if orbit.status is OrbitStatus.PERIODIC else 0.5
+
+
+def _impacts(axes: Axes, x: Any, y: Any, side: int, look: dict[str, Any]) -> None:
+    if not len(x):
+        return
+    axes.plot(
+        x,
+        y,
+        ls="",
+        marker="^" if side > 0 else "v",
+        ms=5.5 if len(x) <= CROWD else 3.5,
+        mfc="white",
+        mec=look["color"],
+        mew=1.0,
+        zorder=look["zorder"] + 3,
+        clip_on=False,
+    )
+
+
+def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str, Unit]) -> None:
+    """Title and key."""
+    wanted = f", wanted {response.expected}" if response.expected and not response.found else ""
+    hertz = f" ({units['omega'].text(response.omega)})" if "omega" in units else ""
+    axes.set_title(
+        f"ω = {response.omega:.6g}{hertz}: {response.orbit.response}{wanted}",
+        loc="left",
+        weight="bold",
+        color=INK,
+    )
+    handles = []
+    twin = response.twin
+    labels = [response.orbit.response, "" if twin is None else f"{twin.response}, its mirror twin"]
+    for orbit, look, label in zip(_traced_orbits(response), _LOOKS, labels, strict=False):
+        handles.append(Line2D([], [], **look, lw=max(_width(orbit), 1.0), label=label))
+    if any(motion.stops for motion in response.motions):
+        if len(response.orbit.impact_sides):
+            mark: dict[str, Any] = {"mfc": "white", "mec": MUTED, "ms": 5.5}
+            handles.append(Line2D([], [], ls="", marker="^", **mark, label="impact begins"))
+        box: dict[str, Any] = {"mfc": CONTACT, "mec": MUTED, "ms": 8, "mew": 0.6}
+        handles.append(Line2D([], [], ls="", marker="s", **box, label="contact with a stop"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2 if len(handles) > 3 else 3)

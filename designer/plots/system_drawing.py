@@ -1,0 +1,192 @@
+"""Any mechanical system as a picture: which spring, damper, clearance and force joins what.
+
+The masses stand in a row from the ground at the left, by how many springs away from it they are.
+What joins neighbours is drawn between them, what joins others below the row, clearances above it.
+Displacements count to the right, so upper stops stand at the right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from designer.base.figure_style import INK, MUTED, styled
+from designer.model.lumped_elements import GROUND, Damper, Gap, Spring
+from designer.model.lumped_system import LumpedSystem
+from designer.model.relative_motion import subscripted
+from designer.model.system_equations import element_rows
+from designer.plots.mechanical_symbols import MechanicalSheet
+
+Joint = Spring | Damper
+_WALL, _FIRST, _WIDTH, _PITCH = 0.9, 5.3, 2.6, 7.0
+"""Abscissae of the wall and of the first mass, the width of a mass, and from one to the next."""
+_ROW = 1.6
+"""Height of one spring, damper or force between neighbours."""
+_LANE, _DEEP = 3.0, 1.7
+"""Height of a clearance above the row, and of a joint below it."""
+_GAP, _STOP = 1.3, 2.3
+"""From a rod to a plate, and length of a stop's spring."""
+
+
+@styled
+def system_drawing(model: LumpedSystem, *, si: bool) -> Figure:
+    """The whole system with its values. si : whether they are SI values, shown with units."""
+    return _Page(model, si=si).figure
+
+
+class _Page(MechanicalSheet):
+    def __init__(self, model: LumpedSystem, *, si: bool) -> None:
+        self.model = model
+        self.values = {symbol: value for symbol, value, _ in element_rows(model, si=si)}
+        self.row = (GROUND, *model.row)
+        self.between: list[list[str]] = [[] for _ in self.row]
+        self.below: list[str] = []
+        self.joints = self._joints()
+        self._sort()
+        rows = max(len(slot) for slot in self.between)
+        self.top = 0.6 + _ROW * max(rows, 2)
+        high = self.top + 0.6 + _LANE * len(model.gaps)
+        width = _FIRST + _PITCH * (len(model.masses) - 1) + _WIDTH + 4.6
+        self.floor = 0.5 - 1.1 - _DEEP * len(self.below) if self.below else 0.0
+        super().__init__(width, high, self.floor - 1.1)
+        self._draw()
+
+    def _joints(self) -> dict[str, Joint]:
+        """Springs and dampers by their symbols."""
+        springs = {subscripted(f"k{i}"): s for i, s in enumerate(self.model.springs, start=1)}
+        dampers = {subscripted(f"c{i}"): d for i, d in enumerate(self.model.dampers, start=1)}
+        return {**springs, **dampers}
+
+    def _sort(self) -> None:
+        """What stands between neighbours, at the right of each place of the row, and what below."""
+        for symbol, joint in self.joints.items():
+            left, right = self._ends(joint.between)
+            (self.between[left] if right == left + 1 else self.below).append(symbol)
+        for place, name in enumerate(self.row):
+            forced = [f"force {name}"] if self._force(name) else []
+            self.between[place] = forced + self.between[place]
+
+    def _ends(self, between: Sequence[str]) -> tuple[int, int]:
+        left, right = sorted(self.row.index(name) for name in between)
+        return left, right
+
+    def _force(self, name: str) -> str:
+        """The forces on a mass as text."""
+        terms = []
+        for i, force in enumerate(self.model.forces, start=1):
+            amplitude, constant = subscripted(f"P{i}"), subscripted(f"G{i}")
+            if force.on == name and amplitude in self.values:
+                terms.append(f"{self.values[amplitude]} sin ωt")
+            if force.on == name and constant in self.values:
+                terms.append(self.values[constant])
+        return " + ".join(terms).replace("+ -", "− ").replace("-", "−")
+
+    def _left(self, place: int) -> float:
+        return _FIRST + _PITCH * (place - 1) if place else _WALL - _WIDTH
+
+    def _middle(self, place: int) -> float:
+        return self._left(place) + 0.5 * _WIDTH if place else _WALL
+
+    def _draw(self) -> None:
+        self.wall(_WALL, self.floor, self.top, -1)
+        self._ground()
+        for place in range(1, len(self.row)):
+            self._mass(place)
+        for place, symbols in enumerate(self.between):
+            for number, symbol in enumerate(symbols):
+                self._neighbours(place, self.top - 0.9 - _ROW * number, symbol)
+        for number, symbol in enumerate(self.below):
+            self._under(-1.5 - _DEEP * number, symbol)
+        for number, gap in enumerate(self.model.gaps):
+            self._clearance(self.top + 1.3 + _LANE * number, gap, self._shift(number))
+
+    def _ground(self) -> None:
+        base = self.model.base
+        if base is None:
+            return
+        self.arrow(_WALL - 0.1, _WALL + 1.2, self.floor - 0.35)
+        stay = ", the stops stay" if base.stops == "fixed" and self.model.gaps else ""
+        self.text(_WALL - 0.4, self.floor - 0.95, f"y = {self.values['Y']} sin ωt{stay}", "left")
+
+    def _mass(self, place: int) -> None:
+        left, name = self._left(place), self.row[place]
+        number = self.model.names.index(name) + 1
+        self.box(left, left + _WIDTH, 0.0, self.top)
+        text = f"{name}\n{self.values[subscripted(f'm{number}')]}"
+        self.text(left + 0.5 * _WIDTH, 0.5 * self.top, text, va="center", size=9.5)
+        x = left + 0.5 * _WIDTH
+        self.line([x, x], [0.0, -0.55], MUTED, 0.8)
+        self.arrow(x, x + 0.9, -0.4)
+        self.text(x + 1.05, -0.4, subscripted(f"x{number}"), "left", "center")
+
+    def _neighbours(self, place: int, y: float, symbol: str) -> None:
+        """A spring, a damper or a force at the right of a place of the row."""
+        x0, x1 = self._left(place) + _WIDTH, self._left(place + 1)
+        if symbol.startswith("force "):
+            self.arrow(x0, x0 + 1.5, y, INK)
+            self.text(x0 + 0.15, y + 0.12, self._force(symbol.removeprefix("force ")), "left")
+            return
+        self._joint(x0, x1, y, symbol)
+
+    def _joint(self, x0: float, x1: float, y: float, symbol: str) -> None:
+        (self.spring if isinstance(self.joints[symbol], Spring) else self.damper)(x0, x1, y)
+        self.text(0.5 * (x0 + x1), y + 0.4, f"{symbol} = {self.values[symbol]}")
+
+    def _under(self, y: float, symbol: str) -> None:
+        """A joint of what are no neighbours, below the row."""
+        left, right = self._ends(self.joints[symbol].between)
+        x0 = self._middle(left) + (0.3 * _WIDTH if left else 0.0)
+        x1 = self._middle(right) - 0.3 * _WIDTH
+        for x, place in ((x0, left), (x1, right)):
+            if place:
+                self.line([x, x], [0.0, y], INK, 1.2)
+        self._joint(x0, x1, y, symbol)
+
+    def _shift(self, number: int) -> float:
+        """Of a clearance's rod from the middle of its mass, where that carries several."""
+        gaps = [set(gap.between) - {GROUND} for gap in self.model.gaps]
+        alone = sum(not gaps[number].isdisjoint(names) for names in gaps) == 1
+        return 0.0 if alone else 0.35 * (number % 3 - 1)
+
+    def _clearance(self, y: float, gap: Gap, shift: float) -> None:
+        """A rod on the mass between plates on springs, which stand on ground or on the other."""
+        mass, other = gap.between if gap.between[0] != GROUND else gap.between[::-1]
+        rod = self._middle(self.row.index(mass)) + shift
+        self.line([rod, rod], [self.top, y + 0.6], INK, 2.0)
+        self.text(rod, y + 0.95, gap.name, size=9.5)
+        ends = []
+        sides = ((1, gap.upper, "upper"), (-1, gap.lower, "lower"))
+        turned = -1 if gap.between[0] == GROUND else 1
+        for sign, place, word in sides:
+            if place is not None:
+                ends.append(self._stop(rod, y, turned * sign, gap, word))
+        if other != GROUND:
+            self._bracket(y, ends, self._middle(self.row.index(other)) + shift)
+            return
+        for side, end in ends:
+            self.wall(end, y - 0.7, y + 0.7, side)
+
+    def _stop(self, rod: float, y: float, side: int, gap: Gap, word: str) -> tuple[int, float]:
+        """A plate on its spring; its side, and where the spring ends."""
+        plate = rod + side * _GAP
+        end = plate + side * _STOP
+        self.line([plate, plate], [y - 0.4, y + 0.4], INK, 2.0)
+        self.spring(plate, end, y)
+        side_stiffness = self.values.get(f"{gap.name}.{word}_stiffness")
+        stiffness = side_stiffness or self.values.get(f"{gap.name}.stiffness", "Hertz")
+        preload = self.values.get(f"{gap.name}.preload")
+        text = stiffness if preload is None else f"{stiffness}, preload {preload}"
+        self.text(0.5 * (plate + end), y - 0.95, text)
+        place = self.values[f"{gap.name}.{word}"].replace("-", "−")
+        self.text(plate, y + 0.5, place, "left" if side > 0 else "right")
+        return side, end
+
+    def _bracket(self, y: float, ends: Sequence[tuple[int, float]], x: float) -> None:
+        """The springs' ends joined over the lane, and down to the other mass."""
+        high = y + 1.5
+        for _, end in ends:
+            self.line([end, end], [y, high], INK, 1.2)
+        spans = [end for _, end in ends]
+        self.line([min(*spans, x), max(*spans, x)], [high, high], INK, 1.2)
+        self.line([x, x], [self.top, high], INK, 1.2)

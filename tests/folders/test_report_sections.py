@@ -1,0 +1,150 @@
+"""Answers of later verbs in the report of a study: the same facts in both files, no byte without
+need, and nothing where there is no report to show them in."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from designer.base.design_folder import REPORTS, Folder
+from designer.base.page import Page, PageSection, markdown
+from designer.base.plain_json import dumps
+from designer.fidelity import trade_files
+from designer.folders.report_sections import SHOWN, renew_report
+from designer.report.page_html import render_page
+from tests.shared.house import ROOT
+
+STORED = Path(__file__).parents[1] / "jobs" / "folders" / "0.1.0" / "format-1.zip"
+TRADE = json.loads((ROOT / "reports/speed-accuracy/trade.json").read_text("utf-8"))
+for _row in TRADE["rungs"]:  # of an earlier version
+    _row.setdefault("convergence", None)
+YIELD = {"failed": 0, "rate": 0.812, "low": 0.786, "high": 0.835}
+CURED = {"failed": 2, "rate": 0.993, "low": 0.983, "high": 0.997}
+TRIAL = {"price": 1.75, "said": ["0.1 % R1 R7", "op-amp <b>X</b>"], "measured": [CURED]}
+CURE: dict[str, Any] = {
+    "format": 1,
+    "reached": True,
+    "why": "",
+    "target": 0.98,
+    "price": 1.75,
+    "said": TRIAL["said"],
+    "responses": [
+        {"omega": 0.85, "expected": "1-2-2", "before": YIELD, "after": CURED, "limit": "R7"}
+    ],
+    "front": [{"price": 0.0, "said": [], "measured": [YIELD]}, TRIAL],
+    "refused": [{"upgrades": ["trimmer fitted"], "why": "no room beside U2"}],
+}
+
+
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a study and a small report of it."""
+    path = tmp_path_factory.mktemp("studied") / "design"
+    with zipfile.ZipFile(STORED) as stream:
+        stream.extractall(path)
+    folder = Folder(path)
+    assert folder.manifest is not None
+    (path / "rules.json").rename(path / "stored.json")
+    del folder.manifest.stages["rules"], folder.manifest.files["rules.json"]
+    scales = PageSection("Scales and conditions", ["One volt."], "scales")
+    page = Page("Small", [], [PageSection("Yields", ["All."], "yields"), scales])
+    for name, text in zip(REPORTS, (render_page(page), markdown(page)), strict=True):
+        folder.manifest.files[name] = ("study", None)
+        folder.rewrite(name, text)
+    return path
+
+
+@pytest.fixture
+def path(studied: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(studied, tmp_path / "design"))
+
+
+def answered(path: Path, stage: Any, answer: dict[str, Any]) -> None:
+    """As a verb leaves its answer in the folder."""
+    folder, name = Folder(path), f"{stage}.json"
+    with folder.working({stage: ({}, [name])}):
+        folder.write(name, dumps(answer))
+    renew_report(folder)
+
+
+def reports(path: Path) -> list[str]:
+    return [(path / name).read_text("utf-8") for name in REPORTS]
+
+
+def numbers(text: str) -> set[str]:
+    return set(re.findall(r"\d+(?:\.\d+)?", re.sub(r"<[^>]*>", " ", text)))
+
+
+def test_every_answer_stands_in_both_files(path: Path) -> None:
+    answered(path, "trade", TRADE)
+    answered(path, "cure", CURE)
+    answer = json.loads((path / "stored.json").read_text("utf-8"))
+    answered(path, "rules", answer)
+    html, text = reports(path)
+    entries = re.findall(r'<a href="#(\w+)">', html)
+    assert entries == ["yields", "cure", "rules", "trade", "scales"]
+    assert re.findall(r'<section id="(\w+)">', html) == entries
+    assert [line for line in text.splitlines() if line[:3] == "## "] == [
+        "## Yields",
+        "## The cheapest cure",
+        "## Design rules",
+        "## Time and error of the engines",
+        "## Scales and conditions",
+    ]
+    for rule in answer["rules"]:
+        assert f'<td class="short">{rule["id"]}</td>' in html
+    cheapest = [r for r in trade_files.sheet(TRADE).splitlines() if r.startswith("| n-p-q ")]
+    assert len(cheapest) > 1
+    assert set(cheapest) <= set(text.splitlines())
+    assert "99.3 % (98.3 to 99.7 %), 2 failed" in text
+    assert "op-amp &lt;b>X&lt;/b>" in text
+    later = text[text.index("## The cheapest") : text.index("## Scales")]
+    assert numbers(later) <= numbers(html[html.index("<body>") :])
+    for name in (name for names in SHOWN.values() for name in names):
+        assert f'<a href="{name}">{name}</a>' in html
+        assert f"[{name}]({name})" in text
+
+
+def test_of_an_answer_with_fewer_figures_the_report_says_how_it_is_made_anew(path: Path) -> None:
+    answered(path, "trade", {"format": 1, "cheapest": [{"question": "n-p-q"}]})
+    for text in reports(path):
+        assert "An earlier version made trade.md" in text
+        assert "designer trade DIR --overwrite" in text
+
+
+def test_a_second_time_changes_nothing_and_the_manifest_knows_the_report(path: Path) -> None:
+    bare = reports(path)
+    answered(path, "cure", CURE)
+    with_cure, manifest = reports(path), (path / "manifest.json").read_bytes()
+    assert bare != with_cure
+    assert Folder(path).changed("study") is None
+    answered(path, "cure", CURE)
+    assert reports(path) == with_cure
+    assert (path / "manifest.json").read_bytes() == manifest
+    (path / "cure.json").write_text("{}", encoding="utf-8")  # damaged: it is told of no more
+    renew_report(Folder(path))
+    assert reports(path) == bare
+
+
+def test_a_report_that_somebody_changed_stays(path: Path) -> None:
+    html, text = path / REPORTS[0], path / REPORTS[1]
+    text.write_text("Mine.", encoding="utf-8")
+    answered(path, "cure", CURE)
+    assert text.read_text("utf-8") == "Mine."
+    assert "The cheapest cure" in html.read_text("utf-8")
+
+
+def test_without_a_finished_study_the_report_waits(path: Path) -> None:
+    folder, before = Folder(path), reports(path)
+    assert folder.manifest is not None
+    folder.manifest.stages["study"].complete = False
+    with folder.working({"cure": ({}, ["cure.json"])}):
+        folder.write("cure.json", dumps(CURE))
+    renew_report(folder)
+    assert reports(path) == before

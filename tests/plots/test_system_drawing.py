@@ -1,0 +1,57 @@
+"""The drawing and the sketch of any system: everything that the file has is in them."""
+
+from __future__ import annotations
+
+import pytest
+from matplotlib.figure import Figure
+
+from designer.base import figure_style
+from designer.model.ascii_sketch import system_sketch
+from designer.model.system_equations import element_rows
+from designer.plots.system_drawing import system_drawing
+from tests.model.test_system_equations import FILES, system
+from tests.shared.system_text import clearance, system_text, table
+
+BRANCH = system_text(
+    {"a": 1.5, "b": 2.5, "c": 3.5},
+    {("a", "b"): 4.5, ("b", "ground"): 5.5, ("c", "b"): 6.5},
+    {("c", "ground"): 0.25, ("a", "b"): 0.75},
+    clearance("A", "a", "c", upper=0.5, lower=0.3, stiffness=12.0),
+    table("force", on="c", amplitude=8.5, constant=-0.125),
+)
+SYSTEMS = {**FILES, "branch": BRANCH}
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_every_value_is_drawn_inside_the_sheet(name: str) -> None:
+    model = system(SYSTEMS[name])
+    figure = system_drawing(model, si=name != "branch")
+    shown = " ".join(texts(figure)).replace("\n", " ").replace("−", "-")
+    for symbol, value, _ in element_rows(model, si=name != "branch"):
+        if not symbol.endswith((".constant", ".depth", ".damping")):  # in the table alone
+            assert value.lstrip("-") in shown, symbol
+    axes = figure.axes[0]
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    for line in axes.lines:
+        x, y = line.get_xydata().T  # type: ignore[union-attr]
+        assert left <= x.min() <= x.max() <= right
+        assert low <= y.min() <= y.max() <= high
+    svg = figure_style.to_svg(figure)
+    assert svg == figure_style.to_svg(system_drawing(model, si=name != "branch"))
+
+
+def test_masses_stand_in_a_row_from_the_ground() -> None:
+    model = system(BRANCH)
+    assert model.row == ("b", "c", "a")
+    sketch = system_sketch(model)
+    assert [sketch.index(f"[ {name} ]") for name in "bca"] == sorted(
+        sketch.index(f"[ {name} ]") for name in "bca"
+    )
+    for line in ("spring: a to b", "damper: c to ground", "A: upper and lower stop, a to c"):
+        assert line in sketch.splitlines()
+    assert "force on c" in sketch
+    assert sketch.isascii()
