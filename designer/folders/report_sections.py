@@ -27,14 +27,15 @@ def _sections(folder: Folder) -> Iterator[PageSection]:
     shown = [name for name in SHOWN if name in stages and stages[name].complete]
     if not shown:
         return
-    from designer.report.verb_sections import SECTIONS, older_section  # they need matplotlib
+    # They need matplotlib.
+    from designer.report.verb_sections import SECTIONS, is_whole, older_section
 
     for name in shown:
         if folder.changed(name) is None:
             answer = folder.json(f"{name}.json")
-            try:
+            if is_whole(name, answer):
                 yield SECTIONS[name](answer, SHOWN[name])
-            except KeyError:  # earlier versions wrote less
+            else:
                 yield older_section(name, SHOWN[name])
 
 

@@ -147,6 +147,43 @@ def _titled(title: str, block: Block) -> PageSection | None:
     return None if block is None else PageSection(title, [block])
 
 
+_MEASURED = ("rate", "low", "high", "failed")
+NEEDED: Mapping[str, Sequence[str]] = {
+    "cure": (
+        "target", "price", "reached", "why", "said", "refused.upgrades", "refused.why",
+        "responses.omega", "responses.expected", "responses.limit", "front.price", "front.said",
+        *(f"{yield_}.{key}" for key in _MEASURED for yield_ in
+          ("responses.before", "responses.after", "front.measured")),
+    ),
+    "rules": (
+        "board", *(f"counts.{status}" for status in (FAIL, PASS, NOT_RUN)),
+        *(f"rules.{key}" for key in ("id", "status", "found", "limit", "do")),
+    ),
+    "trade": (
+        "truths",
+        *(f"cheapest.{key}" for key in
+          ("number", "question", "of", "rung", "level", "shown", "seconds", "note")),
+        *(f"boards.{key}" for key in
+          ("number", "omega", "b", "boards", "ok", "lost", "gained", "undecided", "difference",
+           "low", "high")),
+    ),
+}  # fmt: skip
+"""Keys that the section of a verb's answer shows, of each item where there is a list."""
+
+
+def is_whole(verb: str, answer: Answer) -> bool:
+    """Whether an answer has every key of ``NEEDED``: earlier versions wrote fewer."""
+    return all(_has(answer, path.split(".")) for path in NEEDED[verb])
+
+
+def _has(value: Any, keys: Sequence[str]) -> bool:
+    if not keys:
+        return True
+    if isinstance(value, Sequence):
+        return all(_has(item, keys) for item in value)
+    return keys[0] in value and _has(value[keys[0]], keys[1:])
+
+
 COMMANDS: Mapping[str, str] = {
     "cure": "search DIR --yield Y --overwrite",
     "rules": "rules DIR",

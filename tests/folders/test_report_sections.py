@@ -8,16 +8,18 @@ import re
 import shutil
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from designer.base.design_folder import REPORTS, Folder
+from designer.base.manifest import StageName
 from designer.base.page import Page, PageSection, markdown
 from designer.base.plain_json import dumps
 from designer.fidelity import trade_files
 from designer.folders.report_sections import SHOWN, renew_report
 from designer.report.page_html import render_page
+from designer.report.verb_sections import NEEDED, SECTIONS, is_whole
 from tests.shared.house import ROOT
 
 STORED = Path(__file__).parents[1] / "jobs" / "folders" / "0.1.0" / "format-1.zip"
@@ -109,6 +111,58 @@ def test_every_answer_stands_in_both_files(path: Path) -> None:
     for name in (name for names in SHOWN.values() for name in names):
         assert f'<a href="{name}">{name}</a>' in html
         assert f"[{name}]({name})" in text
+
+
+class _Read(dict[str, Any]):
+    """An object that notes which keys are read, as paths, but for those that may be missing."""
+
+    def __init__(self, answer: dict[str, Any], keys: set[str], path: str = "") -> None:
+        super().__init__({key: _reads(v, keys, f"{path}{key}.") for key, v in answer.items()})
+        self._keys, self._path = keys, path
+        self._free: set[str] = set()
+
+    def __getitem__(self, key: str) -> Any:
+        value = super().__getitem__(key)
+        if key in self._free:
+            return dict.copy(value) if isinstance(value, dict) else value
+        self._keys.add(self._path + key)
+        return value
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self._free.add(key)
+        return super().get(key, default)
+
+
+def _reads(value: Any, keys: set[str], path: str) -> Any:
+    if isinstance(value, dict):
+        return _Read(value, keys, path)
+    return [_reads(item, keys, path) for item in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("verb", SECTIONS)
+def test_what_a_section_reads_is_what_an_answer_has_to_have(verb: str, path: Path) -> None:
+    """So that a KeyError is an error: an answer of an earlier version is known before."""
+    stored = json.loads((path / "stored.json").read_text("utf-8"))
+    answer = {"cure": CURE, "rules": stored, "trade": TRADE}[verb]
+    keys: set[str] = set()
+    for one in (answer, answer | {"reached": False}):
+        SECTIONS[verb](_Read(one, keys), SHOWN[cast(StageName, verb)])
+    inner = {key for key in keys if not any(k.startswith(f"{key}.") for k in keys)}
+    assert inner == set(NEEDED[verb])
+    assert is_whole(verb, answer)
+    for key in NEEDED[verb]:
+        fewer = json.loads(json.dumps(answer))
+        *above, last = key.split(".")
+        for item in _items(fewer, above):
+            del item[last]
+        assert not is_whole(verb, fewer)
+
+
+def _items(value: Any, path: list[str]) -> list[Any]:
+    """The objects at this path, in lists too."""
+    if isinstance(value, list):
+        return [found for item in value for found in _items(item, path)]
+    return _items(value[path[0]], path[1:]) if path else [value]
 
 
 def test_of_an_answer_with_fewer_figures_the_report_says_how_it_is_made_anew(path: Path) -> None:
