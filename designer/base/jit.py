@@ -74,27 +74,27 @@ def nothing_compiled() -> bool:
 
 
 class _CompileWatch(Listener):  # type: ignore[misc]
-    """Tells when compilation begins and ends; a kernel's own callees are within its own."""
+    """Tells when compilation begins and ends. numba compiles on one thread at a time."""
 
-    def __init__(self, tell: Callable[[bool], None]) -> None:
+    def __init__(self, tell: Callable[[str | None], None]) -> None:
         self._tell = tell
         self._depth = 0
 
-    def on_start(self, event: object) -> None:
+    def on_start(self, event: Any) -> None:
         self._depth += 1
-        if self._depth == 1:
-            self._tell(True)
+        if self._depth == 1:  # a callee is within its caller
+            self._tell(str(event.data["dispatcher"].py_func.__module__))
 
     def on_end(self, event: object) -> None:
         self._depth -= 1
         if self._depth == 0:
-            self._tell(False)
+            self._tell(None)
 
 
 @contextmanager
-def compilation_watched(tell: Callable[[bool], None]) -> Iterator[None]:
-    """Call ``tell`` with True whenever numba begins to compile, on the thread that does, and with
-    False when that is done; not for what is loaded from ``CACHE``."""
+def compilation_watched(tell: Callable[[str | None], None]) -> Iterator[None]:
+    """Call ``tell`` with the name of a function's module whenever numba begins to compile it, on
+    the thread that does, and with None when that is done; not for what is loaded from ``CACHE``."""
     with install_listener("numba:compile", _CompileWatch(tell)):
         yield
 

@@ -14,7 +14,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+
+from designer.base.jit import compilation_watched
 
 CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
@@ -38,27 +39,17 @@ TEXT = (
 @contextmanager
 def announced(say: Callable[[str], None]) -> Iterator[None]:
     """Calls ``say`` with one line when the first kernel of a part is compiled inside."""
-    from numba.core import event
+    told: set[str] = set()
 
-    lock = threading.Lock()
-    announced: set[str] = set()
-    depth = threading.local()
-
-    class Listener(event.Listener):  # type: ignore[misc]
-        def on_start(self, event: Any) -> None:
-            depth.now = getattr(depth, "now", 0) + 1
-            name = str(event.data["dispatcher"].py_func.__module__)
-            part = PARTS.get(name.rpartition(".")[2], MOTION)
-            with lock:  # a callee belongs to the part that calls it
-                if depth.now > 1 or part in announced or not name.startswith("designer."):
-                    return
-                announced.add(part)
+    def tell(module: str | None) -> None:
+        if module is None or not module.startswith("designer."):
+            return
+        part = PARTS.get(module.rpartition(".")[2], MOTION)
+        if part not in told:
+            told.add(part)
             say(TEXT.format(part=part))
 
-        def on_end(self, event: Any) -> None:
-            depth.now -= 1
-
-    with _interruptible(), event.install_listener("numba:compile", Listener()):
+    with _interruptible(), compilation_watched(tell):
         yield
 
 

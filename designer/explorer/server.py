@@ -91,10 +91,10 @@ class Explorer:
         """The process that chooses parts."""
         return PartsProcess()
 
-    def tell_compiling(self, on: bool) -> None:
-        """Tell every page, also those that open later, that kernels are compiled, or no more."""
-        self.compiling = on
-        self._tell({"kind": "compiling", "on": on})
+    def tell_compiling(self, module: str | None) -> None:
+        """Tell every page, also later ones, that kernels are compiled; None : no more."""
+        self.compiling = module is not None
+        self._tell({"kind": "compiling", "on": self.compiling})
 
     def _tell(self, message: Message) -> None:
         """What every page is told."""
