@@ -51,8 +51,8 @@ class Table:
     def folded(self) -> FoldedTable | None:
         """The table with the rows that say the same, but for their names, as one sentence; None
         where fewer than ``FOLD`` do, or not most of them."""
-        said = Counter(row[self.names :] for row in self.rows)
-        cells, count = said.most_common(1)[0] if self.names and self.rows else ((), 0)
+        repeated = Counter(row[self.names :] for row in self.rows)
+        cells, count = repeated.most_common(1)[0] if self.names and self.rows else ((), 0)
         if count < FOLD or 2 * count <= len(self.rows):
             return None
         rest = tuple(row for row in self.rows if row[self.names :] != cells)

@@ -340,10 +340,10 @@ class _Lineage:
 def _continuation(met: AttractorList, before: MetAttractor, way: _Way) -> int | None:
     """Place in the list of the stable orbit that continues one of the value before, if any."""
     n = before.motion.n
-    found = _continue(met, way, before.strobes[0], n, HALVINGS)
-    if found is None:
+    continued = _continue(met, way, before.strobes[0], n, HALVINGS)
+    if continued is None:
         return None
-    x, monodromy = found
+    x, monodromy = continued
     k = met.at(x)
     if k is not None:
         alike = met.met[k].motion.n == n and met.met[k].symmetric is before.symmetric
@@ -364,9 +364,9 @@ def _continue(
 ) -> tuple[Array, Array] | None:
     """Strobe and matrix at the end of the way of the stable orbit of period n through x (states,)
     at its start; None where there is none. The way is halved where Newton's method leads far."""
-    found = shoot(way.flow, x, n)
-    if found is not None and met.distance(found[0], x) <= LEAP:
-        return found if np.abs(np.linalg.eigvals(found[1])).max() < 1.0 else None
+    shot = shoot(way.flow, x, n)
+    if shot is not None and met.distance(shot[0], x) <= LEAP:
+        return shot if np.abs(np.linalg.eigvals(shot[1])).max() < 1.0 else None
     if not halvings:
         return None
     first, second = way.halves()

@@ -200,7 +200,7 @@ def with_same_parts(
         certificate=Certificate("bound", 0.0, "the parts are those of the design that was cured"),
         binding={},
     )
-    conditions = modelfile.circuit.kept
+    conditions = modelfile.circuit.active_conditions
     amplitudes = [design.amplitude(r.b, r.omega) for r in responses] or [design.amplitude()]
     needed = None
     if responses and conditions & {"swing", "load"}:

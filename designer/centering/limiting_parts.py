@@ -75,11 +75,11 @@ def limitings(
     count = max(max((a.sample for a in answers), default=0) + 1, DRAWN)
     boards = plan.boards(range(count))
     rows = [[a for a in answers if a.question == k] for k in range(len(plan.questions))]
-    found = margins.margins(
+    of_questions = margins.margins(
         plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress
     )
     drawn = together(plan.circuit, plan.spread, plan.seed)
-    return tuple(limiting(margin, drawn) for margin in found)
+    return tuple(limiting(margin, drawn) for margin in of_questions)
 
 
 def together(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:

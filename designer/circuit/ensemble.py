@@ -110,17 +110,17 @@ class Ensemble:
         def chunk(first: int) -> list[SettledBoard]:
             heed()
             part = slice(first, first + CHUNK)
-            found = self._compiled(index[part], drives[part], states[part], len(kernel.STAGES))
-            for k, response in enumerate(found):
+            settled = self._compiled(index[part], drives[part], states[part], len(kernel.STAGES))
+            for k, response in enumerate(settled):
                 if response is None:
-                    found[k] = self._alone(
+                    settled[k] = self._alone(
                         int(index[first + k]), drives[first + k], states[first + k]
                     )
                 progress()
-            return [r for r in found if r is not None]
+            return [r for r in settled if r is not None]
 
         chunks = parallel(chunk, range(0, len(index), CHUNK), jobs)
-        return [response for found in chunks for response in found]
+        return [response for settled in chunks for response in settled]
 
     def quick(
         self,
@@ -142,12 +142,12 @@ class Ensemble:
         def chunk(first: int) -> list[Orbit | None]:
             heed()
             part = slice(first, first + CHUNK)
-            found = self._compiled(index[part], drives[part], states[part], QUICK)
+            settled = self._compiled(index[part], drives[part], states[part], QUICK)
             progress()
-            return [None if r is None else r.orbit for r in found]
+            return [None if r is None else r.orbit for r in settled]
 
         chunks = parallel(chunk, range(0, len(index), CHUNK), jobs)
-        return [orbit for found in chunks for orbit in found]
+        return [orbit for settled in chunks for orbit in settled]
 
     def run(
         self,
@@ -206,10 +206,10 @@ class Ensemble:
         while len(asked):
             answers = self._answers(modes, rows, given[asked], starts[asked], stages)
             code = answers.whole[:, kernel.CODE]
-            found = np.flatnonzero(code == FOUND)
-            periods = [drives[k].period for k in asked[found]]
-            responses = self._responses(answers, found, periods, modes)
-            for k, response in zip(asked[found], responses, strict=True):
+            closed = np.flatnonzero(code == FOUND)
+            periods = [drives[k].period for k in asked[closed]]
+            responses = self._responses(answers, closed, periods, modes)
+            for k, response in zip(asked[closed], responses, strict=True):
                 out[k] = response
             missing = answers.whole[code == kernel.BUILD, kernel.MISSING :][:, :2]
             modes.enter({modes.targets.beyond(int(m), int(g)) for m, g in missing})
@@ -254,19 +254,19 @@ class Ensemble:
     def _responses(
         self,
         answers: kernel.Answers,
-        found: Index,
+        closed: Index,
         periods: Sequence[float],
         modes: working.BoardModes,
     ) -> Iterator[SettledBoard]:
         """Those answers in the normal form; the rules are those of ``attractors.describe``."""
-        multipliers = np.linalg.eigvals(answers.monodromy[found]).astype(complex)
+        multipliers = np.linalg.eigvals(answers.monodromy[closed]).astype(complex)
         radius = np.abs(multipliers).max(axis=1, initial=0.0)
-        graze, facts = answers.graze[found], answers.facts[found]
-        spans = np.abs(answers.extremes[found][:, self._in_clearances]).max(axis=2)
+        graze, facts = answers.graze[closed], answers.facts[closed]
+        spans = np.abs(answers.extremes[closed][:, self._in_clearances]).max(axis=2)
         near = (graze.min(axis=2) < attractors.ENGINE_ERROR * spans).any(axis=1)
         grazing = near | (facts[:, kernel.UNDECIDED] > 0.0)
         size = len(self.boards.circuit.states)
-        for k, e in enumerate(found):
+        for k, e in enumerate(closed):
             whole = answers.whole[e].tolist()
             n, spent, *counts = whole[kernel.COUNTED :]
             first, *more = zip(counts[0::2], counts[1::2], strict=True) if counts else [(0, 0)]

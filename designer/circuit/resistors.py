@@ -74,11 +74,11 @@ def effective(values: Mapping[str, float], composites: Mapping[str, Composite]) 
 
 def composites_of(circuit: Circuit) -> dict[str, Composite]:
     """The resistors of a circuit that are two parts, and how those are joined."""
-    found: dict[str, Composite] = {}
+    composites: dict[str, Composite] = {}
     by_name = {r.name: r for r in circuit.resistors}
     for name, first in by_name.items():
         second = by_name.get(f"{name[:-1]}B")
         if name.endswith("A") and second is not None:
             parallel = (first.a, first.b) == (second.a, second.b)
-            found[name[:-1]] = "parallel" if parallel else "series"
-    return found
+            composites[name[:-1]] = "parallel" if parallel else "series"
+    return composites

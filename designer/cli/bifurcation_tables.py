@@ -112,21 +112,21 @@ def _curves(answer: Mapping[str, Any]) -> None:
 
 def _region(answer: Mapping[str, Any]) -> Iterator[str]:
     """What bounds the region of a response, and where to sit in it."""
-    found, names = answer["region"], (answer["parameter"], answer["and"]["name"])
+    region, names = answer["region"], (answer["parameter"], answer["and"]["name"])
 
     def place(values: Sequence[float]) -> str:
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True))
 
-    kinds = Counter(end["kind"] for end in found["border"])
+    kinds = Counter(end["kind"] for end in region["border"])
     rays = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
-    yield f"\nRegion of {found['response']} about {place(found['at'])}"
+    yield f"\nRegion of {region['response']} about {place(region['at'])}"
     yield f"rays end by: {rays}"
-    ellipse = found["ellipse_around"]["share"]
+    ellipse = region["ellipse_around"]["share"]
     yield (
-        f"each parameter may be off by {found['around']['share']:.2%} there whatever the other "
+        f"each parameter may be off by {region['around']['share']:.2%} there whatever the other "
         f"does, by {ellipse:.2%} in an ellipse: the less, the more the other is off"
     )
-    best = found["best"]
+    best = region["best"]
     yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"
 
 

@@ -384,7 +384,7 @@ def _fitted(board: Mapping[str, Any]) -> None:
     if board["reason"]:
         say(f"The board{of} was not found: {board['reason']}")
         return
-    told = (
+    rows = (
         {
             "figure": f["name"],
             "unit": f["unit"],
@@ -394,7 +394,7 @@ def _fitted(board: Mapping[str, Any]) -> None:
         }
         for f in board["figures"]
     )
-    table(f"The board{of}, as its records tell it", told)
+    table(f"The board{of}, as its records tell it", rows)
     advised = (
         {
             "wanted": a["expected"],

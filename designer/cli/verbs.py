@@ -564,12 +564,12 @@ def bench(
     from designer.cli import tables
     from designer.jobs import bench_job
 
-    told = None if channels is None else bench_job.channels_of(channels)
+    roles = None if channels is None else bench_job.channels_of(channels)
     result = bench_job.bench(
         folder,
         record or (),
         omega=omega,
-        channels=told,
+        channels=roles,
         fit=fit,
         boards=boards,
         out=out,

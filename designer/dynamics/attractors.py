@@ -83,19 +83,19 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
                 reason = _too_long(flow, spent, budget)
             return Orbit(status, reason=reason, periods=spent)
         x, mode = run.strobes[-1], run.mode
-        found, cost = _polish(flow, run)
+        orbit, cost = _polish(flow, run)
         spent += cost
-        if found is not None:
-            return replace(found, periods=spent)
+        if orbit is not None:
+            return replace(orbit, periods=spent)
         if stage >= 3:
             growth = lyapunov(flow, x, mode, FIRST)
             spent, x, mode = spent + FIRST, growth.start, growth.mode
             if growth.value * flow.drive.period > CHAOS:
                 return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
-            found, cost = long_orbit(flow, x, mode)
+            orbit, cost = long_orbit(flow, x, mode)
             spent += cost
-            if found is not None:
-                return replace(found, periods=spent)
+            if orbit is not None:
+                return replace(orbit, periods=spent)
     still = _without_period(flow, run)
     if not still:  # a growth too small to be seen at once
         growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
@@ -103,10 +103,10 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         if growth.value > SURE * growth.error:
             return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
         run = flow.run(growth.start, STAGES[-1], mode=growth.mode)
-        found, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
+        orbit, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
         spent += len(run.strobes) - 1 + cost
-        if found is not None:
-            return replace(found, periods=spent)
+        if orbit is not None:
+            return replace(orbit, periods=spent)
         still = run.status is FlowStatus.DONE and _without_period(flow, run)
     why = "quasi-periodic, or of a longer period" if still else "very slow"
     return _unperiodic(
@@ -149,8 +149,8 @@ def long_orbit(flow: Flow, x: Array, mode: ModeKey | None = None) -> tuple[Orbit
     run = flow.run(x, LONG_PERIOD, mode=mode)
     if run.status is not FlowStatus.DONE:
         return None, len(run.strobes) - 1
-    found, cost = _polish(flow, run, range(MAX_PERIOD + 1, LONG_PERIOD + 1))
-    return found, LONG_PERIOD + cost
+    orbit, cost = _polish(flow, run, range(MAX_PERIOD + 1, LONG_PERIOD + 1))
+    return orbit, LONG_PERIOD + cost
 
 
 def is_stationary(strobes: Array) -> bool:
@@ -334,7 +334,7 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
     Starts that are left when ``step_budget.STARTS`` steps are spent are not run. Mirror twins
     count as one; aperiodic ones are not told apart.
     """
-    found: list[Orbit] = []
+    attractors: list[Orbit] = []
     left = float(step_budget.STARTS)
     for x in states:
         if left <= 0.0:
@@ -342,9 +342,9 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
         budget = Budget(min(step_budget.SETTLING, left))
         orbit = settle(flow, np.asarray(x, dtype=float), budget=budget)
         left -= budget.spent
-        if not any(same(flow, orbit, other) for other in found):
-            found.append(orbit)
-    return found
+        if not any(same(flow, orbit, other) for other in attractors):
+            attractors.append(orbit)
+    return attractors
 
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
@@ -373,8 +373,8 @@ def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     if flow.system.mirror is None or orbit.status is not OrbitStatus.PERIODIC:
         return None
     x = mirrored_strobes(flow, orbit)[0]
-    found = shoot(flow, x, orbit.n)
-    return None if found is None else describe(flow, found[0], orbit.n, found[1])
+    shot = shoot(flow, x, orbit.n)
+    return None if shot is None else describe(flow, shot[0], orbit.n, shot[1])
 
 
 def _polish(
@@ -388,11 +388,11 @@ def _polish(
         gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
         if gap.max() > WORTH:
             continue
-        found = shoot(flow, strobes[-1], n, run.mode, peak)
+        shot = shoot(flow, strobes[-1], n, run.mode, peak)
         cost += 8 * n
-        if found is None:
+        if shot is None:
             continue
-        x, monodromy = found
+        x, monodromy = shot
         once = flow.run(x, n)
         if once.status is not FlowStatus.DONE:
             continue

@@ -115,10 +115,10 @@ class Function:
 
 def follow(flow: Flow, start: Array, periods: int) -> ContinuedOrbit | None:
     """The orbit of this period near a start (states,); None where shooting does not arrive."""
-    found = shoot(flow, start, periods, peak=peaks_near(flow, start))
-    if found is None:
+    shot = shoot(flow, start, periods, peak=peaks_near(flow, start))
+    if shot is None:
         return None
-    x, monodromy = found
+    x, monodromy = shot
     return ContinuedOrbit(_extremes(flow, x, periods), _stability(monodromy), periods, x)
 
 

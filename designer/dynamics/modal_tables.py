@@ -78,15 +78,15 @@ def keys(system: PiecewiseLinearSystem) -> list[ModeKey]:
 def _modes(system: PiecewiseLinearSystem) -> dict[int, Mode] | None:
     """Open mode 0, upper contact 1, lower contact 2, if those are all there are."""
     open_mode = system.mode(system.start)
-    found = {0: open_mode}
+    modes = {0: open_mode}
     for guard in open_mode.guards:
         mode = system.mode(guard.target)
         only = len(mode.guards) == 1 and mode.guards[0].target == system.start
         number = {1: 1, -1: 2}.get(mode.sides[0], 0)
-        if not only or number in found or guard.clearance != 0 or mode.guards[0].clearance != 0:
+        if not only or number in modes or guard.clearance != 0 or mode.guards[0].clearance != 0:
             return None
-        found[number] = mode
-    return found if len(found) > 1 and open_mode.sides == (0,) else None
+        modes[number] = mode
+    return modes if len(modes) > 1 and open_mode.sides == (0,) else None
 
 
 def _displacement(modes: dict[int, Mode], drive: Drive) -> tuple[Array, float, Array] | None:

@@ -131,12 +131,12 @@ class PiecewiseLinearSystem:
     @property
     def state_in(self) -> tuple[int | None, ...]:
         """For each clearance the index of the state that its displacement is; None for others."""
-        found = []
+        indices = []
         for row in self.displacement:
             places = np.flatnonzero(row)
             alone = len(places) == 1 and places[0] < self.size and row[places[0]] == 1.0
-            found.append(int(places[0]) if alone else None)
-        return tuple(found)
+            indices.append(int(places[0]) if alone else None)
+        return tuple(indices)
 
     @property
     def moving(self) -> int:

@@ -169,7 +169,7 @@ def by_flow(
         for met, (clearance, side) in zip(velocities, stops, strict=True):
             here = (run.impacts.side == side) & (run.impacts.clearance == clearance)
             met += run.impacts.velocity[here].tolist()
-    end, found = strobes[-1], (np.array(minima), *(np.array(met) for met in velocities))
+    end, extremes = strobes[-1], (np.array(minima), *(np.array(met) for met in velocities))
     chaos = growth is not None and growth.value * growth.period > CHAOS
     if growth and chaos and course.tangents >= kernel.SPAN and not _repeats(flow, strobes):
         orbit = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
@@ -179,7 +179,7 @@ def by_flow(
             orbit = _measured(flow, orbit)
         elif growth is not None and not np.isfinite(orbit.lyapunov):
             orbit = replace(orbit, lyapunov=growth.value)
-    return _of_orbit(orbit, end, found, spent)
+    return _of_orbit(orbit, end, extremes, spent)
 
 
 def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
@@ -197,9 +197,9 @@ def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
     return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
 
 
-def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, ...], spent: int) -> Steady:
-    """An orbit as what was ``found`` before it leads to: minima and velocities of each stop, after
-    ``spent`` periods."""
+def _of_orbit(orbit: Orbit, end: Array, extremes: tuple[Array, ...], spent: int) -> Steady:
+    """An orbit with the ``extremes`` of the run that led to it: minima, then impact velocities of
+    each stop, after ``spent`` periods."""
     if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
         orbit = replace(orbit, status=OrbitStatus.PERIODIC)
     periodic = orbit.status is OrbitStatus.PERIODIC
@@ -214,11 +214,11 @@ def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, ...], spent: int) ->
         radius=orbit.radius if periodic else float("nan"),
         start=orbit.start if len(orbit.start) else end,
         end=end,
-        minima=found[0],
-        velocities=found[1],
+        minima=extremes[0],
+        velocities=extremes[1],
         periods=spent + orbit.periods,
         more=orbit.more if periodic else (),
-        further=found[2:],
+        further=extremes[2:],
     )
 
 
@@ -279,10 +279,10 @@ def _by_kernel(
         counted,
         cursor,
     )
-    found = watch.minima, watch.velocities[:entries].copy()
+    extremes = watch.minima, watch.velocities[:entries].copy()
     spent += int(counted[kernel_orbit.SPENT])
     if code == kernel.NOT_SETTLED and course.patience:  # a long period, or none, but settled
-        return _of_orbit(settle(flow(), orbit, budget=budget), strobes[-1], found, spent)
+        return _of_orbit(settle(flow(), orbit, budget=budget), strobes[-1], extremes, spent)
     exponent = float(facts[2]) / period, float("nan")
     if code == kernel.APERIODIC:
         plain = growth > CHAOS and course.tangents >= kernel.SPAN  # else it was later that it was
@@ -303,8 +303,8 @@ def _by_kernel(
         radius=float(facts[0]) if n else float("nan"),
         start=orbit,
         end=strobes[-1],
-        minima=found[0],
-        velocities=found[1],
+        minima=extremes[0],
+        velocities=extremes[1],
         periods=spent,
     )
 

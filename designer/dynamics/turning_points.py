@@ -70,14 +70,14 @@ def turning_points_of(
     past = np.stack([x @ row[:-2] + row[-2] * u + row[-1] for row in rows])
     first, second = _derivatives(flow, x, u, du)
     step = drive.period / points
-    found: list[TurningPoint] = []
+    turning: list[TurningPoint] = []
     for (clearance, side, row), h in zip(stops, past, strict=True):
         C, D = row[:-2], row[-2]
-        found += [
+        turning += [
             TurningPoint(clearance, side, tip, node / points, height)
             for node, height, tip in _turning(h, first @ C + D * du, second @ C + D * ddu, step)
         ]
-    return found
+    return turning
 
 
 def _rate(flow: Flow, orbit: Orbit) -> float:

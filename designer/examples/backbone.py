@@ -99,12 +99,12 @@ def _resonance(model: LumpedSystem) -> tuple[Branch, tuple[float, float] | None]
     if first_touches(model, high)[0].b > model.b:
         raise ArithmeticError(f"the stops are hit at ω = {high:g}")
     known = [(high, linear_orbit(model, high))]
-    found = survey(of_model(model, high, "omega"), known, low, high, depth=0)
-    folds = [p for p in found.points if p.kind is PointKind.FOLD]
+    located = survey(of_model(model, high, "omega"), known, low, high, depth=0)
+    folds = [p for p in located.points if p.kind is PointKind.FOLD]
     if not folds:
-        return found.branches[0], None
+        return located.branches[0], None
     last = max(folds, key=lambda p: p.value)
-    return found.branches[0], (last.value, float(last.point.orbit.extremes[0, 1]))
+    return located.branches[0], (last.value, float(last.point.orbit.extremes[0, 1]))
 
 
 def _curve(branch: Branch, stable: bool) -> tuple[Array, Array]:

@@ -146,12 +146,12 @@ def _windows(
     span = omegas[0], omegas[-1]
 
     def locate(k: int) -> RecordedWindow | None:
-        found = _window(modelfile, omegas[k], orbits[k], span)
+        recorded = _window(modelfile, omegas[k], orbits[k], span)
         step()
-        return found
+        return recorded
 
-    each = [found for found in parallel(locate, middles, jobs) if found is not None]
-    return _distinct(sorted(each, key=lambda found: found.window.low.value))
+    each = [recorded for recorded in parallel(locate, middles, jobs) if recorded is not None]
+    return _distinct(sorted(each, key=lambda recorded: recorded.window.low.value))
 
 
 def _middles(orbits: Sequence[Orbit]) -> list[int]:
@@ -176,10 +176,10 @@ def _window(
         return None
 
 
-def _distinct(found: Sequence[RecordedWindow]) -> list[RecordedWindow]:
+def _distinct(windows: Sequence[RecordedWindow]) -> list[RecordedWindow]:
     """Of windows that were located from two of their places, the first."""
     out: list[RecordedWindow] = []
-    for each in found:
+    for each in windows:
         low, response = each.window.low.value, each.window.response
         if not any(
             other.window.response == response

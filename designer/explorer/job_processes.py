@@ -62,11 +62,11 @@ class Job:
 class JobProcesses:
     """The jobs of one server.
 
-    told : is called with a job's message whenever it changes, on a thread of its own.
+    changed : is called with a job's message whenever it changes, on a thread of its own.
     """
 
-    def __init__(self, told: Callable[[Message], None]) -> None:
-        self._told = told
+    def __init__(self, changed: Callable[[Message], None]) -> None:
+        self._changed = changed
         self._jobs: dict[str, Job] = {}
         self._threads: list[threading.Thread] = []
 
@@ -127,9 +127,9 @@ class JobProcesses:
             for line in _lines(stream):
                 copy.write(f"{line}\n")
                 job.line = line.removeprefix("designer: ")[:300]
-                self._told(job.message())
+                self._changed(job.message())
         job.status = job.process.wait()
-        self._told(job.message())
+        self._changed(job.message())
 
 
 def _lines(stream: IO[str]) -> Iterator[str]:

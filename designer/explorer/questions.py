@@ -94,7 +94,7 @@ def boards(modelfile: ModelFile, choose: Choose, question: PageQuestion) -> Iter
     yield from board_box(modelfile, place, expected(question.more.get("expect")), choose)
 
 
-def kept(
+def save_model(
     modelfile: ModelFile, root: Path, jobs: JobProcesses, question: PageQuestion
 ) -> Iterator[Message]:
     """A place saved as a model file in ``root``, and a job that is begun on it.

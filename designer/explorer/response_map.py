@@ -148,15 +148,15 @@ def borders(request: MapRequest) -> Iterator[Message]:
         return
     (x, y), whose = request.at, f"Borders of {summary(orbit)}"
     plan = CurvePlan(request.subject, request.x.name, request.y.name, y, request.window)
-    found: list[BorderCurve] = []
+    curves: list[BorderCurve] = []
 
     def follow(step: Callable[[], None]) -> None:
-        found.extend(border_curves.around(plan, orbit, x, step))
+        curves.extend(border_curves.around(plan, orbit, x, step))
 
     for points, _ in enumerate(stepped(follow)):
-        yield _borders_message(found, f"{whose}: being followed, {points} points so far")
-    words = whose if found else f"{whose}: none was found within the map"
-    yield _borders_message(found, words, done=True)
+        yield _borders_message(curves, f"{whose}: being followed, {points} points so far")
+    words = whose if curves else f"{whose}: none was found within the map"
+    yield _borders_message(curves, words, done=True)
 
 
 def _side(

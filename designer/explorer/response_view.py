@@ -221,8 +221,10 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
 
 def multipliers_text(multipliers: Sequence[complex] | np.ndarray) -> str:
     """Floquet multipliers, the largest first; a conjugate pair once, with ±."""
-    kept = [mu for mu in sorted(multipliers, key=lambda mu: (-abs(mu), -mu.imag)) if mu.imag >= 0.0]
-    return ", ".join(_multiplier(complex(mu)) for mu in kept) or "none"
+    upper = [
+        mu for mu in sorted(multipliers, key=lambda mu: (-abs(mu), -mu.imag)) if mu.imag >= 0.0
+    ]
+    return ", ".join(_multiplier(complex(mu)) for mu in upper) or "none"
 
 
 def _multiplier(mu: complex) -> str:

@@ -26,7 +26,7 @@ from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
-from designer.explorer.questions import boards, kept, planes, read_question, viewed
+from designer.explorer.questions import boards, planes, read_question, save_model, viewed
 from designer.explorer.saved_page import save_page
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
@@ -326,8 +326,8 @@ class _Socket(WebSocketHandler, _Guarded):
             answer = partial(boards, e.modelfile, e.parts, question)
             e.board_queue.ask(self, question.number, answer, self.send)
         else:  # beside the picture, whose next question shall not overtake it
-            answer = partial(kept, e.modelfile, e.root, e.jobs, question)
-            e.queue.ask((self, "kept"), question.number, answer, self.send)
+            answer = partial(save_model, e.modelfile, e.root, e.jobs, question)
+            e.queue.ask((self, "save"), question.number, answer, self.send)
 
     def on_close(self) -> None:
         self.explorer.sockets.discard(self)

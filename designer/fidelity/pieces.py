@@ -85,44 +85,44 @@ def rungs_json(
 
 
 def rungs(
-    said: Mapping[str, Any],
+    piece: Mapping[str, Any],
 ) -> tuple[tuple[RungError, ...], Truth, SolverSettings | None, float]:
     """The inverse of ``rungs_json``; numbers that are not finite come back as nan."""
-    settings = said["settings"]
+    settings = piece["settings"]
     return (
-        tuple(_compared(row) for row in said["rows"]),
-        _truth(said["truth"]),
+        tuple(_compared(row) for row in piece["rows"]),
+        _truth(piece["truth"]),
         None if settings is None else SolverSettings(**settings),
-        _number(said["seconds"]),
+        _number(piece["seconds"]),
     )
 
 
-def tally(said: Mapping[str, Any]) -> Tally:
+def tally(piece: Mapping[str, Any]) -> Tally:
     """Counts of a piece of boards."""
-    return Tally(**{f.name: said[f.name] for f in fields(Tally)})
+    return Tally(**{f.name: piece[f.name] for f in fields(Tally)})
 
 
-def _compared(said: Mapping[str, Any]) -> RungError:
+def _compared(row: Mapping[str, Any]) -> RungError:
     return RungError(
         **{
-            **said,
-            "label": ResponseLabel(**said["label"]),
-            "seconds": _number(said["seconds"]),
-            "error": {of: _number(v) for of, v in said["error"].items()},
-            "velocity": {of: _number(v) for of, v in said["velocity"].items()},
-            "numerical": _number(said["numerical"]),
-            "convergence": _number(said["convergence"]),
+            **row,
+            "label": ResponseLabel(**row["label"]),
+            "seconds": _number(row["seconds"]),
+            "error": {of: _number(v) for of, v in row["error"].items()},
+            "velocity": {of: _number(v) for of, v in row["velocity"].items()},
+            "numerical": _number(row["numerical"]),
+            "convergence": _number(row["convergence"]),
         }
     )
 
 
-def _truth(said: Mapping[str, Any]) -> Truth:
+def _truth(piece: Mapping[str, Any]) -> Truth:
     return Truth(
         **{
-            **said,
-            "label": ResponseLabel(**said["label"]),
-            "error": _number(said["error"]),
-            "velocity": _number(said["velocity"]),
+            **piece,
+            "label": ResponseLabel(**piece["label"]),
+            "error": _number(piece["error"]),
+            "velocity": _number(piece["velocity"]),
         }
     )
 

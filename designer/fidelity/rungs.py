@@ -234,8 +234,8 @@ def _runge_kutta(
         "u",
         keep=True,
     )
-    found = read(Waveforms(time, signals, "", 0.0), reading)
-    return found.orbit, _traced(found, 1.0, system.moving)
+    run = read(Waveforms(time, signals, "", 0.0), reading)
+    return run.orbit, _traced(run, 1.0, system.moving)
 
 
 def in_ngspice(subject: GateSubject, truth: Truths) -> dict[str, GateSubject]:
@@ -285,19 +285,21 @@ def _spice(
     for name, one in on.items():
         for k, own in enumerate(ladder):
             settings = _own(one, own)
-            found, half, gear = runs[name, k]
-            passed = passes(one, found, (half, gear))
+            run, half, gear = runs[name, k]
+            passed = passes(one, run, (half, gear))
             entrant = _timed(one, settings, clock)
-            said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
-            said["discarded_periods"] = one.discard
-            if isinstance(found, SimulationFailed):
-                orbit, shown = Orbit(OrbitStatus.FAILED, reason=found.reason), np.zeros(0)
+            described = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
+            described["discarded_periods"] = one.discard
+            if isinstance(run, SimulationFailed):
+                orbit, shown = Orbit(OrbitStatus.FAILED, reason=run.reason), np.zeros(0)
             else:
-                orbit = _in_model_units(found.orbit, asked)
+                orbit = _in_model_units(run.orbit, asked)
                 moving = one.system.moving
-                shown = _traced(found, float(asked.volts[moving]), moving)
+                shown = _traced(run, float(asked.volts[moving]), moving)
             yield (
-                RungAnswer(name, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
+                RungAnswer(
+                    name, names[k], described, orbit, shown, reason=orbit.reason, gate=passed
+                ),
                 entrant,
             )
 
@@ -350,12 +352,12 @@ def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
     return displacement(flow, orbit) / volts
 
 
-def _traced(found: Read, volts: float, moving: int) -> Array:
+def _traced(run: Read, volts: float, moving: int) -> Array:
     """(n · POINTS,) first displacement of a run's last n periods."""
-    if not found.orbit.n or found.trace is None:
+    if not run.orbit.n or run.trace is None:
         return np.zeros(0)
-    time, states = found.trace
-    count = found.orbit.n * POINTS
+    time, states = run.trace
+    count = run.orbit.n * POINTS
     grid = time[-1] * np.arange(count) / count
     return np.asarray(np.interp(grid, time, states[:, moving])) / volts
 
@@ -376,19 +378,19 @@ def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
     read = [run for run in (own, *beside) if isinstance(run, Read)]
     if len(read) < 3 or isinstance(own, SimulationFailed):
         return False
-    exact, found = subject.orbit, own.orbit
-    if found.status not in (OrbitStatus.PERIODIC, OrbitStatus.APERIODIC):
+    exact, orbit = subject.orbit, own.orbit
+    if orbit.status not in (OrbitStatus.PERIODIC, OrbitStatus.APERIODIC):
         return False
     if len({run.orbit.response for run in read}) > 1:
         return False
     ideal = subject.rung == "ideal"
-    if ideal and found.response != exact.response:
+    if ideal and orbit.response != exact.response:
         return False
-    if found.status is not OrbitStatus.PERIODIC:
+    if orbit.status is not OrbitStatus.PERIODIC:
         return True  # there is no strobe and no wave to compare
-    extremes = exact.extremes if exact.status is OrbitStatus.PERIODIC else found.extremes
+    extremes = exact.extremes if exact.status is OrbitStatus.PERIODIC else orbit.extremes
     peak = np.abs(extremes).max(axis=1)
-    last = [run.strobes[-found.n :] for run in read]
+    last = [run.strobes[-orbit.n :] for run in read]
     apart = max(
         float((np.abs(a - b) / peak).max()) for i, a in enumerate(last) for b in last[i + 1 :]
     )

@@ -59,20 +59,20 @@ _LOOKS = {
 
 
 def trade_json(
-    found: Trade, provenance: Mapping[str, Any], seconds: float, title: str
+    result: Trade, provenance: Mapping[str, Any], seconds: float, title: str
 ) -> dict[str, Any]:
     """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``."""
-    boards = [r.boards for r in found.responses]
+    boards = [r.boards for r in result.responses]
     document = {
         "format": FORMAT,
         "title": title,
-        "rungs": [_row(row, r.truth) for r in found.responses for row in r.rows],
-        "truths": [_truth(r.truth) for r in found.responses],
+        "rungs": [_row(row, r.truth) for r in result.responses for row in r.rows],
+        "truths": [_truth(r.truth) for r in result.responses],
         "boards": [_boards(b) for b in boards if isinstance(b, BoardTrade)],
         "left_out": [
             {**b.label.as_dict(), "reason": b.reason} for b in boards if isinstance(b, LeftOut)
         ],
-        "cheapest": [_cheapest(c) for c in found.cheapest],
+        "cheapest": [_cheapest(c) for c in result.cheapest],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
@@ -203,13 +203,13 @@ def cheapest_table(answer: Mapping[str, Any]) -> Table | None:
     for c in answer["cheapest"]:
         if c["number"] is not None and not alone:
             continue
-        kept = {True: "yes", False: "no", None: NONE}[c["shown"]]
+        shown = {True: "yes", False: "no", None: NONE}[c["shown"]]
         rung = [NONE] * 4
         if c["rung"]:
             rung = [TITLES[c["rung"]], c["level"], _measured(c, "measured")]
             rung.append(_measured(c, "convergence"))
         seconds = _short(c["seconds"]) if c["rung"] else NONE
-        rows.append((c["question"], c["of"], *rung, kept, seconds, c["note"]))
+        rows.append((c["question"], c["of"], *rung, shown, seconds, c["note"]))
     columns = (
         "question", "against", "rung", "setting", "measured", "convergence", "kept", "CPU seconds",
         "note",
@@ -296,8 +296,8 @@ def _cell(row: Mapping[str, Any] | None) -> str:
         error = f"convergence {_percent(row['convergence'])}"
     error = error if row["right"][BOARD] else row["response"]
     seconds = row["seconds_per_period"]
-    said = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
-    return f"{said} (gate not passed)" if row["gate"] is False else said
+    text = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
+    return f"{text} (gate not passed)" if row["gate"] is False else text
 
 
 def _percent(value: float | None) -> str:

@@ -99,13 +99,13 @@ class Trade:
 
 def trade(responses: Sequence[TradedResponse]) -> Trade:
     """Judge what was found, response by response and for all together."""
-    found = []
+    choices = []
     for of in (BOARD, EQUATIONS):
         for question in QUESTIONS:
-            found += [cheapest(question, of, [one]) for one in responses]
+            choices += [cheapest(question, of, [one]) for one in responses]
             if len(responses) > 1:
-                found.append(cheapest(question, of, responses))
-    return Trade(tuple(responses), (*(c for c in found if c is not None), *_of_boards(responses)))
+                choices.append(cheapest(question, of, responses))
+    return Trade(tuple(responses), (*(c for c in choices if c is not None), *_of_boards(responses)))
 
 
 def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Cheapest | None:
@@ -121,8 +121,8 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
     left_out = [f"without response {n}: {reason}" for n, reason in why.items() if reason]
     open_ = [str(r.truth.label.number) for r in asked if of == BOARD and not r.truth.sure]
     if open_:
-        told = UNSURE if label else f"{UNSURE} (response {', '.join(open_)})"
-        return replace(nothing, shown=False, note="; ".join([told, *left_out]))
+        unsure = UNSURE if label else f"{UNSURE} (response {', '.join(open_)})"
+        return replace(nothing, shown=False, note="; ".join([unsure, *left_out]))
     truth = asked[0].truth
     finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == truth.rung][-1:]
     kinds = dict.fromkeys((row.rung, row.level) for r in asked for row in r.rows)
@@ -196,11 +196,11 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
     off = any(b.off(YIELD) for b in some)
     rung = "ideal" if off else CIRCUIT
     # ngspice is what is measured against: the circuit's difference is what there is to say.
-    said = [f"the exact circuit is off by more than {100.0 * YIELD:g} %"] if off else []
-    said += [note] if note else []
+    notes = [f"the exact circuit is off by more than {100.0 * YIELD:g} %"] if off else []
+    notes += [note] if note else []
     if undecided := sum(b.undecided for b in some):
         asked = sum(b.asked for b in some)
-        said.append(f"{undecided} of {asked} boards undecided, counted as differing")
+        notes.append(f"{undecided} of {asked} boards undecided, counted as differing")
     return Cheapest(
         SHARE,
         IDEAL,
@@ -211,5 +211,5 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
         math.nan if off else measured,
         off or measured <= YIELD,
         sum(b.seconds[rung] for b in some),
-        "; ".join(said),
+        "; ".join(notes),
     )

@@ -221,16 +221,16 @@ def tally(
         Ask(a.sample, 0, StartKind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED
     ]
     hearings = cross_checks(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
-    heard = {h.sample: h for h in hearings}
+    by_sample = {h.sample: h for h in hearings}
     asked = plan.questions[0]
     both = []
     for answer in answers:
-        hearing = heard.get(answer.sample)
-        said = None if hearing is None else hearing.survives(asked)
-        if answer.verdict in (Verdict.OK, Verdict.LOST) and said is not None:
-            both.append((answer.verdict is Verdict.OK, said))
+        hearing = by_sample.get(answer.sample)
+        survived = None if hearing is None else hearing.survives(asked)
+        if answer.verdict in (Verdict.OK, Verdict.LOST) and survived is not None:
+            both.append((answer.verdict is Verdict.OK, survived))
     # The first run of each; too long a way is none.
-    periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values() if h.response]
+    periods = [h.periods + 4 * max(asked.start.n, 1) for h in by_sample.values() if h.response]
     counts = Tally(
         decided=len(both),
         ok=sum(mine for mine, _ in both),
@@ -240,7 +240,7 @@ def tally(
         runs=len(periods),
         periods=float(sum(periods)),
         seconds=seconds,
-        resolved=sum(_resolved(heard.get(answer.sample), answer) for answer in answers),
+        resolved=sum(_resolved(by_sample.get(answer.sample), answer) for answer in answers),
     )
     if plan.circuit.figures is None:
         return counts

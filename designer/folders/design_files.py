@@ -81,7 +81,7 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
 def answer(synthesis: Synthesis) -> dict[str, Any]:
     """The JSON object of ``design.json``."""
     cost = cost_or_none(synthesis)
-    found = synthesis_json(
+    document = synthesis_json(
         synthesis.modelfile,
         synthesis.design,
         synthesis.model_responses,
@@ -89,7 +89,7 @@ def answer(synthesis: Synthesis) -> dict[str, Any]:
         synthesis.seconds,
         better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
     )
-    return {**found, "board_cost": None if cost is None else cost.as_dict()}
+    return {**document, "board_cost": None if cost is None else cost.as_dict()}
 
 
 def design_provenance(synthesis: Synthesis) -> dict[str, Any]:

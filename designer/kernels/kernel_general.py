@@ -171,8 +171,8 @@ def _first_rise(c: Float, end: float, rounding: float, tangencies: Int) -> float
 
 
 @callee
-def _stationary(c: Float, end: float, found: Float) -> int:
-    """Writes the points of [0, end] where p' = 0 into ``found``; returns how many."""
+def _stationary(c: Float, end: float, points: Float) -> int:
+    """Writes the points of [0, end] where p' = 0 into ``points``; returns how many."""
     n = c.shape[0]
     q = np.empty(n - 1)
     for k in range(1, n):
@@ -182,7 +182,7 @@ def _stationary(c: Float, end: float, found: Float) -> int:
     right = np.empty(80)
     left[0], right[0] = 0.0, end
     top, count = 1, 0
-    while top > 0 and count < found.shape[0]:
+    while top > 0 and count < points.shape[0]:
         top -= 1
         a, b = left[top], right[top]
         m, r = 0.5 * (a + b), 0.5 * (b - a)
@@ -192,11 +192,11 @@ def _stationary(c: Float, end: float, found: Float) -> int:
         if abs(d) - bound * r > 0.0:
             va, vb = _value(q, a), _value(q, b)
             if (va <= 0.0 < vb) or (vb <= 0.0 < va):
-                found[count] = _root(q, a, b)
+                points[count] = _root(q, a, b)
                 count += 1
             continue
         if r < FINEST:
-            found[count] = m
+            points[count] = m
             count += 1
             continue
         left[top], right[top] = m, b
@@ -285,33 +285,33 @@ def _measure(
 ) -> None:
     """Extremes of the states, of the displacements and of the distances to the stops in a step."""
     c = np.empty(tables.taylor.shape[1])
-    found = np.empty(16)
+    points = np.empty(16)
     for i in range(log.extremes.shape[0]):
         rows = tables.taylor[mode, :, i] if i < n else tables.watched[mode, i - n]
         _series(rows, z, c)
-        count = _stationary(c, end, found)
+        count = _stationary(c, end, points)
         for q in range(count + 2):
-            v = c[0] if q == count else _value(c, end if q > count else found[q])
+            v = c[0] if q == count else _value(c, end if q > count else points[q])
             log.extremes[i, 0] = min(log.extremes[i, 0], v)
             log.extremes[i, 1] = max(log.extremes[i, 1], v)
     for j in range(tables.side.shape[1]):
         if tables.side[mode, j] == 0:
             continue
         _series(tables.depth[mode, j], z, c)
-        count = _stationary(c, end, found)
+        count = _stationary(c, end, points)
         for q in range(count):
-            depth[j] = max(depth[j], _value(c, found[q]))
+            depth[j] = max(depth[j], _value(c, points[q]))
         depth[j] = max(depth[j], _value(c, end))
     for g in range(tables.guards[mode]):
         j = tables.clearance[mode, g]
         if j < 0 or tables.side[mode, j] != 0:
             continue
         _series(tables.guard[mode, g], z, c)
-        count = _stationary(c, end, found)
+        count = _stationary(c, end, points)
         for q in range(count):
-            v = _value(c, found[q])
-            falls = _slope(c, min(found[q] + 1e-6, end)) <= 0.0
-            if v < 0.0 and falls and 0.0 < found[q] < end:
+            v = _value(c, points[q])
+            falls = _slope(c, min(points[q] + 1e-6, end)) <= 0.0
+            if v < 0.0 and falls and 0.0 < points[q] < end:
                 log.graze[j, 1] = min(log.graze[j, 1], -v)
 
 

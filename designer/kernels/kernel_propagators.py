@@ -407,7 +407,7 @@ def _first_crossing(
     h, part = data[(base & MASK) + H], data[(base & MASK) + REST]
     _, _, limits = function_places(n)
     _, _, _, _, one = table_places(n)
-    count, found, through = min(STEPS, int(left / h) + 1), -1.0, -1
+    count, earliest, through = min(STEPS, int(left / h) + 1), -1.0, -1
     for r in range(watched):
         at = (first + one * r) & MASK
         low, high = data[at + limits + LOW], data[at + limits + HIGH]
@@ -423,12 +423,12 @@ def _first_crossing(
                 data, function, k, h, m4, low, high, tangency, undecided, work
             )
             if time >= 0.0:
-                if found < 0.0 or time < found:
-                    found, through = time, 2 * r + (HIGH if side > 0 else LOW)
+                if earliest < 0.0 or time < earliest:
+                    earliest, through = time, 2 * r + (HIGH if side > 0 else LOW)
                     count = min(count, int(time / h) + 1)
                 break
             k = suspect_step(h, rest, low, high, count, work, k + 1)
-    return found, through
+    return earliest, through
 
 
 @leaf

@@ -74,14 +74,14 @@ def _side(
     second: bool,
     ratio: int,
     level: float,
-    found: Index,
+    completions: Index,
     numbers: Array,
 ) -> tuple[int, bool, int]:
     """Completions of one mass: stiffness pair, displacement integrator; error at most ``level``.
 
-    found (room, 4) gets the upper and lower resistor, the integrator's resistor and capacitor;
-    numbers (room, 4) the two further numbers of the minimax, the scale q and the error so far.
-    Returns how many, whether there was room, and the steps.
+    completions (room, 4) gets the upper and lower resistor, then the integrator's resistor and
+    capacitor; numbers (room, 4) the two further numbers of the minimax, the scale q and the error
+    so far. Returns how many, whether there was room, and the steps.
     """
     r, w, peaks = values.r, rules.w, rules.peaks
     alpha, p = scales
@@ -127,10 +127,10 @@ def _side(
             if fits:
                 error = max(largest(rules.six, v), largest(rules.two if second else rules.one, v))
                 if error <= level + TINY:
-                    if count == len(found):
+                    if count == len(completions):
                         return count, False, steps
-                    found[count, 0], found[count, 1] = up, low
-                    found[count, 2], found[count, 3] = values.sum_r[i], values.sum_c[i]
+                    completions[count, 0], completions[count, 1] = up, low
+                    completions[count, 2], completions[count, 3] = values.sum_r[i], values.sum_c[i]
                     numbers[count, 0], numbers[count, 1] = v[place], v[place + 1]
                     numbers[count, 2], numbers[count, 3] = q, error
                     count += 1
@@ -146,17 +146,19 @@ def _copy(into: Index, parts: Index) -> None:
 
 
 @callee
-def _put(parts: Index, found: Index, second: bool) -> None:
+def _put(parts: Index, completion: Index, second: bool) -> None:
     """Put one completion (its four indices) among the parts."""
     if second:
-        parts[R5], parts[R11], parts[R7], parts[C3] = found[0], found[1], found[2], found[3]
+        parts[R5], parts[R11] = completion[0], completion[1]
+        parts[R7], parts[C3] = completion[2], completion[3]
     else:
-        parts[R4], parts[R10], parts[R1], parts[C1] = found[0], found[1], found[2], found[3]
+        parts[R4], parts[R10] = completion[0], completion[1]
+        parts[R1], parts[C1] = completion[2], completion[3]
 
 
 @callee
 def _pair(
-    rules: Rules, parts: Index, v: Array, p: float, found: Index, one: Array, two: Array
+    rules: Rules, parts: Index, v: Array, p: float, completion: Index, one: Array, two: Array
 ) -> float:
     """Error of a completion of both masses; infinite where the two do not go together.
 
@@ -167,7 +169,7 @@ def _pair(
         return np.inf
     parts[R5] = parts[R11] = parts[R7] = parts[C3] = -1
     for k, part in enumerate((R5, R11, R7, C3)):
-        if not agree(rules, parts, part, found[k]):
+        if not agree(rules, parts, part, completion[k]):
             return np.inf
     v[6], v[7], v[8], v[9] = one[0], one[1], two[0], two[1]
     return float(max(one[3], two[3], largest(rules.both, v)))

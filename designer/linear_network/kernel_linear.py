@@ -218,7 +218,7 @@ def _ratios(
     centre: float,
     half: float,
     most: int,
-    found: Index,
+    pairs: Index,
 ) -> tuple[int, int]:
     """Ratios within ``half`` of ``centre`` that some allowed pair of resistors has; the steps.
 
@@ -246,7 +246,7 @@ def _ratios(
                 parts[pair[0]] = parts[pair[1]] = -1
                 if kinds > most:
                     continue
-            found[count] = k
+            pairs[count] = k
             count += 1
             break
         k += 1

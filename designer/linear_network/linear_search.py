@@ -78,31 +78,31 @@ def best(
     capacitors, prices = capacitors[order], prices[order]
     question = LinearQuestion(targets, signal, capacitors, prices, bounds, spec)
     if level is None:
-        found = _answered(question, MOST_STEPS, empty)
+        levels = _answered(question, MOST_STEPS, empty)
     else:
         search = _search(question)
-        found = search.level(max(level, search.first), MOST_STEPS)
-        if found.nothing:
-            return Shortfall("coefficients", found.whole)
-    if found.nothing and not found.whole and question.by_joins:
-        found = _thinned(found, question)
-    if found.nothing:
-        return Shortfall(_what_binds(found, question, resistors), found.whole)
-    return _linear_block(found, question)
+        levels = search.level(max(level, search.first), MOST_STEPS)
+        if levels.nothing:
+            return Shortfall("coefficients", levels.whole)
+    if levels.nothing and not levels.whole and question.by_joins:
+        levels = _thinned(levels, question)
+    if levels.nothing:
+        return Shortfall(_what_binds(levels, question, resistors), levels.whole)
+    return _linear_block(levels, question)
 
 
 def _search(question: LinearQuestion) -> LevelSearch:
     return PairSearch(question) if question.by_joins else TermSearch(question)
 
 
-def _linear_block(found: Levels, question: LinearQuestion) -> LinearBlock:
+def _linear_block(levels: Levels, question: LinearQuestion) -> LinearBlock:
     """Of the choices with the error that was found: the fewest distinct values, the least price."""
     search, resistors = _search(question), len(question.targets.entries)
-    limit = found.error + max(question.spec.slack, 0.0)
-    index, solver = search.fewest(found.parts, limit, MOST_STEPS // 8)
+    limit = levels.error + max(question.spec.slack, 0.0)
+    index, solver = search.fewest(levels.parts, limit, MOST_STEPS // 8)
     error = search.error(index)
-    least = min(error, found.error)  # with work left over, the second stage may find better
-    bound = found.error if found.whole else min(found.empty, least)
+    least = min(error, levels.error)  # with work left over, the second stage may find better
+    bound = levels.error if levels.whole else min(levels.empty, least)
     chosen = [
         *question.resistors[index[:resistors]].tolist(),
         *question.capacitors[index[resistors:]].tolist(),
@@ -113,7 +113,7 @@ def _linear_block(found: Levels, question: LinearQuestion) -> LinearBlock:
         least=least,
         bound=bound,
         proved=least <= bound + EXACT,
-        proof=_proof(found, question),
+        proof=_proof(levels, question),
         solver=solver,
     )
 
@@ -125,15 +125,15 @@ def _levels(question: LinearQuestion, patience: int, empty: float = 0.0) -> Leve
     """
     search = _search(question)
     level = max(empty, search.first)
-    found = Levels(np.inf, np.full(len(question.targets.parts), -1), empty, False, -1, 0, 0)
+    levels = Levels(np.inf, np.full(len(question.targets.parts), -1), empty, False, -1, 0, 0)
     while True:
-        level = min(level, LAST_LEVEL, found.error)
-        at = search.level(level, patience - found.steps)
+        level = min(level, LAST_LEVEL, levels.error)
+        at = search.level(level, patience - levels.steps)
         best = at.error <= level + ROUNDING
-        empty = level if at.whole and not best else found.empty
-        found = replace(at.after(found), empty=empty, whole=at.whole and (best or at.nothing))
+        empty = level if at.whole and not best else levels.empty
+        levels = replace(at.after(levels), empty=empty, whole=at.whole and (best or at.nothing))
         if best or not at.whole or level >= LAST_LEVEL:
-            return found
+            return levels
         level *= 1e3 if level < 1e-6 else search.growth
 
 
@@ -142,14 +142,14 @@ def _answered(question: LinearQuestion, patience: int, empty: float = 0.0) -> Le
     found, the best that dives find with the other half. Its bound stays the level that is empty."""
     if question.by_joins:
         return _levels(question, patience)
-    found = _levels(question, patience // 2, empty)
-    if not found.nothing or found.whole:
-        return found
-    near = TermDives(TermSearch(question)).best(max(found.empty, EXACT), patience // 2)
-    return replace(near.after(found), empty=found.empty, whole=False)
+    levels = _levels(question, patience // 2, empty)
+    if not levels.nothing or levels.whole:
+        return levels
+    near = TermDives(TermSearch(question)).best(max(levels.empty, EXACT), patience // 2)
+    return replace(near.after(levels), empty=levels.empty, whole=False)
 
 
-def _thinned(found: Levels, question: LinearQuestion) -> Levels:
+def _thinned(levels: Levels, question: LinearQuestion) -> Levels:
     """Something to offer where the work ran out: the best of a part of the resistors.
 
     Its bound stays that of the whole catalogue.
@@ -160,21 +160,21 @@ def _thinned(found: Levels, question: LinearQuestion) -> Levels:
         taken = np.arange(0, len(question.resistors), every)
         fewer = replace(question, resistors=question.resistors[taken])
         with part(f"every {every}th resistor"):
-            thin = _levels(fewer, MOST_STEPS // 8, found.empty)
+            thin = _levels(fewer, MOST_STEPS // 8, levels.empty)
         parts = thin.parts.copy()
         parts[:resistors] = taken[parts[:resistors]]
-        found = replace(replace(thin, parts=parts).after(found), empty=found.empty, whole=False)
-    return found
+        levels = replace(replace(thin, parts=parts).after(levels), empty=levels.empty, whole=False)
+    return levels
 
 
-def _what_binds(found: Levels, question: LinearQuestion, resistors: Array) -> str:
+def _what_binds(levels: Levels, question: LinearQuestion, resistors: Array) -> str:
     """What leaves no choice: the first preference or condition without which there is one."""
     for name, relaxed in _relaxations(question, resistors):
         with part(f"without {name}"):
             again = _answered(relaxed, MOST_STEPS // 8)
         if not again.nothing:
             return name
-    return "displacement integrators" if found.reached >= 0 else "coefficients"
+    return "displacement integrators" if levels.reached >= 0 else "coefficients"
 
 
 def _relaxations(
@@ -201,7 +201,7 @@ def _relaxations(
         yield "side conditions", replace(question, bounds=none)
 
 
-def _proof(found: Levels, question: LinearQuestion) -> str:
+def _proof(levels: Levels, question: LinearQuestion) -> str:
     """How the bound is known, in words."""
     resistors, capacitors = len(question.resistors), len(question.capacitors)
     pair = question.by_joins
@@ -210,16 +210,16 @@ def _proof(found: Levels, question: LinearQuestion) -> str:
     scope = f"all {resistors} resistor and {capacitors} capacitor values"
     empty = (
         f"the {way} over {scope} leave{'' if pair else 's'} no choice with a linear error of "
-        f"{found.empty:.3g} or less"
-        if found.empty > 0.0
+        f"{levels.empty:.3g} or less"
+        if levels.empty > 0.0
         else f"over {scope} the first level of error that was searched has an answer"
     )
-    after = "next level" if found.empty > 0.0 else "first level"
-    if found.error <= EXACT and not found.whole and not pair:
+    after = "next level" if levels.empty > 0.0 else "first level"
+    if levels.error <= EXACT and not levels.whole and not pair:
         return f"no error is below 0, and one up to {EXACT:g} counts as none"
-    if found.whole:
+    if levels.whole:
         return (
-            f"{empty}; at the {after} every {choice} with an error below {found.error:.6g} "
-            f"was {did} and none is better ({found.rows} {those} in all)"
+            f"{empty}; at the {after} every {choice} with an error below {levels.error:.6g} "
+            f"was {did} and none is better ({levels.rows} {those} in all)"
         )
-    return f"{empty}; the next level was not searched to its end ({found.steps:.3g} steps)"
+    return f"{empty}; the next level was not searched to its end ({levels.steps:.3g} steps)"

@@ -169,7 +169,7 @@ class CircuitSpec(FileTable):
     front, of those that they are not; none: every family."""
 
     @property
-    def kept(self) -> frozenset[str]:
+    def active_conditions(self) -> frozenset[str]:
         """The side conditions that are kept, by name."""
         if isinstance(self.side_conditions, bool):
             return frozenset(SIDE_CONDITIONS if self.side_conditions else ())

@@ -152,12 +152,12 @@ def _compared(r: Piece) -> str:
 def _misprints(misprints: Sequence[Piece]) -> list[Block]:
     rows = []
     for m in misprints:
-        error, worst, kept = "", "", "reaches no part"
+        error, worst, shares = "", "", "reaches no part"
         if m["reaches"]:
             error = "a wrong sign" if m["max_error"] is None else _percent(m["max_error"])
             worst, shown = m["worst"], [r["kept"] for r in m["responses"]]
-            kept = f"{sum(shown)} of {len(shown)}" if shown else "not run"
-        rows.append((m["where"], m["printed"], m["right"], m["note"], error, worst, kept))
+            shares = f"{sum(shown)} of {len(shown)}" if shown else "not run"
+        rows.append((m["where"], m["printed"], m["right"], m["note"], error, worst, shares))
     columns = (
         "where", "printed", "must read", "read as", "coefficient error", "in", "responses kept",
     )  # fmt: skip

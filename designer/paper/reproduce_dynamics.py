@@ -132,8 +132,8 @@ def reproduce(
     page = dynamics_page(dynamics, figures, COMMAND, first=FIRST, starts=STARTS)
     write_files(out, (DATA, _document(dynamics, extent, source)), page, figures, ("png", "svg"))
     _parquet(out / "branches.parquet", dynamics.survey, source)
-    for found in borders:
-        write(out / f"{found.name}.csv", found.table())
+    for each in borders:
+        write(out / f"{each.name}.csv", each.table())
     for name, result in sweeps.items():
         write_sweep(out / f"{name}.parquet", result, source)
     return dynamics

@@ -87,26 +87,26 @@ def response_borders(
 def main_windows_of_rest(progress: Progress) -> list[BranchWindow]:
     """The window of each symmetric response that rest leads to at ``INSIDE``."""
     step = progress.stage("Windows of 1-p-p", len(INSIDE))
-    found = []
+    windows = []
     for omega in INSIDE:
         over = ModelSubject(MODEL, omega).family("omega")
-        found.append(window(over, settle(over.flow(omega), np.zeros(4)), omega, *OMEGA))
+        windows.append(window(over, settle(over.flow(omega), np.zeros(4)), omega, *OMEGA))
         step()
-    return found
+    return windows
 
 
 def report(*, out: Path, jobs: int, progress: Progress) -> Mapping[str, ResponseBorders]:
     """Write the pictures and tables into a folder that exists."""
     windows = main_windows_of_rest(progress)
-    found = {name: response_borders(windows, name, jobs, progress) for name in SECOND}
-    for borders in found.values():
+    borders_of = {name: response_borders(windows, name, jobs, progress) for name in SECOND}
+    for borders in borders_of.values():
         figure = borders.figure()
         for form in ("png", "svg"):
             write(out / f"{borders.name}.{form}", picture(figure, form, 160.0))
         write(out / f"{borders.name}.csv", borders.table())
     if (out / README).is_file():
-        write(out / README, _with_pictures((out / README).read_text("utf-8"), found.values()))
-    return found
+        write(out / README, _with_pictures((out / README).read_text("utf-8"), borders_of.values()))
+    return borders_of
 
 
 def _with_pictures(page: str, borders: Iterable[ResponseBorders]) -> str:

@@ -147,8 +147,8 @@ def _ngspice(case: Case) -> PageSection:
 
 
 def _places(case: Case) -> Table | None:
-    found = case["search"]["final"]["responses"]
-    rows = [{**row, **place} for place, row in zip(found, case["responses"], strict=True)]
+    places = case["search"]["final"]["responses"]
+    rows = [{**row, **place} for place, row in zip(places, case["responses"], strict=True)]
     columns: Columns = {
         "response": lambda row: row["expect"],
         "ω": lambda row: f"{row['omega']:.5g}",

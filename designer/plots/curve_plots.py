@@ -41,7 +41,7 @@ def _round_values(low: float, high: float) -> list[float]:
 
 @styled
 def curves(
-    found: Sequence[BorderCurve],
+    lines: Sequence[BorderCurve],
     plan: CurvePlan,
     name: str = "",
     labels: Sequence[Label] = (),
@@ -58,15 +58,15 @@ def curves(
     figure = new_figure(8.6, 5.6)
     axes = figure.subplots()
     figure.suptitle(curves_title(name, plan, 104), x=0.012, ha="left", fontsize=8.5, color=INK)
-    for curve in found:
+    for curve in lines:
         _line(axes, curve)
     handles: list[Any] = [
         Line2D([], [], color=MARKS[kind][1], lw=1.6, label=kind)
-        for kind in dict.fromkeys(c.kind for c in found)
+        for kind in dict.fromkeys(c.kind for c in lines)
     ]
-    if not all(all(c.stable) for c in found):
+    if not all(all(c.stable) for c in lines):
         handles.append(Line2D([], [], color=MUTED, lw=0.6, label="no stable orbit beside it"))
-    handles += _meetings(axes, found)
+    handles += _meetings(axes, lines)
     second = NAMES.get(plan.second, plan.second)
     axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
     handles.append(
@@ -94,12 +94,12 @@ def _line(axes: Axes, curve: BorderCurve) -> None:
     axes.plot(*thick.T, color=colour, lw=1.6, zorder=3)
 
 
-def _meetings(axes: Axes, found: Sequence[BorderCurve]) -> list[Line2D]:
+def _meetings(axes: Axes, lines: Sequence[BorderCurve]) -> list[Line2D]:
     """Points of codimension two beside which a stable orbit lives, a mark for each name; their
     legend. The others stand in the tables."""
-    widths = np.ptp(np.concatenate([curve.points for curve in found]), axis=0) if found else 1.0
+    widths = np.ptp(np.concatenate([curve.points for curve in lines]), axis=0) if lines else 1.0
     places: dict[str, list[tuple[float, float]]] = {}
-    for curve in found:
+    for curve in lines:
         for name, a, b in curve.codimension_two:
             away = np.linalg.norm((curve.points - [a, b]) / np.maximum(widths, 1e-300), axis=1)
             if any(curve.stable[k] for k in np.argsort(away)[:BESIDE]):

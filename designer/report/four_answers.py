@@ -36,20 +36,20 @@ def _match(data: ReportData) -> list[Block]:
         else "the model and the exact circuit (ngspice was not asked)"
     )
     if not number:
-        lead, found = "No response is asked for.", "So none was compared."
+        lead, detail = "No response is asked for.", "So none was compared."
     elif not bad:
         every = "The response was" if number == 1 else f"{words.all_of(number)} responses were"
         lead = "Yes, in every engine that was asked."
-        found = f"{every} found, and {engines} agree on {'it' if number == 1 else 'each'}."
+        detail = f"{every} found, and {engines} agree on {'it' if number == 1 else 'each'}."
     else:
         good, wanted = number - bad, words.plural(number, "response")
         rest = "the other is" if bad == 1 else f"the other {bad} are"
         lead = f"Not all of it: {good} of {wanted}."
-        found = (
+        detail = (
             f"{good} of {wanted} {'was' if good == 1 else 'were'} found with {engines} in "
             f"agreement; {rest} named below with what went wrong."
         )
-    return [Lead(lead), found, _coefficients(data)]
+    return [Lead(lead), detail, _coefficients(data)]
 
 
 def _coefficients(data: ReportData) -> str:

@@ -37,5 +37,5 @@ def _before(text: str, place: str, new: str) -> str:
     or nothing to put there."""
     if not new.strip():
         return text
-    before, found, after = text.partition(f"\n{place}")
-    return f"{before}\n{_MARKS[0]}{new}{_MARKS[1]}{place}{after}" if found else text
+    before, mark, after = text.partition(f"\n{place}")
+    return f"{before}\n{_MARKS[0]}{new}{_MARKS[1]}{place}{after}" if mark else text

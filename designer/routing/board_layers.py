@@ -23,9 +23,9 @@ def with_layers(text: str, count: int) -> str:
     """
     board = read(text)
     listed, inner = board.get("layers"), inner_layers(board)
-    kept = [each for each in listed.children if each.text(0) not in inner]
-    at = 1 + next(i for i, each in enumerate(kept) if each.text(0) == FRONT)
-    new = Expression((listed.items[0], *kept[:at], *layers(INNER[count]), *kept[at:]))
+    outer = [each for each in listed.children if each.text(0) not in inner]
+    at = 1 + next(i for i, each in enumerate(outer) if each.text(0) == FRONT)
+    new = Expression((listed.items[0], *outer[:at], *layers(INNER[count]), *outer[at:]))
     gone = (*TRACKS, "via", "zone")
     items = [i for i in board.items if not (isinstance(i, Expression) and i.name in gone)]
     return expression_text(Expression(tuple(new if i is listed else i for i in items)))

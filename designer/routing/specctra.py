@@ -133,8 +133,8 @@ def with_session(text: str, session: Path) -> str:
             raise routes.error("no session", EXPECTED)
         items = list(_routed(routes.get("routes"), numbers))
     gone = (*TRACKS, "via")
-    kept = [i for i in board.items if not (isinstance(i, Expression) and i.name in gone)]
-    return expression_text(Expression((*kept, *items), board.source))
+    rest = [i for i in board.items if not (isinstance(i, Expression) and i.name in gone)]
+    return expression_text(Expression((*rest, *items), board.source))
 
 
 def _pins(board: BoardFile, source: Expression, names: Sequence[str]) -> Iterator[_Pin]:

@@ -149,8 +149,8 @@ def decoupling_cell(circuit: Circuit, package: str, parts: SheetParts) -> SheetC
 
 def _capacitors(circuit: Circuit, package: str) -> list[SupplyCapacitor]:
     """Of a package, that of the positive rail first."""
-    found = [p for p in circuit.fittings if isinstance(p, SupplyCapacitor)]
-    return [p for p in found if p.package == package]
+    capacitors = [p for p in circuit.fittings if isinstance(p, SupplyCapacitor)]
+    return [p for p in capacitors if p.package == package]
 
 
 def _stack(

@@ -43,7 +43,7 @@ from designer.spice.simulator import (
     SpiceJob,
     Waveforms,
 )
-from designer.spice.worker import Reply, told, work
+from designer.spice.worker import Reply, reason_of, work
 
 T = TypeVar("T")
 
@@ -305,7 +305,7 @@ def _unpack(value: bytes) -> Any:
     try:
         return pickle.loads(value)
     except Exception as error:
-        return SimulationFailed(f"analysis failed: its result cannot be read: {told(error)}")
+        return SimulationFailed(f"analysis failed: its result cannot be read: {reason_of(error)}")
 
 
 def require_ngspice(pool: SpicePool) -> None:

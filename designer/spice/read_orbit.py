@@ -201,8 +201,8 @@ def _impacts(
             velocities.append(np.interp(once, t, moving) if len(once) else np.zeros(0))
         moved = y @ rows.displacement[:-2] + rows.displacement[-2] * u + rows.displacement[-1]
         floor = ENGINE_ERROR * max(float(np.abs(moved).max()), 1e-12)
-        found = _joined(times), _joined(sides), _joined(velocities), depth, miss
-        out.append(_Impacts(counts, *found, _doubt(counts, min(depth, miss), floor)))
+        joined = _joined(times), _joined(sides), _joined(velocities), depth, miss
+        out.append(_Impacts(counts, *joined, _doubt(counts, min(depth, miss), floor)))
     return out
 
 

@@ -58,13 +58,13 @@ def drive_of(model: SecondOrderSystem) -> Array:
 
 
 def static_rests(
-    design: Design, model: SecondOrderSystem, found: Sequence[ModelResponse]
+    design: Design, model: SecondOrderSystem, responses: Sequence[ModelResponse]
 ) -> tuple[StaticRest, ...]:
     """The dead zone and each contact, with constant forces that hold the masses there. A contact
     that no such force reaches, or a state that it would drive too far, is left out."""
     if not design.circuit.stops:
         return (StaticRest((), None, 0.0, 0.0),)
-    statics = _Statics(design, model, peaks(design.model, found).reaches)
+    statics = _Statics(design, model, peaks(design.model, responses).reaches)
     still = statics.open()
     contacts = [
         statics.contact(k, side)

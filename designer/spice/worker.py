@@ -100,18 +100,20 @@ def _outcome(simulator: Simulator, job: bytes) -> bytes:
         try:
             todo: SpiceJob[Any] = pickle.loads(job)
         except Exception as error:
-            raise SimulationFailed(f"analysis failed: it cannot be read: {told(error)}") from error
+            raise SimulationFailed(
+                f"analysis failed: it cannot be read: {reason_of(error)}"
+            ) from error
         try:
             waveforms = simulator.run(todo.netlist, todo.signals, todo.stop, todo.analysis)
         except (ValueError, OSError, EnvironmentMissing) as error:
-            raise SimulationFailed(f"simulation failed: {told(error)}") from error
+            raise SimulationFailed(f"simulation failed: {reason_of(error)}") from error
         try:
             return pickle.dumps(todo.reduce(waveforms))
         except Exception as error:
-            raise SimulationFailed(f"analysis failed: {told(error)}", waveforms.log) from error
+            raise SimulationFailed(f"analysis failed: {reason_of(error)}", waveforms.log) from error
     except SimulationFailed as failure:
         return pickle.dumps(SimulationFailed(failure.reason, failure.log))
 
 
-def told(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"

@@ -113,7 +113,7 @@ class _Sizing:
         clearance = place.clearance
         amplifier = self._differences(place, self._at(1.0))[0]
         own = dict(amplifier.values)
-        found = size_dead_zone.size(
+        stage = size_dead_zone.size(
             self._target(place, amplifier.gain),
             q.resistors,
             q.base,
@@ -122,16 +122,16 @@ class _Sizing:
             {**self.linear, **own},
             q.prices,
         )
-        if isinstance(found, str):
-            return found
-        errors = {**found.errors, **amplifier.errors}
-        threshold = found.threshold / amplifier.gain
+        if isinstance(stage, str):
+            return stage
+        errors = {**stage.errors, **amplifier.errors}
+        threshold = stage.threshold / amplifier.gain
         scales = CircuitScales.of(
             self.system, self.linear, clearance.mass, threshold / clearance.first.gap
         )
-        own |= found.values
+        own |= stage.values
         if clearance.other is not None:
-            force = found.values[place.part("R50")]
+            force = stage.values[place.part("R50")]
             values, error = further_stages.reaction(self.system, place, scales, force, self.heavy)
             own |= values
             errors["reaction"] = error
@@ -139,8 +139,8 @@ class _Sizing:
         if isinstance(whole, str):
             return whole
         worst = max(abs(e) for e in errors.values())
-        proved = found.proved and worst <= found.bound + EXACT
-        return replace(found, values=whole, errors=errors, threshold=threshold, proved=proved)
+        proved = stage.proved and worst <= stage.bound + EXACT
+        return replace(stage, values=whole, errors=errors, threshold=threshold, proved=proved)
 
     def enumerated(self) -> DeadZone | str:
         """All stages at the amplitude that leaves them the least error."""
@@ -152,18 +152,18 @@ class _Sizing:
             if not np.isfinite(errors.min()):
                 return "stop slope"
             scales = tried[int(np.flatnonzero(errors <= errors.min() + EXACT)[0])]
-        found = self._stages(scales)
-        if found is None:
+        stage = self._stages(scales)
+        if stage is None:
             return "stop slope"
-        whole = self._with_references(found.values, scales)
+        whole = self._with_references(stage.values, scales)
         if isinstance(whole, str):
             return whole
         return DeadZone(
             values=whole,
-            errors=found.errors,
-            threshold=found.threshold,
+            errors=stage.errors,
+            threshold=stage.threshold,
             bound=0.0,
-            proved=found.worst <= EXACT,
+            proved=stage.worst <= EXACT,
             proof=further_stages.PROOF,
             solver="every choice looked at",
         )

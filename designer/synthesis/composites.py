@@ -172,9 +172,9 @@ def best(program: PairProgram, used: frozenset[float]) -> dict[str, Pair]:
     reached: tuple[float, dict[str, Pair]] = (float("inf"), {})
     for few in [*(n for n in FEW if n < most), most]:
         doing(f"composites, at most {few} of {most}")
-        found = model.least_error(few)
-        if found is not None and found[0] < reached[0] - EXACT:
-            reached = found
+        least = model.least_error(few)
+        if least is not None and least[0] < reached[0] - EXACT:
+            reached = least
         if reached[0] <= EXACT:
             break
     else:

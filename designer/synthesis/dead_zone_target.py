@@ -208,7 +208,7 @@ def slope_interval(
     limit = np.concatenate([error - h, error + h]) + 1e-12
     ends = []
     for sign in (1.0, -1.0):
-        found = linprog(
+        program = linprog(
             sign * rate,
             A_ub=np.concatenate([D, -D]),
             b_ub=limit,
@@ -216,7 +216,7 @@ def slope_interval(
             method="highs",
         )
         # HiGHS' own tolerance can make a point of the interval empty: then the point itself.
-        scales = best if found.x is None else found.x
+        scales = best if program.x is None else program.x
         ends.append(float(rate @ scales))
     middle = float(rate @ best)
     low, high = min(*ends, middle), max(*ends, middle)

@@ -129,7 +129,7 @@ def synthesise(
     largest = max([1.0, *(relative_amplitude(model, r) for r in responses)])
     order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims)
     search = _Search(order, responses)
-    best = search.best(spec.kept)
+    best = search.best(spec.active_conditions)
     if isinstance(best, _Missed):
         search.refuse(best)
     design = best.design
@@ -167,7 +167,7 @@ class _Search:
     def binding(self, best: _Verified) -> dict[str, float]:
         """max_error without each condition that costs some; nothing where the error is none, and
         not asked of a tree of choices, which each condition would have searched again."""
-        error, conditions = best.design.errors.max_error, self.order.spec.kept
+        error, conditions = best.design.errors.max_error, self.order.spec.active_conditions
         if error <= EXACT or not self.by_joins:
             return {}
 
@@ -197,7 +197,7 @@ class _Search:
             and better.distinct_values(spec.preferred) > spec.most_values
         ):
             return design
-        improved = self._verified(better, spec.kept)
+        improved = self._verified(better, spec.active_conditions)
         if not all(check.holds for check in improved.checks):
             return design
         exact = improved.errors.max_error <= EXACT
@@ -234,7 +234,7 @@ class _Search:
         if not self.by_joins:
             guilty = [name for name in SIDE_CONDITIONS if name in missed.broken]
             return guilty, ", ".join(guilty)
-        conditions = self.order.spec.kept
+        conditions = self.order.spec.active_conditions
         doing("what leaves no choice")
         if not conditions or isinstance(self.best(frozenset()), _Missed):
             return [], ""
@@ -357,7 +357,7 @@ class _Search:
 
     def _acts(self, best: _Verified, name: str) -> bool:
         """Whether the search could notice that this condition is left out."""
-        conditions = self.order.spec.kept
+        conditions = self.order.spec.active_conditions
         first, without = self._limits(conditions), self._limits(conditions - {name})
         if best.limits != first:  # some limit had to be tightened
             return True

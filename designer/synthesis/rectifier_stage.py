@@ -78,9 +78,9 @@ def size(
     least, ranges = best
     level = max(least, EXACT) + ranking.slack
     while level <= LAST_LEVEL * GROWTH:
-        found = half.choose(ranges, level * (1.0 + 1e-9), ranking)
-        if found is not None:
-            return _answer(target, *found, min(bound, least))
+        choice = half.choose(ranges, level * (1.0 + 1e-9), ranking)
+        if choice is not None:
+            return _answer(target, *choice, min(bound, least))
         level *= GROWTH
     return "distinct values" if ranking.most is not None else "matched parts"
 
@@ -160,10 +160,10 @@ class _Half:
         if len(main) == 0:
             return None
         tables = [main] if self.feed_is_tied else [main, self._feed_rows(main, ranking.free)]
-        found = choose(tables, (), ranking)
-        if found is None:
+        choice = choose(tables, (), ranking)
+        if choice is None:
             return None
-        rows, status = found
+        rows, status = choice
         chosen: dict[str, float] = {}
         for table, i in zip(tables, rows, strict=True):
             chosen |= dict(zip(table.table.names, table.table.values[i].tolist(), strict=True))

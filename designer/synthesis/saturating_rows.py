@@ -45,22 +45,22 @@ def rows_within(
     known = int(np.argmin(np.abs(t.u - sure)))
     if known in keys:
         keys = [known, *(k for k in keys if k != known)]
-    found: list[TableRows] = []
+    nulls: list[TableRows] = []
     for key in keys[:TRIES]:
         rows, _ = null_rows(t, key, level, free, NULLS)
         if len(rows):
-            found.append(_fewest_and_best(rows, free))
-        if len(found) == KEYS:
+            nulls.append(_fewest_and_best(rows, free))
+        if len(nulls) == KEYS:
             break
-    if not found:
+    if not nulls:
         return None
     slopes = TableRows.stacked(
         [
             _fewest_and_best(slopes.take(np.flatnonzero(slopes.key == r.key[0])), free)
-            for r in sorted(found, key=lambda r: int(r.key[0]))
+            for r in sorted(nulls, key=lambda r: int(r.key[0]))
         ]
     )
-    return slopes, TableRows.stacked(found)
+    return slopes, TableRows.stacked(nulls)
 
 
 def _fewest_and_best(rows: TableRows, free: frozenset[float]) -> TableRows:
@@ -158,9 +158,9 @@ def pick(
     level = max(least, ranking.tolerance) + ranking.slack
     while level <= last * GROWTH:
         rows = rows_within(t, level * (1.0 + 1e-9) + 1e-10, u, ranking.free)
-        found = None if rows is None else choose(rows, noise_rules(t, *rows), ranking)
-        if rows is not None and found is not None:
-            (i, j), status = found
+        choice = None if rows is None else choose(rows, noise_rules(t, *rows), ranking)
+        if rows is not None and choice is not None:
+            (i, j), status = choice
             chosen = rows[0].table.take(np.array([i])).beside(rows[1].table.take(np.array([j])))
             return dict(zip(chosen.names, chosen.values[0].tolist(), strict=True)), status
         level *= GROWTH

@@ -87,20 +87,20 @@ def size(
     resistors that only set a level [ohm]."""
     if target.shift[0] >= MOST_SHIFT:
         return "dead-zone bias"
-    found = _Found(None, 0.0, "stop slope")
+    so_far = _Found(None, 0.0, "stop slope")
     stages = _stages(target, resistors, base, ranking.free, equal)
     for number, stage in enumerate(stages, start=1):
         doing(f"dead zone, tables {number}")
-        if stage.rescue and found.best is not None:
+        if stage.rescue and so_far.best is not None:
             break
-        found = _search(target, stage, equal, ranking.free | {base}, found)
-        if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
+        so_far = _search(target, stage, equal, ranking.free | {base}, so_far)
+        if so_far.best is not None and so_far.error <= max(so_far.bound, 0.0) + EXACT:
             break
-        if found.best is not None and stage.whole:
+        if so_far.best is not None and stage.whole:
             break
-    if found.best is None:
-        return found.binding
-    t, least = found.best
+    if so_far.best is None:
+        return so_far.binding
+    t, least = so_far.best
     doing("dead zone, fewest values")
     picked = saturating_rows.pick(t, least.error, least.u, ranking, LAST_LEVEL)
     if picked is None:
@@ -110,7 +110,7 @@ def size(
         return rule if free is None else "distinct values"
     values, status = picked
     values = {name: values[name] for name in parts_of(target.kind, target.sides)}
-    return _answer(target, values, found.bound, status)
+    return _answer(target, values, so_far.bound, status)
 
 
 def _search(

@@ -322,15 +322,15 @@ def _left(
         pairs = _fewest_of_each(pairs, np.log(pairs["R207"] / pairs["R206"]), free)
     low, high = np.log(target.slope)
     q = np.log(right["R210"] / right["R50"])
-    found = [ValueTable(("R206", "R207", "R209"), np.zeros((0, 3)))]
+    by_value = [ValueTable(("R206", "R207", "R209"), np.zeros((0, 3)))]
     for value in lists["R209"]:
         rows = pairs
         for name in tied:
             rows = rows.take(rows[name] == value)
         u = np.log(rows["R207"] / rows["R206"] / value)
         rows = rows.take(distance(q, low - u, high - u) <= level)
-        found.append(rows.with_column("R209", np.full(len(rows), value)))
-    return ValueTable.stacked(found)
+        by_value.append(rows.with_column("R209", np.full(len(rows), value)))
+    return ValueTable.stacked(by_value)
 
 
 def _fewest_of_each(

@@ -12,7 +12,7 @@ import pytest
 from designer import InputError, ModelFile, parse_model_file, read_model_file
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.place import read_place
-from designer.explorer.questions import kept, read_question
+from designer.explorer.questions import read_question, save_model
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
 from tests.explorer.served import EXAMPLES
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
@@ -118,11 +118,11 @@ def asked(kind: str, **more: object) -> Any:
 def test_a_question_to_save_is_answered_and_asks_back(tmp_path: Path) -> None:
     modelfile, jobs = file("paper"), JobProcesses(lambda _: None)
     question = asked("save", name="mine", pins=["0.85~1-2-2~0.25"])
-    (first,) = kept(modelfile, tmp_path, jobs, question)
+    (first,) = save_model(modelfile, tmp_path, jobs, question)
     assert first == {"kind": "saved", "name": "mine.toml", "missing": []}
-    (same,) = kept(modelfile, tmp_path, jobs, question)
+    (same,) = save_model(modelfile, tmp_path, jobs, question)
     assert same["kind"] == "saved"
-    (other,) = kept(modelfile, tmp_path, jobs, asked("save", name="mine"))
+    (other,) = save_model(modelfile, tmp_path, jobs, asked("save", name="mine"))
     assert other == {"kind": "exists", "name": "mine.toml", "verb": "save"}
     assert len(read_model_file(tmp_path / "mine.toml").responses) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
@@ -133,7 +133,9 @@ def test_a_job_without_a_wanted_response_is_refused_before_anything_is_written(
 ) -> None:
     modelfile = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}")
     with pytest.raises(InputError, match="pin one"):
-        list(kept(modelfile, tmp_path, JobProcesses(lambda _: None), asked("run", name="mine")))
+        list(
+            save_model(modelfile, tmp_path, JobProcesses(lambda _: None), asked("run", name="mine"))
+        )
     assert list(tmp_path.iterdir()) == []
 
 

@@ -33,7 +33,7 @@ RECTIFIER = CircuitSpec(dead_zone="rectifier")
 
 def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
     wanted = Order.of(PAPER, RECTIFIER, CATALOG, PEAKS)
-    within = limits(RECTIFIER, RECTIFIER.kept, wanted.opamp, 13.0, PEAKS.fastest)
+    within = limits(RECTIFIER, RECTIFIER.active_conditions, wanted.opamp, 13.0, PEAKS.fastest)
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
     (above, top), (bottom, below) = _beside(block, (1e3, 1e6), "R4")
@@ -51,7 +51,7 @@ def test_the_best_of_those_tried_is_taken() -> None:
     """Against the first choice, and against every level of R4 tried one by one."""
     spec = replace(RECTIFIER, resistors=("E24",))
     wanted = Order.of(PAPER, spec, CATALOG, PEAKS)
-    within = limits(spec, spec.kept, wanted.opamp, 13.0, PEAKS.fastest)
+    within = limits(spec, spec.active_conditions, wanted.opamp, 13.0, PEAKS.fastest)
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
     first = attempt(wanted, within, block)

@@ -199,15 +199,15 @@ def test_wishes_and_side_conditions() -> None:
     assert circuit.matched == (("C2", "C4"), ("R1", "R7", "R3"))
     assert circuit.preferred == (1e-8, 4.7, 4.7e3, 1e4, 2.2e4)
     assert circuit.composites == ("R50", "R203")
-    assert circuit.kept == {"load", "swing"}
+    assert circuit.active_conditions == {"load", "swing"}
     assert hash(circuit) == hash(parse_model_file(text).circuit)
 
 
 def test_side_conditions_are_all_or_none_or_those_named() -> None:
-    assert CircuitSpec().kept == set(SIDE_CONDITIONS)
-    assert CircuitSpec(side_conditions=False).kept == set()
-    assert CircuitSpec(side_conditions=()).kept == set()
-    assert CircuitSpec(side_conditions=("swing",)).kept == {"swing"}
+    assert CircuitSpec().active_conditions == set(SIDE_CONDITIONS)
+    assert CircuitSpec(side_conditions=False).active_conditions == set()
+    assert CircuitSpec(side_conditions=()).active_conditions == set()
+    assert CircuitSpec(side_conditions=("swing",)).active_conditions == {"swing"}
 
 
 def test_omega_may_be_dimensionless_under_mechanical() -> None:

@@ -82,7 +82,7 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
     design = made.design
     ratio = design.amplitude(response.b, response.omega) / design.amplitude()
     assert ratio == pytest.approx(1.4**2 / 0.8)
-    assert {c.name for c in design.checks if c.holds} == set(file.circuit.kept)
+    assert {c.name for c in design.checks if c.holds} == set(file.circuit.active_conditions)
 
 
 @pytest.mark.parametrize(
