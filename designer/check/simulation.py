@@ -150,7 +150,7 @@ def simulate(
     for omega in omegas:
         check_omega("--omega", omega, modelfile.model)
     if not omegas and not modelfile.responses:
-        need_responses(modelfile, " (or --omega)")
+        need_responses(modelfile, ', or --omega, or --frequency "10 Hz" of a file in SI')
     specs = [Response(float(w)) for w in omegas] or list(modelfile.responses)
     file = str(modelfile.source) if modelfile.source else None
     for number, spec in enumerate(specs, start=1):

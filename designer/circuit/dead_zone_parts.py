@@ -23,6 +23,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.mechanics import Clearance, MechanicalModel, Side
 
 Kind = Literal["saturation", "rectifier"]
+_RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a file says nothing)'
 
 
 @dataclass(frozen=True)
@@ -84,10 +85,10 @@ class DeadZoneStage:
             return None
         if any(stop.gap <= 0.0 for stop in stops):
             found = f'"saturation", with the stop of clearance {name} in contact at rest'
-            expected = '"rectifier": an amplifier that clips is linear where nothing moves'
+            expected = f"{_RECTIFIER}; an amplifier that clips is linear where nothing moves"
         elif len(stops) == 2 and stops[0] != stops[1]:
             found = f'"saturation", with unequal stops in clearance {name}'
-            expected = '"rectifier": an amplifier that clips has the same stop on both sides'
+            expected = f"{_RECTIFIER}; an amplifier that clips has the same stop on both sides"
         else:
             return None
         return InputError(None, "circuit.dead_zone", found, expected)

@@ -183,7 +183,13 @@ expect = "1-1-1"
 # twin = "exact"                # of 1-2-1 its mirror twin 1-1-2 will not do
 # b = 1.2                       # with every gap and constant force 1.2 times as large
 
-""" + _CIRCUIT
+"""
+    + _CIRCUIT.replace(
+        '"saturation"        # the stage that makes the clearance; or "rectifier"\n',
+        '"rectifier"         # makes any stops; "saturation": one clearance with equal ones\n',
+    )
+    .replace("saturation = 13.0               # V; ", "# saturation = 13.0             # V; ")
+    .replace("where omega = 1 may lie", "where the first mass's own frequency may lie on the board")
 )
 """A file of format 2."""
 

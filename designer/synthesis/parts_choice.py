@@ -48,10 +48,11 @@ EMPTY = 1e-9
 ASIDE = 1e-6
 """Relative: the ends of an interval of R4 leave out the value between."""
 SPLIT = (
-    "two clearances between the same two, one for each stop: a stage's idle half stays off only "
-    "while the other is not much steeper"
+    "its two stops in two clearances: one [[clearance]] with only upper, another at the same place "
+    "with only lower; each has its own count then, so that 1-1-1 is 1-1-0;0-1"
 )
-"""What frees a clearance whose stops are too unequal for one stage."""
+"""What frees a clearance whose stops are too unequal for one stage: beside a much steeper half, its
+idle half does not stay off."""
 FREES = {
     "frequency": "widen circuit.frequency or circuit.capacitor_range",
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
@@ -271,7 +272,8 @@ class _Search:
             names += tuple(check.name for check in broken)
             apart = self._too_unequal(broken)
             if apart is not None:
-                return _Missed(Shortfall(f"the stops of {apart}", True), ("swing",), SPLIT)
+                what = f"the stops of clearance {apart}, too unequal for one stage"
+                return _Missed(Shortfall(what, True), ("swing",), SPLIT)
             tighter = within.tightened(broken, design, slower=slower)
             if tighter == within:
                 break
