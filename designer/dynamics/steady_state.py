@@ -171,19 +171,30 @@ def by_flow(
             met += run.impacts.velocity[here].tolist()
     end, extremes = strobes[-1], (np.array(minima), *(np.array(met) for met in velocities))
     chaos = growth is not None and growth.value * growth.period > CHAOS
+    after = None
     if growth and chaos and course.tangents >= kernel.SPAN and not _repeats(flow, strobes):
-        orbit = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
+        orbit, after = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
     else:
         orbit = settle(flow, end, budget=budget)
         if orbit.status is OrbitStatus.APERIODIC:
-            orbit = _measured(flow, orbit)
+            orbit, after = _measured(flow, orbit)
         elif growth is not None and not np.isfinite(orbit.lyapunov):
             orbit = replace(orbit, lyapunov=growth.value)
+    if after is not None:
+        steady = by_flow(flow, after, course, stops, budget)
+        return replace(steady, periods=spent + steady.periods)
     return _of_orbit(orbit, end, extremes, spent)
 
 
-def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
-    """An aperiodic motion with its exponent to ``SWEPT``. rates : what is known of its growth."""
+def _faded(rates: Array) -> bool:
+    """Whether chaos was a transient: its tangents shrink in the last quarter of its ``rates``."""
+    tail = rates[len(rates) - len(rates) // 4 :]
+    return len(tail) > 0 and float(tail.mean()) < -CHAOS
+
+
+def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> tuple[Orbit, Array | None]:
+    """An aperiodic motion with its exponent to ``SWEPT``; also the state that it was left in, if it
+    was a transient. rates : what is known of its growth."""
     x, mode = orbit.start, orbit.mode or None
 
     def further(blocks: int) -> Array:
@@ -194,7 +205,8 @@ def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
 
     known = until(SWEPT, np.zeros(0) if rates is None else rates, further)
     growth = LyapunovExponent(known, flow.drive.period, x, mode or ())
-    return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
+    measured = replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
+    return measured, x if _faded(known) else None
 
 
 def _of_orbit(orbit: Orbit, end: Array, extremes: tuple[Array, ...], spent: int) -> Steady:
@@ -286,7 +298,11 @@ def _by_kernel(
     exponent = float(facts[2]) / period, float("nan")
     if code == kernel.APERIODIC:
         plain = growth > CHAOS and course.tangents >= kernel.SPAN  # else it was later that it was
-        exponent = _swept_exponent(model, orbit, rates if plain else rates[:0])
+        value, error, after = _swept_exponent(model, orbit, rates if plain else rates[:0])
+        if after is not None:
+            steady = _by_kernel(flow, tables, period, after, course, budget)
+            return replace(steady, periods=spent + steady.periods)
+        exponent = value, error
     stopped = code == kernel.STOPPED
     n, p, q = (
         int(counted[place]) if code == kernel.PERIODIC else 0
@@ -309,8 +325,11 @@ def _by_kernel(
     )
 
 
-def _swept_exponent(model: kernel.DrivenModel, x: Array, rates: Array) -> tuple[float, float]:
-    """Exponent and its error of the chaos through x (4,), of which some rates are known."""
+def _swept_exponent(
+    model: kernel.DrivenModel, x: Array, rates: Array
+) -> tuple[float, float, Array | None]:
+    """Exponent and its error of the chaos through x (4,), of which some rates are known; also the
+    state that it was left in, if it was a transient."""
     x, place = x.copy(), np.array([-1, kernel_orbit.DONE])
 
     def further(blocks: int) -> Array:
@@ -318,8 +337,9 @@ def _swept_exponent(model: kernel.DrivenModel, x: Array, rates: Array) -> tuple[
         kernel.exponent(model, x, place, kernel.ALIGN + blocks * kernel.RENEWAL, room)
         return room if place[1] == kernel_orbit.DONE else room[:0]
 
-    growth = LyapunovExponent(until(SWEPT, rates, further), model.period, x, ())
-    return growth.value, growth.error
+    known = until(SWEPT, rates, further)
+    growth = LyapunovExponent(known, model.period, x, ())
+    return growth.value, growth.error, x if _faded(known) else None
 
 
 def _symmetric(flow: Callable[[], Flow], half: float, x: Array, n: int, peak: Array) -> bool:

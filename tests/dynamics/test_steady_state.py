@@ -20,10 +20,12 @@ from designer.dynamics.steady_state import Course, DrivenSystem, Steady, by_flow
 from designer.kernels import kernel_algebra, kernel_orbit, kernel_sweep
 from designer.kernels.kernel_modal import CHANGE, WIDTH
 from designer.model.model import Dimensionless
+from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.model.swept_tables import ModalBatch
 from tests.dynamics.test_modal_tables import PAPER, cases
 from tests.shared.oracles import Plain
+from tests.shared.system_text import clearance, system_text, table
 
 PLAIN = Plain(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 PERIODIC = (1.55, 1.43, 0.85, 0.54, 0.41, 0.337, 0.284, 0.24, 0.215, 0.3, 0.1, 1.085, 0.7)
@@ -249,3 +251,30 @@ def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = (run.impacts.time > 40 * 2 * np.pi / 0.215) & (run.impacts.side > 0)
     assert len(got.velocities) == shown.sum() > 3
     np.testing.assert_allclose(got.velocities, run.impacts.state[shown, 1], atol=1e-8)
+
+
+def test_chaos_that_fades_while_its_exponent_is_taken_is_a_transient() -> None:
+    """Beyond the grazing of its linear orbit a press is chaotic for hundreds of periods, then
+    settles on that orbit, whose closed form is the oscillator's steady state."""
+    mass, damping, stiffness, force, omega = 1.2, 9.0, 4e3, 12.0, 127.0
+    press = parse_model_file(
+        system_text(
+            {"ram": mass},
+            {("ram", "ground"): stiffness},
+            {("ram", "ground"): damping},
+            clearance(
+                "stops", "ram", "ground", upper=0.8e-3, lower=1.5e-3,
+                upper_stiffness=40e3, lower_stiffness=6e3,
+            ),
+            table("force", on="ram", amplitude=force),
+        )
+    ).model.second_order().piecewise_linear()  # fmt: skip
+    chaos = Flow(press, Drive(122.0)).run(np.array([2e-3, 0.1]), 400).strobes[-100:]
+    phasor = force / (stiffness - mass * omega**2 + 1j * omega * damping)
+    linear = np.array([phasor.imag, omega * phasor.real])
+    ended = [by_flow(Flow(press, Drive(omega)), x, Course()) for x in chaos]
+    assert all(s.lyapunov > 0.0 for s in ended if s.status is OrbitStatus.APERIODIC)
+    settled = [s for s in ended if s.status is OrbitStatus.PERIODIC]
+    assert len(settled) > len(chaos) / 2
+    for steady in settled:
+        np.testing.assert_allclose(steady.start, linear, rtol=1e-6)
