@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from designer.base.jit import compilation_watched
+from designer.base import jit
 
 CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
@@ -49,7 +49,7 @@ def announced(say: Callable[[str], None]) -> Iterator[None]:
             told.add(part)
             say(TEXT.format(part=part))
 
-    with _interruptible(), compilation_watched(tell):
+    with _interruptible(), jit.compilation_watched(tell):
         yield
 
 

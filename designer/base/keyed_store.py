@@ -73,7 +73,8 @@ class KeyedStore(Generic[Entry]):
     """Names of entries that answer another request."""
     unsealed: set[str] = field(default_factory=set)
     """Names of entries that were taken without a seal, because they are vouched for."""
-    _noted: set[str] = field(default_factory=set)
+    noted: set[str] = field(default_factory=set)
+    """Names of entries that ``note`` was told of."""
 
     def names(self, pattern: str) -> list[str]:
         """Names of the files that are there, in order. pattern : as of ``Path.glob``."""
@@ -132,8 +133,8 @@ class KeyedStore(Generic[Entry]):
             partial.write_bytes(content)
 
     def _damaged(self, name: str, why: str) -> None:
-        if name not in self._noted:
-            self._noted.add(name)
+        if name not in self.noted:
+            self.noted.add(name)
             self.note(f"{self.root / name}: {why}")
 
 

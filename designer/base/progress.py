@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar, Token
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
@@ -129,12 +128,7 @@ class Progress:
         threading.Thread(target=self._watch, args=(self._ended,), daemon=True).start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         if self._ended is not None:
             self._ended.set()
         if self._token is not None:
@@ -275,15 +269,10 @@ class Terminal(Progress):
         self._bars.start()
         return super().__enter__()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         if kind is None:
             self._finish()
-        super().__exit__(kind, error, trace)
+        super().__exit__(kind, *rest)
         self._bars.stop()
 
     def _finish(self) -> None:

@@ -58,3 +58,6 @@ from .sweep_store import (
     work_hash as work_hash,
     write_sweep as write_sweep,
 )
+from .work_files import (
+    WorkFiles as WorkFiles,
+)

@@ -2,71 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetForm
 from designer.bifurcations.border_curves import BLOCKS, BorderCurve, read_curve
+from designer.folders.work_files import WorkFiles
 
-FORMAT = 1
 _MEETING = pa.struct([("kind", pa.string()), ("values", pa.list_(pa.float64()))])
-_SCHEMA = pa.schema(
-    [
-        ("kind", pa.string()),
-        ("response", pa.string()),
-        ("symmetric", pa.bool_()),
-        ("points", pa.list_(pa.list_(pa.float64()))),
-        ("stable", pa.list_(pa.bool_())),
-        ("ends", pa.list_(pa.string())),
-        ("codimension_two", pa.list_(_MEETING)),
-    ]
+_FORM = ParquetForm(
+    pa.schema(
+        [
+            ("kind", pa.string()),
+            ("response", pa.string()),
+            ("symmetric", pa.bool_()),
+            ("points", pa.list_(pa.list_(pa.float64()))),
+            ("stable", pa.list_(pa.bool_())),
+            ("ends", pa.list_(pa.string())),
+            ("codimension_two", pa.list_(_MEETING)),
+        ]
+    )
 )
 
 
 @dataclass(frozen=True)
 class CurveBlocks:
-    """Blocks of the curves of one sweep: ``curves.parquet/block-000000.parquet`` in ``root``."""
+    """Blocks of the curves of one sweep: ``curves.parquet/block-000000.parquet`` in a folder."""
 
-    root: Path
-    """Folder that the blocks lie in."""
-    work: str
-    """Hash of what decides the curves."""
-    provenance: Mapping[str, Any]
-    """Versions, seed and settings, which go into every file."""
-    note: Note = quiet
-    """Told of entries that are not taken."""
-    vouch: Vouch = nobody
-    """Asked about entries without a seal."""
+    files: WorkFiles
+    """Where the blocks lie."""
 
     @staticmethod
     def names() -> list[str]:
-        """File names of all blocks, inside root."""
+        """File names of all blocks, inside the folder."""
         return [f"curves.parquet/block-{k:06d}.parquet" for k in range(BLOCKS)]
 
     def read(self, block: int) -> list[BorderCurve] | None:
         """The curves of a finished block of this very work, or None."""
-        rows = self._store.read(self.names()[block], self._key(block))
+        rows = self.files.read(self.names()[block], _FORM, block=block)
         return None if rows is None else [read_curve(row) for row in rows]
 
     def write(self, block: int, curves: Sequence[BorderCurve]) -> None:
         """Keep a finished block, a row a curve."""
         rows = [curve.as_dict() for curve in curves]
-        more = {"provenance": self.provenance}
-        self._store.write(self.names()[block], self._key(block), rows, more)
-
-    @cached_property
-    def _store(self) -> KeyedStore[Rows]:
-        return KeyedStore(self.root, ParquetForm(_SCHEMA), self.note, self.vouch)
-
-    def _key(self, block: int) -> dict[str, Any]:
-        return {"format": FORMAT, "work": self.work, "block": block}
+        self.files.write(self.names()[block], _FORM, rows, block=block)
 
 
 def curves_csv(curves: Sequence[BorderCurve], first: str, second: str) -> str:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetForm
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares, SharePlan, Step
 from designer.dynamics.orbit import OrbitStatus
+from designer.folders.work_files import WorkFiles
 
-FORMAT = 1
 _COLUMNS = [
     ("attractor", pa.int64()),
     ("status", pa.string()),
@@ -34,34 +31,26 @@ _COLUMNS = [
 @dataclass(frozen=True)
 class ShareBlocks:
     """Blocks of the counted basins of one sweep: ``shares.parquet/block-000000.parquet`` in
-    ``root``, a row for each attractor at each value."""
+    a folder, a row for each attractor at each value."""
 
-    root: Path
-    """Folder that the blocks lie in."""
+    files: WorkFiles
+    """Where the blocks lie."""
     parameter: str
     """Name of the swept parameter's column."""
-    work: str
-    """Hash of what decides the counts."""
-    provenance: Mapping[str, Any]
-    """Versions, seed and settings, which go into every file."""
-    note: Note = quiet
-    """Told of entries that are not taken."""
-    vouch: Vouch = nobody
-    """Asked about entries without a seal."""
 
     @staticmethod
     def name(block: int) -> str:
-        """File name of a block, inside root."""
+        """File name of a block, inside the folder."""
         return f"shares.parquet/block-{block:06d}.parquet"
 
     @staticmethod
     def names(plan: SharePlan) -> list[str]:
-        """File names of all blocks, inside root."""
+        """File names of all blocks, inside the folder."""
         return [ShareBlocks.name(k) for k in range(len(plan.blocks()))]
 
     def read(self, block: int) -> list[Step] | None:
         """The steps of a finished block of this very work, or None."""
-        rows = self._store.read(self.name(block), self._key(block))
+        rows = self.files.read(self.name(block), self._form, block=block)
         if rows is None:
             return None
         steps: dict[float, list[AttractorShare]] = {}
@@ -76,16 +65,11 @@ class ShareBlocks:
             for value, step in zip(values, steps, strict=True)
             for share in step
         ]
-        more = {"provenance": self.provenance}
-        self._store.write(self.name(block), self._key(block), rows, more)
+        self.files.write(self.name(block), self._form, rows, block=block)
 
-    @cached_property
-    def _store(self) -> KeyedStore[Rows]:
-        schema = pa.schema([(self.parameter, pa.float64()), *_COLUMNS])
-        return KeyedStore(self.root, ParquetForm(schema), self.note, self.vouch)
-
-    def _key(self, block: int) -> dict[str, Any]:
-        return {"format": FORMAT, "work": self.work, "block": block}
+    @property
+    def _form(self) -> ParquetForm:
+        return ParquetForm(pa.schema([(self.parameter, pa.float64()), *_COLUMNS]))
 
 
 def _read(row: dict[str, Any]) -> AttractorShare:

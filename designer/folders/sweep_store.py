@@ -1,8 +1,4 @@
-"""Finished blocks of a sweep, a map or a basin on disk, as Parquet.
-
-Every file says which work it belongs to and carries the provenance; it appears whole or not at
-all, and one that was damaged since is not taken (``base.keyed_store``).
-"""
+"""Steps of a sweep, and cells of a map or a basin, on disk (``work_files``)."""
 
 from __future__ import annotations
 
@@ -10,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +13,13 @@ import numpy as np
 import pyarrow as pa
 
 from designer.base.arrays import Array
-from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetForm
 from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import Sweep
 from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Steady
+from designer.folders.work_files import WorkFiles
 
-FORMAT = 1
 RULES = 3
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
 _COLUMNS = [
@@ -70,14 +64,13 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
         for track, steps in sweep.steps.items()
         for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
     ]
-    key = {"format": FORMAT, "work": work_hash(sweep.plan.as_dict())}
-    form = ParquetForm(_sweep_schema(parameter), _FURTHER)
-    store: KeyedStore[Rows] = KeyedStore(path.parent, form)
-    store.write(path.name, key, rows, {"provenance": provenance})
+    files = WorkFiles(path.parent, work_hash(sweep.plan.as_dict()), provenance)
+    files.write(path.name, _sweep_form(parameter), rows)
 
 
-def _sweep_schema(parameter: str) -> pa.Schema:
-    return pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
+def _sweep_form(parameter: str) -> ParquetForm:
+    schema = pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
+    return ParquetForm(schema, _FURTHER)
 
 
 def _rows(
@@ -100,29 +93,22 @@ def _named(row: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SweepStore:
-    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``."""
+    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in a folder."""
 
-    root: Path
-    """Folder that the blocks lie in."""
+    files: WorkFiles
+    """Where the blocks lie."""
     parameter: str
     """Name of the swept parameter's column."""
-    work: str
-    """Hash of the plan."""
-    provenance: Mapping[str, Any]
-    """Versions, seed and settings, which go into every file."""
-    note: Note = quiet
-    """Told of entries that are not taken."""
-    vouch: Vouch = nobody
-    """Asked about entries without a seal."""
 
     @staticmethod
     def name(track: str, block: int) -> str:
-        """File name of a block, inside root."""
+        """File name of a block, inside the folder."""
         return f"sweep.parquet/{track.replace(' ', '-')}-{block:06d}.parquet"
 
     def read(self, track: str, block: int) -> list[Steady] | None:
         """The steps of a finished block of this very work, or None."""
-        rows = self._store.read(self.name(track, block), self._key(track, block))
+        form = _sweep_form(self.parameter)
+        rows = self.files.read(self.name(track, block), form, track=track, block=block)
         if rows is None:
             return None
         out = []
@@ -137,25 +123,16 @@ class SweepStore:
 
     def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
-        rows = _rows(self.parameter, track, values, steps)
-        more = {"provenance": self.provenance}
-        self._store.write(self.name(track, block), self._key(track, block), rows, more)
-
-    @cached_property
-    def _store(self) -> KeyedStore[Rows]:
-        form = ParquetForm(_sweep_schema(self.parameter), _FURTHER)
-        return KeyedStore(self.root, form, self.note, self.vouch)
-
-    def _key(self, track: str, block: int) -> dict[str, Any]:
-        return {"format": FORMAT, "work": self.work, "track": track, "block": block}
+        rows, form = _rows(self.parameter, track, values, steps), _sweep_form(self.parameter)
+        self.files.write(self.name(track, block), form, rows, track=track, block=block)
 
 
 @dataclass(frozen=True)
 class GridStore:
-    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``."""
+    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in a folder."""
 
-    root: Path
-    """Folder that the rows lie in."""
+    files: WorkFiles
+    """Where the rows lie."""
     kind: str
     """"map" or "basins"."""
     x: str
@@ -166,23 +143,15 @@ class GridStore:
     """Name of the column of values from row to row."""
     ys: Array
     """Values from row to row."""
-    work: str
-    """Hash of the plan."""
-    provenance: Mapping[str, Any]
-    """Versions, seed and settings, which go into every file."""
-    note: Note = quiet
-    """Told of entries that are not taken."""
-    vouch: Vouch = nobody
-    """Asked about entries without a seal."""
 
     @staticmethod
     def name(kind: str, row: int) -> str:
-        """File name of a row, inside root."""
+        """File name of a row, inside the folder."""
         return f"{kind}.parquet/row-{row:06d}.parquet"
 
     def read(self, row: int) -> list[MapCell] | None:
         """The cells of a finished row of this very work, or None."""
-        rows = self._store.read(self.name(self.kind, row), self._key(row))
+        rows = self.files.read(self.name(self.kind, row), self._form, row=row)
         if rows is None or len(rows) != len(self.xs):
             return None
         out = []
@@ -199,16 +168,11 @@ class GridStore:
         for cell in cells:
             coordinates = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
             rows.append({**coordinates, **_columns(cell)})
-        name = self.name(self.kind, row)
-        self._store.write(name, self._key(row), rows, {"provenance": self.provenance})
-
-    @cached_property
-    def _store(self) -> KeyedStore[Rows]:
-        return KeyedStore(self.root, ParquetForm(self._schema, _MORE), self.note, self.vouch)
+        self.files.write(self.name(self.kind, row), self._form, rows, row=row)
 
     @property
-    def _schema(self) -> pa.Schema:
-        return pa.schema(
+    def _form(self) -> ParquetForm:
+        schema = pa.schema(
             [
                 ("i", pa.int64()),
                 ("j", pa.int64()),
@@ -218,6 +182,4 @@ class GridStore:
                 ("strobe", pa.list_(pa.float64())),
             ]
         )
-
-    def _key(self, row: int) -> dict[str, Any]:
-        return {"format": FORMAT, "work": self.work, "row": row}
+        return ParquetForm(schema, _MORE)

@@ -236,8 +236,7 @@ def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan, folder: Folder | Non
     kind, progress, jobs = work.request.kind, work.progress, work.jobs
     store = None
     if folder is not None:
-        axes = (kind, plan.x, plan.xs, plan.y, plan.ys)
-        store = GridStore(folder.path, *axes, *work.keeping(folder))
+        store = GridStore(work.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
     step = progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
     body: dict[str, Any] = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),

@@ -14,6 +14,7 @@ from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.folders.sweep_store import work_hash
+from designer.folders.work_files import WorkFiles
 from designer.jobs.bifurcation_request import Plan, Request, curve_plan, region_at, share_plan
 from designer.model.model_file import ModelFile
 
@@ -59,9 +60,10 @@ class BifurcationWork:
             return self.shares.seed
         return None if self.request.starts is None else 0
 
-    def keeping(self, folder: Folder) -> tuple[Any, ...]:
-        """What every store of finished blocks in a folder is told last."""
-        return self.hash, self.provenance, self.progress.note, folder.vouches
+    def files(self, folder: Folder) -> WorkFiles:
+        """Where the finished blocks lie in a folder."""
+        note = self.progress.note
+        return WorkFiles(folder.path, self.hash, self.provenance, note, folder.vouches)
 
 
 def with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:

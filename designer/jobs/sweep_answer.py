@@ -52,7 +52,7 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
     progress, jobs, name = work.progress, work.jobs, plan.parameter
     store = None
     if folder is not None:
-        store = SweepStore(folder.path, name, *work.keeping(folder))
+        store = SweepStore(work.files(folder), name)
     blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
     swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
     points = []
@@ -136,7 +136,7 @@ def _shares(work: BifurcationWork, folder: Folder | None) -> BasinShares | None:
     if plan is None:
         return None
     if folder is not None:
-        store = ShareBlocks(folder.path, plan.parameter, *work.keeping(folder))
+        store = ShareBlocks(work.files(folder), plan.parameter)
     step = work.progress.stage(f"{len(plan.numbers)} starts at each value", len(plan.values))
     return basin_shares.run(plan, work.jobs, store, step)
 
@@ -167,7 +167,7 @@ def _curves(
     """The curves through the sweep's points, or what of them the folder has not."""
     store = None
     if folder is not None:
-        store = CurveBlocks(folder.path, *work.keeping(folder))
+        store = CurveBlocks(work.files(folder))
     over = f"bifurcation curves over {plan.first} and {plan.second}"
     step = work.progress.stage(over, border_curves.BLOCKS)
     return border_curves.run(plan, points, work.jobs, store, step)

@@ -22,6 +22,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course
 from designer.folders.sweep_store import GridStore, SweepStore
+from designer.folders.work_files import WorkFiles
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
@@ -128,7 +129,7 @@ def subject() -> ModelSubject:
 
 def test_a_sweep_and_its_store(tmp_path: Path) -> None:
     plan = SweepPlan(subject(), "omega", np.linspace(0.7, 0.72, 3), course=BRIEF)
-    store = SweepStore(tmp_path, "omega", "w", {})
+    store = SweepStore(WorkFiles(tmp_path, "w", {}), "omega")
     made = sweep.run(plan, store=store)
     for value, step in zip(plan.values, made.steps["down"], strict=True):
         flow = plan.subject.settings([{"omega": float(value)}])[0].flow()
@@ -141,7 +142,7 @@ def test_a_sweep_and_its_store(tmp_path: Path) -> None:
 
 def test_a_map_and_basins(tmp_path: Path) -> None:
     axes = ("omega", np.linspace(0.7, 0.72, 2), "A.upper", np.linspace(0.5, 0.6, 2))
-    store = GridStore(tmp_path, "map", *axes, "w", {})
+    store = GridStore(WorkFiles(tmp_path, "w", {}), "map", *axes)
     plan = MapPlan(subject(), *axes, course=BRIEF)
     made = parameter_map.run(plan, store=store)
     assert parameter_map.run(plan, store=store) == made

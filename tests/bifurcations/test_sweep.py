@@ -24,6 +24,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course, Steady, by_flow
 from designer.folders.sweep_store import GridStore, SweepStore, work_hash
+from designer.folders.work_files import WorkFiles
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, response_colours
 from tests.dynamics.test_modal_tables import PAPER
@@ -183,7 +184,7 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
 
     def store(name: str, work: str = "w") -> SweepStore:
         (tmp_path / name).mkdir(exist_ok=True)
-        return SweepStore(tmp_path / name, "omega", work, {"seed": None})
+        return SweepStore(WorkFiles(tmp_path / name, work, {"seed": None}), "omega")
 
     whole = sweep.run(plan, store=store("whole"))
     for track in tracks:
@@ -191,12 +192,12 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
             place = store(f"{track}{kept}")
             for number in range(kept):
                 name = SweepStore.name(track, number)
-                (place.root / name).parent.mkdir(exist_ok=True)
-                (place.root / name).write_bytes((tmp_path / "whole" / name).read_bytes())
+                (place.files.root / name).parent.mkdir(exist_ok=True)
+                (place.files.root / name).write_bytes((tmp_path / "whole" / name).read_bytes())
             assert _text(sweep.run(plan, store=place)) == _text(whole)
             for path in sorted((tmp_path / "whole").rglob("*.parquet")):
                 if path.is_file():
-                    other = place.root / path.relative_to(tmp_path / "whole")
+                    other = place.files.root / path.relative_to(tmp_path / "whole")
                     assert other.read_bytes() == path.read_bytes()
     foreign = store("whole", "another")
     assert foreign.read(tracks[0], 0) is None  # of another sweep
@@ -215,20 +216,20 @@ def test_damaged_blocks_are_computed_again(tmp_path: Path) -> None:
     """Of a sweep and of a map; the other blocks are taken, and the files are again as they were."""
     notes: list[str] = []
     plan = _plan(1.0, 0.9, 100, "down", course=QUICK)
-    steps = SweepStore(tmp_path, "omega", "w", {}, notes.append)
+    steps = SweepStore(WorkFiles(tmp_path, "w", {}, notes.append), "omega")
     whole = sweep.run(plan, store=steps)
     assert len(plan.blocks("down")) > 1
     path = tmp_path / SweepStore.name("down", 0)
     before, last = _flipped(path), tmp_path / SweepStore.name("down", 1)
     written = last.stat().st_mtime_ns
     assert steps.read("down", 0) is None
-    again = SweepStore(tmp_path, "omega", "w", {}, notes.append)
+    again = SweepStore(WorkFiles(tmp_path, "w", {}, notes.append), "omega")
     assert _text(sweep.run(plan, store=again)) == _text(whole)
     assert notes == [f"{path}: damaged, computed again"] * 2  # by each of the stores
     assert path.read_bytes() == before
     assert last.stat().st_mtime_ns == written
     axes = ("omega", np.linspace(0.8, 1.6, 3), "b", np.linspace(0.2, 0.3, 2))
-    grid = GridStore(tmp_path, "map", *axes, "w", {}, notes.append)
+    grid = GridStore(WorkFiles(tmp_path, "w", {}, notes.append), "map", *axes)
     mapped = MapPlan(ModelSubject(PAPER), *axes)
     made = parameter_map.run(mapped, store=grid)
     path = tmp_path / GridStore.name("map", 1)
@@ -243,7 +244,7 @@ def test_further_clearances_are_kept(tmp_path: Path) -> None:
     """In a column of their own, which files of systems with one clearance do not have."""
     (one,) = sweep.run(_plan(0.9, 0.9, 1, "down", course=QUICK)).steps["down"]
     both = replace(one, more=((1, 0), (0, 3)))
-    store = SweepStore(tmp_path, "omega", "w", {})
+    store = SweepStore(WorkFiles(tmp_path, "w", {}), "omega")
     for block, steps in enumerate(([one, both], [one])):
         store.write("down", block, [0.9] * len(steps), steps)
         found = store.read("down", block)
@@ -257,7 +258,7 @@ def test_map_by_settling(tmp_path: Path) -> None:
     plan = MapPlan(
         ModelSubject(PAPER), "omega", np.linspace(0.8, 1.6, 12), "b", np.linspace(0.15, 0.4, 6)
     )
-    store = GridStore(tmp_path, "map", "omega", plan.xs, "b", plan.ys, "w", {})
+    store = GridStore(WorkFiles(tmp_path, "w", {}), "map", "omega", plan.xs, "b", plan.ys)
     made = parameter_map.run(plan, jobs=2, store=store)
     assert parameter_map.run(plan, store=store) == made  # read again
     assert [(c.i, c.j) for c in made.cells] == [(i, j) for i in range(6) for j in range(12)]
