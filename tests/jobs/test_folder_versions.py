@@ -102,8 +102,8 @@ def test_a_study_is_answered_as_it_was(
 ) -> None:
     """By this version, where nothing that decides a study is another since."""
     inputs = document(stored / "manifest.json")["stages"]["design"]["inputs"]
-    for module in ("design_source", "stage_runner"):
-        monkeypatch.setattr(f"designer.jobs.{module}.design_inputs", lambda *_: inputs)
+    for module in ("folders.design_source", "jobs.stage_runner"):
+        monkeypatch.setattr(f"designer.{module}.design_inputs", lambda *_: inputs)
     written = document(stored / "tolerance.json")
     assert cli.status(["tolerance", str(stored), *STUDY.split(), "--json"]) in (0, 1)
     assert json.loads(capfd.readouterr().out)["responses"] == written["responses"]
