@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 
 from designer.cli import entry as cli
+from designer.folders import design_source
 from designer.folders.design_source import read_design
+from designer.jobs import stage_runner, study_job
 from designer.jobs.study_stage import Place, read_study
 from tests.shared.stopped_work import work_stopped
 
@@ -52,7 +54,7 @@ def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 @pytest.fixture
 def later(monkeypatch: pytest.MonkeyPatch) -> None:
     """This version is a later one than wrote any folder."""
-    monkeypatch.setattr("designer.folders.design_source.__version__", "99.0")
+    monkeypatch.setattr(design_source, "__version__", "99.0")
 
 
 @pytest.fixture(scope="module")
@@ -102,8 +104,8 @@ def test_a_study_is_answered_as_it_was(
 ) -> None:
     """By this version, where nothing that decides a study is another since."""
     inputs = document(stored / "manifest.json")["stages"]["design"]["inputs"]
-    for module in ("folders.design_source", "jobs.stage_runner"):
-        monkeypatch.setattr(f"designer.{module}.design_inputs", lambda *_: inputs)
+    for module in (design_source, stage_runner, study_job):
+        monkeypatch.setattr(module, "design_inputs", lambda *_: inputs)
     written = document(stored / "tolerance.json")
     assert cli.status(["tolerance", str(stored), *STUDY.split(), "--json"]) in (0, 1)
     assert json.loads(capfd.readouterr().out)["responses"] == written["responses"]
