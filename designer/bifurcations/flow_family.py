@@ -78,8 +78,3 @@ class FlowPlane:
         """The family over the first parameter, at a value of the second."""
         one = self.first
         return Family(one.parameter, one.low, one.high, lambda v: self.build(v, second))
-
-    def along_second(self, first: float) -> Family:
-        """The family over the second parameter, at a value of the first."""
-        one = self.second
-        return Family(one.parameter, one.low, one.high, lambda v: self.build(first, v))

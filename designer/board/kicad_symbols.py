@@ -89,15 +89,14 @@ def two_pins(
     right: tuple[str, str],
     lines: Sequence[Sequence[tuple[float, float]]],
     body: float,
-    kind: str = "passive",
 ) -> SymbolShape:
     """A part of two pins in a row; left, right : number and name. body : its half length."""
     length = REACH - int(body)
     inner = [((-float(REACH - length), 0.0), (-body, 0.0)), ((body, 0.0), (REACH - length, 0.0))]
     strokes = [tuple(line) for line in lines] + [p for p in inner if p[0] != p[1]]
     pins = (
-        ShapePin(*left, kind, -REACH, 0, 0, length),
-        ShapePin(*right, kind, REACH, 0, 180, length),
+        ShapePin(*left, "passive", -REACH, 0, 0, length),
+        ShapePin(*right, "passive", REACH, 0, 180, length),
     )
     return SymbolShape(name, prefix, (SymbolUnit(pins, tuple(strokes), filled=False),))
 

@@ -28,7 +28,6 @@ from designer.yields.margins import DRAWN, Limit, Margin
 OFFSET, NULL, RAILS = "offset", "null", "rails"
 GRAZING, NEIGHBOUR, COEXISTING = "grazing", "neighbour window", "coexisting attractor"
 NOTHING = "nothing that was seen"
-MECHANISMS = (OFFSET, NULL, RAILS, GRAZING, NEIGHBOUR, COEXISTING, NOTHING)
 COEFFICIENTS = "resistors and capacitors of the linear part"
 NAMES = {
     OFFSET: "op-amps' offsets and bias",
@@ -49,7 +48,7 @@ class Limiting:
     """What limits one response."""
 
     mechanism: str
-    """What ends the response, one of ``MECHANISMS``."""
+    """What ends the response, from ``OFFSET`` to ``NOTHING``."""
     border: str
     """Where the response ends, in words."""
     distance: float

@@ -125,7 +125,7 @@ def _equations(boards: Boards) -> NodalEquations:
 class BoardModes:
     """Some of the working modes of N boards, in the form of the fast path."""
 
-    def __init__(self, boards: Boards, keys: Iterable[ModeKey] = ()) -> None:
+    def __init__(self, boards: Boards) -> None:
         circuit, self._boards = boards.circuit, boards
         self.targets = GuardTargets(working_keys(circuit))
         between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
@@ -133,7 +133,7 @@ class BoardModes:
             len(boards), 0, len(circuit.states), len(circuit.stops), 0, between
         )
         self._beyond: dict[tuple[int, int], Array] = {}
-        self.add(keys or first_keys(circuit))
+        self.add(first_keys(circuit))
 
     @property
     def good(self) -> Mask:

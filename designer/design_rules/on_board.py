@@ -59,10 +59,10 @@ COPPER = frozenset({"clearance"})
 
 
 def without_board(
-    rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str = NO_BOARD
+    rules: Sequence[CustomRule], overrides: Mapping[str, Override]
 ) -> tuple[RuleOutcome, ...]:
     """Every rule on a board, none of them run."""
-    return tuple(_idle(rule, rules, overrides, why) for rule in _wanted())
+    return tuple(_idle(rule, rules, overrides, NO_BOARD) for rule in _wanted())
 
 
 def checked(

@@ -207,9 +207,9 @@ class Flow:
                 return result
         return self._run_general(x, stretches, points, key, phi, max_events, room, measure=measure)
 
-    def to_strobe(self, x: Array, phase: float, *, measure: bool = False) -> FlowResult:
+    def to_strobe(self, x: Array, phase: float) -> FlowResult:
         """Start in state x (n,) at drive phase ``phase`` [rad] and run to the next strobe; by the
-        general kernel. Times of impacts count from the strobe before.
+        general kernel.
 
         Raises
         ------
@@ -218,10 +218,9 @@ class Flow:
         x = np.array(x, dtype=float)
         _check(x, self.system.size, 1, 1)
         u = self.drive.offset + self.drive.amplitude * np.sin(phase)
-        key, room = self.system.mode_at(x, u), 24 if measure else 0
-        nothing = np.zeros((0, 0))
+        key, nothing = self.system.mode_at(x, u), np.zeros((0, 0))
         return self._run_general(
-            x, 1, 1, key, nothing, MAX_EVENTS, room, measure=measure, phase=phase % (2.0 * np.pi)
+            x, 1, 1, key, nothing, MAX_EVENTS, 0, measure=False, phase=phase % (2.0 * np.pi)
         )
 
     def _run_general(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from designer.base.arrays import Array
@@ -18,18 +16,18 @@ UNSETTLED = 30
 """Drive periods that stand for an orbit without a period."""
 
 
-def fastest(flow: Flow, orbit: Orbit, velocities: Sequence[int] = ()) -> float:
+def fastest(flow: Flow, orbit: Orbit) -> float:
     """Angular frequency of the highest harmonic of the drive that matters.
 
     It is the highest line, sub- and superharmonics of the drive alike, whose amplitude in one of
-    the ``velocities`` (indices of states; every second one by default) is above ``SMALLEST`` of the
-    largest line in that one; at least the drive's own.
+    the velocities (every second state) is above ``SMALLEST`` of the largest line in that one; at
+    least the drive's own.
     """
     settled = orbit.status is OrbitStatus.PERIODIC
     periods = orbit.n if settled else UNSETTLED
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
     run = flow.run(start, periods, mode=orbit.mode or None, points=POINTS)
-    shown = run.strobes[:-1, velocities or slice(1, None, 2)]
+    shown = run.strobes[:-1, 1::2]
     return _highest(shown, settled) * flow.drive.omega / periods
 
 

@@ -137,18 +137,18 @@ def not_found(modelfile: ModelFile) -> list[str]:
     ]
 
 
-def place_for(root: Path, name: object, suffix: str = SUFFIX) -> Path:
-    """A file or folder directly in ``root``.
+def place_for(root: Path, name: object) -> Path:
+    """A model file directly in ``root``.
 
     Raises
     ------
     InputError : a name that is more than a name.
     """
-    text = name.removesuffix(suffix) if isinstance(name, str) else ""
+    text = name.removesuffix(SUFFIX) if isinstance(name, str) else ""
     if not NAME.fullmatch(text) or text.endswith("."):
         expected = "letters, digits, _, - and ., without a folder, at most 60"
         raise InputError(None, "name", text, expected)
-    return root / f"{text}{suffix}"
+    return root / f"{text}{SUFFIX}"
 
 
 def save(path: Path, text: str, *, overwrite: bool = False) -> bool:

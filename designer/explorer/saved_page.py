@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from designer.base.atomic_write import appearing
@@ -23,13 +22,9 @@ def save_page(
     path: Path,
     options: Options,
     progress: Progress,
-    *,
-    omegas: Sequence[float] = (),
 ) -> None:
-    """Write the page of a model with the views along ω, the windows and the yields in it.
-
-    omegas : drive frequencies of the views, ascending, in the model's units; () for as many along
-    the slider as 3 MB have room for.
+    """Write the page of a model with the views along ω, the windows and the yields in it: as many
+    views along the slider as 3 MB have room for.
 
     Raises
     ------
@@ -38,7 +33,7 @@ def save_page(
     """
     options.check()
     _check_place(path, options.overwrite)
-    branch = record(modelfile, omegas or places(modelfile), options.workers, progress)
+    branch = record(modelfile, places(modelfile), options.workers, progress)
     counted = yields(modelfile, options, progress)
     page = recorded_page(modelfile, message_of(branch, counted))
     with appearing(path, FIELD) as partial:

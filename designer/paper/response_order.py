@@ -49,7 +49,6 @@ def gaps(
     model: Dimensionless,
     mains: Sequence[tuple[int, BranchWindow]],
     steps: int = STEPS,
-    jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> list[WindowGap]:
     """What rest leads to between neighbouring main windows that do not overlap.
@@ -62,7 +61,7 @@ def gaps(
         if high > low:
             values = np.linspace(low, high, steps + 2)[1:-1]
             plan = sweep.SweepPlan(ModelSubject(model), "omega", values, ("start 0",))
-            (track,) = sweep.run(plan, jobs).steps.values()
+            (track,) = sweep.run(plan).steps.values()
             seen = [(float(w), s.response) for w, s in zip(values, track, strict=True)]
             out.append(WindowGap(p, after, low, high, tuple(seen[::-1])))
         progress()
