@@ -295,7 +295,7 @@ def test_overwrite_replaces_listed_files_only(
     for name in ("notes.txt", "samples.parquet/mine.parquet"):
         (out / name).write_text("mine")
     before = _tree(out)
-    fewer = ["tolerance", str(out), "--samples", "10", "-q"]
+    fewer = ["tolerance", str(out), "--samples", "10", "--rung", "exact", "--no-blame", "-q"]
     _refused(fewer, capfd, "manifest.json", f"samples {SAMPLES}", "--overwrite")
     _refused([*fewer, "--resume"], capfd, "manifest.json", "--overwrite")
     assert _tree(out) == before
@@ -701,7 +701,8 @@ def test_a_response_that_the_model_does_not_show_ends_the_folder_properly(
     model = tmp_path / "wrong.toml"
     text = BASE + WANTED.replace("1-2-2", "1-5-5") + COARSE_CIRCUIT
     model.write_text(text, encoding="utf-8")
-    arguments = ["run", str(model), "--out", str(tmp_path / "out"), "--samples", "3", "--json"]
+    out, few = str(tmp_path / "out"), ("--samples", "3", "--json")
+    arguments = ["tolerance", str(model), "--out", out, *few]
     assert entry.status(arguments) == 1
     (response,) = _strict(capfd.readouterr().out)["responses"]
     assert response["expected"] == "1-5-5"
