@@ -16,7 +16,7 @@ by Brent's method along the curve, every value of it on a converged point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -44,8 +44,9 @@ FALLEN = 1e-7
 
 HALVINGS, TRIES = 34, (5, 12)
 """Of an interval in which counts change; after so many of them the point itself is tried for."""
-CORNER = 2e-2
-"""In scaled units: farthest from a curve's last point to the grazing that stops it."""
+NEAREST, CORNER = 1e-6, 2e-2
+"""In scaled units: first step from a curve's last point to the grazing that stops it, and how far
+off that may be."""
 
 
 @dataclass(frozen=True)
@@ -227,15 +228,47 @@ def _touching(
 
 def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> CodimensionTwo | None:
     """Where a curve that cannot be followed past its point number ``index`` meets grazing: there it
-    has a corner, for beyond it the multipliers change with the square root of the penetration."""
+    has a corner, for beyond it the multipliers change with the square root of the penetration.
+
+    On that side the curve hugs the grazing curve, by the square of the distance from the meeting.
+    Along the grazing curve all is smooth, so it is followed to where the other kind happens too.
+    """
     if isinstance(p.condition, Grazing):
         return None
+    kind = p.condition.kind
+    event = meeting(kind, PointKind.GRAZING), kind
     for grazing, phase in _turning(system, p)[:2]:
-        found = system.meet(p, grazing, np.array([phase]))
-        if found is not None and system.distance(p.z, found.z) <= CORNER:
-            kind = p.condition.kind
-            name = meeting(kind, PointKind.GRAZING)
-            return CodimensionTwo(name, found, float(index + 1), PointKind.GRAZING)
+        touching, origin = system.instead(p, grazing, np.array([phase]))
+        found = None if origin is None else _first_along(touching, origin, event)
+        if found is None:
+            continue
+        own = replace(
+            found,
+            z=np.delete(found.z, system.states),
+            tangent=p.tangent,
+            condition=p.condition.renewed(found.jacobian),
+        )
+        if system.distance(p.z, own.z) <= CORNER:
+            return CodimensionTwo(event[0], own, float(index + 1), PointKind.GRAZING)
+    return None
+
+
+def _first_along(system: ExtendedSystem, origin: CurvePoint, event: Event) -> CurvePoint | None:
+    """The nearest point to the origin along its curve at which an event happens, either way, in
+    steps that double; None within ``CORNER``."""
+    ends, step = {1.0: origin, -1.0: origin}, NEAREST
+    while step < CORNER:
+        for way, before in list(ends.items()):
+            guess = before.z + way * step * system.scale * before.tangent
+            after = system.correct(guess, before.tangent, before.condition)
+            if after is None:
+                del ends[way]
+                continue
+            ends[way] = after
+            one, other = (events(system, p).get(event, np.nan) for p in (before, after))
+            if one * other < 0.0 and (root := _root(system, before, after, event)):
+                return root[1]
+        step *= 2.0
     return None
 
 
@@ -243,7 +276,7 @@ def _turning(system: ExtendedSystem, p: CurvePoint) -> list[tuple[Grazing, float
     """The orbit's turning points but the curve's own, nearest to its stop first."""
     n = system.states
     own = (p.condition, float(p.z[n])) if isinstance(p.condition, Grazing) else None
-    return grazings(system.flow(p.z), p.z[:n], system.n, own)
+    return grazings(system.flow(p.z), p.z[:n], system.n, own, symmetric=system.symmetric)
 
 
 def partner(system: ExtendedSystem, p: CurvePoint) -> Array:

@@ -305,15 +305,23 @@ class Both:
 
 
 def grazings(
-    flow: Flow, x: Array, n: int, but: tuple[Grazing, float] | None = None
+    flow: Flow,
+    x: Array,
+    n: int,
+    but: tuple[Grazing, float] | None = None,
+    *,
+    symmetric: bool = False,
 ) -> list[tuple[Grazing, float]]:
     """The turning points of an orbit as what may graze, nearest to its stop first, each with its
-    phase. but : one that is left out, and its mirror image."""
+    phase. but : one that is left out, and its mirror image. symmetric : whether the second half of
+    the orbit is the mirror image of the first, in which case that tells all."""
     orbit = Orbit(OrbitStatus.PERIODIC, n=n, start=x)
     spans = np.abs(flow.run(x, n, measure=True).spans).max(axis=1)
     near = sorted(turning_points_of(flow, orbit), key=lambda t: abs(t.height))
     out = []
     for t in near:
+        if symmetric and t.phase >= 0.5 * n:
+            continue
         touch = StopTouch(t.clearance, t.side, t.tip)
         if but is None or not _is_same(
             touch, t.phase, *but, mirrored=flow.system.mirror is not None

@@ -150,6 +150,26 @@ class ExtendedSystem:
             found, z=own, tangent=p.tangent, condition=p.condition.renewed(found.jacobian)
         )
 
+    def instead(
+        self, p: CurvePoint, other: Condition, extra: Array
+    ) -> tuple[ExtendedSystem, CurvePoint | None]:
+        """The equations of a condition in place of that of a point's curve, and the orbit that
+        obeys them, sought across the curve from the point.
+
+        extra : the other's own unknowns there. None where Newton's method finds none.
+        """
+        n = self.states
+        scale, z, border = (
+            np.concatenate([each[:n], own, each[-2:]])
+            for each, own in (
+                (self.scale, np.ones(len(extra))),
+                (p.z, extra),
+                (p.tangent, np.zeros(len(extra))),
+            )
+        )
+        system = replace(self, scale=scale, _flows={})
+        return system, system.correct(z, border, other)
+
     def _solve(
         self, guess: Array, border: Array, condition: Condition, along: Array
     ) -> CurvePoint | None:

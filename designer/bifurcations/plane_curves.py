@@ -159,7 +159,7 @@ def _begun(
     halved = bifurcation.symmetric and flow.system.mirror is not None
     peaks = peaks_near(flow, x)
     jacobian = solved.jacobian * peaks / peaks[:, None]
-    for condition, extra in _conditions(bifurcation, jacobian, flow):
+    for condition, extra in _conditions(bifurcation, jacobian, flow, symmetric=halved):
         scale = np.concatenate([peaks, np.ones(len(extra)), window.widths])
         system = ExtendedSystem(plane, n, halved, len(x), scale)
         z = np.concatenate([x, extra, [bifurcation.value, second]])
@@ -177,7 +177,7 @@ def _near(bifurcation: Bifurcation) -> float:
 
 
 def _conditions(
-    bifurcation: Bifurcation, jacobian: Array, flow: Flow
+    bifurcation: Bifurcation, jacobian: Array, flow: Flow, *, symmetric: bool
 ) -> list[tuple[Condition, Array]]:
     """What may hold at a located point, most likely first, with the condition's own unknowns."""
     kind = bifurcation.kind
@@ -186,7 +186,8 @@ def _conditions(
     if kind is not PointKind.GRAZING:
         return [(Multiplier.at(kind, jacobian), np.zeros(0))]
     x, n = bifurcation.point.solved.x, bifurcation.point.orbit.n
-    return [(grazing, np.array([phase])) for grazing, phase in grazings(flow, x, n)[:4]]
+    near = grazings(flow, x, n, symmetric=symmetric)[:4]
+    return [(grazing, np.array([phase])) for grazing, phase in near]
 
 
 def _follow(
@@ -233,7 +234,7 @@ def _follow(
         if new.iterations <= 4:
             step = min(1.5 * step, GREATEST)
         elif new.iterations > 7:
-            step *= 0.6
+            step = max(0.6 * step, LEAST)
     if end == LOST and (last := grazing_near(system, points[-1], len(points) - 1)):
         points.append(last.point)
         met.append(last)

@@ -14,6 +14,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.kernel_algebra import motion_terms
 from designer.dynamics.mode_tables import augmented, augmented_row, step_length
 from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
 
@@ -97,9 +98,7 @@ def _mode(system: PiecewiseLinearSystem, x: Array, u: float, touch: StopTouch) -
 def _derivatives(row: Array, M: Array, z: Array, time: float, period: float) -> Array:
     """(3, k) value and first two derivatives, by time over the period, of row · exp(M time) z."""
     terms = np.empty((TERMS, z.shape[1]))
-    for k in range(TERMS):
-        terms[k] = row @ z
-        z = M @ z * (period / (k + 1))
+    motion_terms(row, M, period, z, terms)
     powers = (time / period) ** np.arange(TERMS)
     first = terms[1:] * ORDERS[1:, None]
     second = first[1:] * ORDERS[1:-1, None]

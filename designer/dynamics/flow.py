@@ -446,7 +446,8 @@ class Flow:
         return extremes[rows] if rows else np.zeros((0, 2))
 
     def _number(self, key: ModeKey) -> int:
-        """Index of the mode in the tables, which are filled on its first use."""
+        """Index of the mode in the tables, which are filled on its first use, and linked to those
+        beside it that are known."""
         known = self._index.get(key)
         if known is not None:
             return known
@@ -464,6 +465,13 @@ class Flow:
         mode_tables.fill(self._tables, number, mode, touched, self._watched, self.drive)
         self._index[key] = number
         self._keys.append(key)
+        for g, guard in enumerate(mode.guards):
+            other = self._index.get(guard.target, -1)
+            self._tables.target[number, g] = other
+            beyond = self.system.mode(guard.target).guards if other >= 0 else ()
+            for h, back in enumerate(beyond):
+                if back.target == key:
+                    self._tables.target[other, h] = number
         return number
 
     def _room(self, modes: int, guards: int) -> ModeTables:

@@ -11,9 +11,13 @@ from scipy.linalg import matrix_balance
 from designer.base.arrays import Array
 from designer.dynamics.piecewise_linear import Drive, Mode
 from designer.kernels import kernel_general as kernel
+from designer.kernels.kernel_algebra import exponential_terms, rows_of_terms
 
 STEP = 0.5
 """‖A h‖ of one step, after balancing."""
+ORDERS = np.arange(kernel.ORDER + 1.0)
+CHORD = ORDERS * (ORDERS - 1.0) / 8.0
+"""Entrywise |C M² exp(M t)| h²/8 over the step is k (k - 1) |c_k| / 8, plus the cut-off tail."""
 
 
 def augmented(mode: Mode, drive: Drive) -> Array:
@@ -63,9 +67,7 @@ def fill(
     M = augmented(mode, drive)
     h = step_length(mode.A, drive.omega)
     powers = tables.taylor[i]
-    powers[0] = np.eye(len(M))
-    for k in range(1, kernel.ORDER + 1):
-        powers[k] = powers[k - 1] @ M * (h / k)
+    exponential_terms(M, h, powers)
     tables.step[i] = h
     tables.propagator[i] = powers[::-1].sum(axis=0)
     tables.guards[i] = len(mode.guards)
@@ -73,15 +75,13 @@ def fill(
     tables.clipped[i] = mode.clipped
     for j, past in enumerate(touched):
         if past is not None:
-            tables.depth[i, j] = augmented_row(past, drive) @ powers
+            rows_of_terms(augmented_row(past, drive), powers, tables.depth[i, j])
     for r, row in enumerate(watched):
-        tables.watched[i, r] = augmented_row(row, drive) @ powers
+        rows_of_terms(augmented_row(row, drive), powers, tables.watched[i, r])
     for g, guard in enumerate(mode.guards):
-        taylor = augmented_row(np.concatenate([guard.C, [guard.D, guard.e]]), drive) @ powers
-        tables.guard[i, g] = taylor
-        # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
-        weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
-        tables.chord[i, g] = weights @ np.abs(taylor) * (1.0 + 1e-9)
+        row, taylor = np.concatenate([guard.C, [guard.D, guard.e]]), tables.guard[i, g]
+        rows_of_terms(augmented_row(row, drive), powers, taylor)
+        tables.chord[i, g] = CHORD @ np.abs(taylor) * (1.0 + 1e-9)
         tables.target[i, g] = -1
         tables.clearance[i, g] = guard.clearance
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, leaf
+from designer.base.jit import callee, compiled, leaf
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -90,3 +90,51 @@ def spectral_radius(M: Float, doublings: int) -> float:
                 square[i, j] = entry
         power, square = square, power
     return float(np.exp(total))
+
+
+@compiled
+def exponential_terms(M: Float, h: float, terms: Float) -> None:
+    """terms (orders, N, N) ← (M h)^k/k!, k = 0, 1, …, whose sum is exp(M h)."""
+    size = len(M)
+    for i in range(size):
+        for j in range(size):
+            terms[0, i, j] = 1.0 if i == j else 0.0
+    for k in range(1, len(terms)):
+        for i in range(size):
+            for j in range(size):
+                total = 0.0
+                for m in range(size):
+                    total += terms[k - 1, i, m] * M[m, j]
+                terms[k, i, j] = total * (h / k)
+
+
+@compiled
+def rows_of_terms(row: Float, terms: Float, out: Float) -> None:
+    """out (orders, N) ← row · terms, for terms (orders, N, N)."""
+    for k in range(len(terms)):
+        for j in range(len(row)):
+            total = 0.0
+            for i in range(len(row)):
+                total += row[i] * terms[k, i, j]
+            out[k, j] = total
+
+
+@compiled
+def motion_terms(row: Float, M: Float, h: float, z: Float, out: Float) -> None:
+    """out (orders, k) ← row · (M h)^j/j! z, j = 0, 1, …, for columns z (N, k): the Taylor terms
+    over h of a linear function along z' = M z."""
+    size, columns = z.shape
+    power, after = z.copy(), np.empty_like(z)
+    for order in range(len(out)):
+        for c in range(columns):
+            total = 0.0
+            for i in range(size):
+                total += row[i] * power[i, c]
+            out[order, c] = total
+        for i in range(size):
+            for c in range(columns):
+                total = 0.0
+                for j in range(size):
+                    total += M[i, j] * power[j, c]
+                after[i, c] = total * (h / (order + 1))
+        power, after = after, power

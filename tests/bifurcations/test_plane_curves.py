@@ -20,6 +20,7 @@ from designer.bifurcations.conditions import (
     MapSlopes,
     Multiplier,
     MultiplierPair,
+    grazings,
 )
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.extended_system import CurvePoint
@@ -28,6 +29,7 @@ from designer.bifurcations.orbit_curve import map_image
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
 from designer.bifurcations.touch import StopTouch
+from designer.bifurcations.windows import window
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -192,16 +194,23 @@ def located(followed: PlaneCurve, p: CurvePoint) -> list[float]:
     return []
 
 
-def half_period(omega: float, b: float, x: Array, tip: float) -> tuple[Array, Array, Array]:
+NEAR = 2e-3
+"""In drive periods: how far about a turning point the contact is that of ``half_period``."""
+
+
+def half_period(
+    omega: float, b: float, x: Array, tip: float, about: int = 0
+) -> tuple[Array, Array, Array]:
     """Mirrored half-period map, its Jacobian, and (x1, x1') at the phase ``tip``, by DOP853 with
-    its variational equations; about the tip the motion is that without contact."""
+    its variational equations; about the turning point the motion is that in contact with the stop
+    ``about``, or without contact (0)."""
     p = replace(PLAIN, b=b)
     period = 2.0 * np.pi / omega
     eye = np.eye(4)
 
     def rhs(t: float, s: Array) -> Array:
-        shallow = min(abs(t / period - tip), abs(t / period - tip + 0.5)) < 0.02
-        side = 0 if shallow else p.side_of(s[0])
+        shallow = min(abs(t / period - tip), abs(t / period - tip + 0.5)) < NEAR
+        side = about if shallow else p.side_of(s[0])
         rate = np.array(p.rhs(t, s[:4], omega, side))
         zero = np.array(p.rhs(t, np.zeros(4), omega, side))
         A = np.array([np.array(p.rhs(t, e, omega, side)) - zero for e in eye]).T
@@ -239,3 +248,26 @@ def test_grazing_meets_pitchfork_by_an_independent_solve() -> None:
     assert found in (1, 4, 5)
     assert np.abs(equations(solved)).max() < 1e-8
     assert solved[5:] == pytest.approx(met.values, abs=1e-7)
+
+
+@pytest.mark.slow
+def test_pitchfork_that_hugs_a_grazing_ends_where_both_meet_by_another_integrator() -> None:
+    """The pitchfork of 1-8-8 comes to the dip in which two contacts become one from the side on
+    which multipliers change with the square root of the gap."""
+    over = ModelSubject(PAPER, 0.215).family("omega")
+    orbit = settle(over.flow(0.215), np.zeros(4))
+    low = window(over, orbit, 0.215, 0.205, 0.22).low.point
+    assert low is not None
+    plane = ModelSubject(PAPER).plane("omega", "b")
+    followed = continued(plane, low, B, PlaneWindow((0.15, 1.8), (0.15, 0.35)))
+    assert followed is not None
+    assert followed.ends == ("grazing meets pitchfork", "edge of b")
+    omega, b = followed.points[0].values
+    x, flow = followed.points[0].z[:4], plane.build(omega, b)
+    (dip, phase), *_ = grazings(flow, x, 1, symmetric=True)
+    assert not dip.touch.tip
+    assert dip.touch.side == 1
+    image, H, at = half_period(omega, b, x, phase, dip.touch.side)
+    assert image == pytest.approx(x, abs=1e-8)
+    assert at == pytest.approx([b, 0.0], abs=1e-8)
+    assert abs(np.linalg.det(np.eye(4) + H)) < 1e-6
