@@ -61,6 +61,7 @@ from .points import (
 )
 from .response_region import (
     ResponseRegion as ResponseRegion,
+    SpreadBox as SpreadBox,
 )
 from .subject import (
     ShownStop as ShownStop,

@@ -32,6 +32,8 @@ BEYOND = 0.1
 """Of a ray: how far past the window Newton's method may look, where the parameters' domains let."""
 EDGE = "edge of the window"
 """What a border is called where the response lives on beyond the window."""
+HELD = 0.95
+"""Of the boards: those between the ends of a spread's box in each parameter."""
 ROUND = 1e-6
 """Of the region's size: how closely the largest ellipse is found."""
 GRID, ROUNDS, NARROWER = 41, 8, 0.25
@@ -79,6 +81,41 @@ class ToleranceEllipse:
 
 
 @dataclass(frozen=True)
+class SpreadBox:
+    """How far boards that should be equal lie from the nominal point, in the plane's parameters."""
+
+    low: tuple[float, float]
+    """Least values of both parameters."""
+    high: tuple[float, float]
+    """Greatest values of both parameters."""
+    share: float
+    """Of the boards that lie between the ends of each parameter."""
+    boards: int
+    """That were drawn."""
+    inside: float
+    """Share of the boards that lie in the part of the region that is seen."""
+
+    @classmethod
+    def about(cls, at: tuple[float, float], ratios: Array, border: Array) -> SpreadBox:
+        """The box of boards that lie at these ratios (boards, 2) to the nominal point."""
+        places = np.array(at) * ratios
+        tail = 0.5 * (1.0 - HELD)
+        (a, b), (c, d) = np.quantile(places, (tail, 1.0 - tail), axis=0).tolist()
+        within = shapely.contains_xy(shapely.Polygon(border), places)
+        return cls((a, b), (c, d), HELD, len(places), float(within.mean()))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain, for JSON."""
+        return {
+            "from": list(self.low),
+            "to": list(self.high),
+            "share": self.share,
+            "boards": self.boards,
+            "inside": self.inside,
+        }
+
+
+@dataclass(frozen=True)
 class ResponseRegion:
     """The part of a response's region that is seen from a nominal point."""
 
@@ -100,6 +137,8 @@ class ResponseRegion:
     """The largest ellipse about the nominal point that lies inside."""
     ellipse_best: ToleranceEllipse
     """The largest ellipse of these proportions inside, wherever its centre."""
+    spread: SpreadBox | None = None
+    """The box of the boards' spread about the nominal point, where boards differ in both."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""
@@ -115,6 +154,7 @@ class ResponseRegion:
             "best": self.best.as_dict(),
             "ellipse_around": self.ellipse_around.as_dict(),
             "ellipse_best": self.ellipse_best.as_dict(),
+            "spread": None if self.spread is None else self.spread.as_dict(),
         }
 
 
@@ -149,6 +189,7 @@ def region(
     border = np.array([values for values, _ in ends])
     nominal = np.abs(np.array(at))
     around, best = _boxes(border / nominal, np.array(at) / nominal)
+    near, widest = _circles(border / nominal, np.array(at) / nominal)
     return ResponseRegion(
         at,
         orbit.response,
@@ -157,7 +198,8 @@ def region(
         tuple(kind for _, kind in ends),
         _box(*around, nominal),
         _box(*best, nominal),
-        *(_ellipse(*each, nominal) for each in _circles(border / nominal, np.array(at) / nominal)),
+        _ellipse(*near, nominal),
+        _ellipse(*widest, nominal),
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,8 +15,9 @@ from designer.base.schema import one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.subject import ShownStop
+from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
-from designer.circuit.netlist import Excitation
+from designer.circuit.netlist import Board, Excitation
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
@@ -167,6 +169,26 @@ class BoardSubject:
             "amplitude": self.amplitude,
             "offset": self.offset,
         }
+
+    def setting_ratios(self, boards: Iterable[Board]) -> dict[str, Array]:
+        """(boards,) by setting, its value on the nominal board over that on each board, at which
+        both move alike: by time scale, and drive over threshold, of the coefficient error's best
+        scales. What else differs no setting makes up for.
+
+        Boards on which a coefficient has the wrong sign, or an op-amp clips inside the clearance,
+        are left out.
+        """
+        design, model = self.design, self.design.model.second_order()
+        seconds, volts = list[float](), list[float]()
+        for board in boards:
+            try:
+                errors = coefficient_errors(design.circuit, model, board)
+            except ArithmeticError:
+                continue
+            seconds.append(errors.scales.seconds / design.errors.scales.seconds)
+            volts.append(design.amplitude() / replace(design, errors=errors).amplitude())
+        slower = np.array(seconds)
+        return {"frequency": slower, "omega": slower, "amplitude": np.array(volts)}
 
     def excitation(self, change: Mapping[str, float]) -> Excitation:
         """The generator's setting with these changes."""

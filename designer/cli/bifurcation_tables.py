@@ -128,6 +128,13 @@ def _region(answer: Mapping[str, Any]) -> Iterator[str]:
     )
     best = region["best"]
     yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"
+    spread = found["spread"]
+    if spread is not None:
+        yield (
+            f"{spread['share']:.0%} of {spread['boards']} boards act as if set from "
+            f"{place(spread['from'])} to {place(spread['to'])}; "
+            f"{spread['inside']:.1%} of them lie inside what is seen"
+        )
 
 
 def _exponents(window: Mapping[str, Any]) -> str:

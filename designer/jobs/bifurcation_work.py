@@ -12,11 +12,14 @@ from designer.bifurcations.basin_shares import SharePlan
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
+from designer.circuit.swept_board import BoardSubject
 from designer.folders.origin import provenance
 from designer.folders.sweep_store import work_hash
 from designer.folders.work_files import WorkFiles
 from designer.jobs.bifurcation_request import Plan, Request, curve_plan, region_at, share_plan
 from designer.model.model_file import ModelFile
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import Spread
 
 Files = dict[str, str | bytes]
 """Contents of files by name."""
@@ -34,6 +37,7 @@ class BifurcationWork:
         self.title = modelfile.title
         self.curves: CurvePlan | None = None
         self.region: float | None = None
+        self.spread: Spread | None = None
         self.shares: SharePlan | None = None
         more: dict[str, Any] = {}
         if isinstance(plan, SweepPlan):
@@ -42,6 +46,10 @@ class BifurcationWork:
             more |= {} if self.curves is None else {"and": self.curves.as_dict()}
             self.region = region_at(request, plan, modelfile)
             more |= {} if self.region is None else {"region": self.region}
+            if self.region is not None and isinstance(plan.subject, BoardSubject):
+                circuit = plan.subject.design.circuit
+                self.spread = spread_of(modelfile, circuit, load_catalog())
+                more |= {"spread": self.spread.as_dict(), "seed": request.seed}
             self.shares = share_plan(request, plan, modelfile)
             more |= {} if self.shares is None else {"shares": self.shares.as_dict()}
         decides = {"kind": request.kind, **plan.as_dict(), **more}

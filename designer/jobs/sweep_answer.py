@@ -4,6 +4,7 @@ tables and pictures."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from designer.bifurcations import (
 from designer.bifurcations.basin_shares import BasinShares
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
 from designer.bifurcations.points import Bifurcation
-from designer.bifurcations.response_region import ResponseRegion
+from designer.bifurcations.response_region import ResponseRegion, SpreadBox
 from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders.curve_store import CurveBlocks, curves_csv
@@ -30,7 +32,10 @@ from designer.folders.share_store import ShareBlocks, shares_csv
 from designer.folders.sweep_store import SweepStore
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
 from designer.plots import titles
+from designer.spread.spread import draw_many
 
+SPREAD_BOARDS = 200
+"""Boards that are drawn for the box of spread."""
 CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
 """Tables and pictures of bifurcation curves."""
 
@@ -158,7 +163,22 @@ def _region(work: BifurcationWork, plan: CurvePlan, swept: Sweep) -> ResponseReg
         expected = f"a value with a periodic response ({orbit.response} there)"
         raise InputError(None, "--region", work.region, expected)
     step = work.progress.stage(f"region of {orbit.response}", response_region.RAYS)
-    return response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
+    found = response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
+    return replace(found, spread=_spread_box(work, plan, found))
+
+
+def _spread_box(work: BifurcationWork, plan: CurvePlan, found: ResponseRegion) -> SpreadBox | None:
+    """How far boards lie from the nominal one, over settings that their parts act like."""
+    subject = plan.subject
+    if work.spread is None or not isinstance(subject, BoardSubject):
+        return None
+    circuit, seed = subject.design.circuit, work.request.seed
+    drawn = draw_many(circuit, work.spread, seed, range(SPREAD_BOARDS))
+    ratios = subject.setting_ratios(drawn.board(k) for k in range(SPREAD_BOARDS))
+    if not {plan.first, plan.second} <= ratios.keys():
+        return None
+    both = np.column_stack([ratios[plan.first], ratios[plan.second]])
+    return SpreadBox.about(found.at, both, found.border)
 
 
 def _curves(

@@ -127,6 +127,12 @@ def _region(axes: Axes, region: ResponseRegion) -> list[Any]:
         x, y = [a - wide, a + wide, a + wide, a - wide], [b - tall, b - tall, b + tall, b + tall]
         axes.plot([*x, x[0]], [*y, y[0]], color=INK, lw=1.0, ls=line, zorder=4)
         handles.append(Line2D([], [], color=INK, lw=1.0, ls=line, label=text))
+    if region.spread is not None:
+        (a, b), (c, d) = region.spread.low, region.spread.high
+        look: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": (0, (4, 2, 1, 2))}
+        axes.plot([a, c, c, a, a], [b, b, d, d, b], zorder=4, **look)
+        text = f"{region.spread.share:.0%} of boards, each way"
+        handles.append(Line2D([], [], label=text, **look))
     for ellipse, line in ((region.ellipse_around, ":"), (region.ellipse_best, "-")):
         (wide, tall), turn = ellipse.half_axes, np.linspace(0.0, 2.0 * np.pi, 181)
         curve = ellipse.centre[0] + wide * np.cos(turn), ellipse.centre[1] + tall * np.sin(turn)

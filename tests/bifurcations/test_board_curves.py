@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
+from designer.circuit.netlist import nominal_board
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -63,3 +66,18 @@ def test_a_grazing_of_a_board_in_hertz_and_volts() -> None:
         hertz = followed.points[place].values[0]
         values = _located(followed, int(place))
         assert min(abs(value - hertz) for value in values) < 1e-8 * hertz
+
+
+def test_settings_at_which_a_board_moves_like_the_nominal_one() -> None:
+    """Capacitors that are all 1 % larger slow the board by 1 %; a generator's resistor that is 2 %
+    larger lets 2 % less of its voltage in."""
+    board = BoardSubject(synthesised().design)
+    circuit = board.design.circuit
+    capacitors = {part.name for part in circuit.capacitors}
+    slower = {n: v * (1.01 if n in capacitors else 1.0) for n, v in circuit.values.items()}
+    weaker = {n: v * (1.02 if n in ("R6", "R12") else 1.0) for n, v in circuit.values.items()}
+    nominal = nominal_board(circuit, ideal=True)
+    found = board.setting_ratios(replace(nominal, values=v) for v in (slower, weaker))
+    assert found["frequency"] == pytest.approx([1.01, 1.0], rel=1e-9)
+    assert found["amplitude"] == pytest.approx([1.0, 1.0 / 1.02], rel=1e-9)
+    assert found["omega"] == pytest.approx(found["frequency"])

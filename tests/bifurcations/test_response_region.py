@@ -7,7 +7,7 @@ import pytest
 
 from designer.bifurcations import response_region
 from designer.bifurcations.plane_curves import PlaneWindow
-from designer.bifurcations.response_region import EDGE, room
+from designer.bifurcations.response_region import EDGE, SpreadBox, room
 from designer.model.swept_model import ModelSubject
 from tests.bifurcations.test_continuation import PAPER, PLAIN
 from tests.bifurcations.test_points import linear_orbit
@@ -69,3 +69,17 @@ def test_largest_circles_of_a_triangle() -> None:
     assert about[1] == pytest.approx(0.1, abs=1e-12)
     assert best[1] == pytest.approx(radius, abs=1e-5)
     assert best[0] == pytest.approx([radius, radius], abs=1e-4)
+
+
+def test_box_of_spread_holds_95_per_cent_of_evenly_spread_boards() -> None:
+    """Ratios from 0.9 to 1.1 and from 0.8 to 1.2 about (0.5, 0.1); the triangle ends at x + y = 1,
+    and all but those with 0.5 r + 0.1 s > 1, of which there are none, lie in it."""
+    evenly = np.linspace(-1.0, 1.0, 401)
+    r, s = (a.ravel() for a in np.meshgrid(1.0 + 0.1 * evenly, 1.0 + 0.2 * evenly))
+    box = SpreadBox.about((0.5, 0.1), np.column_stack([r, s]), TRIANGLE)
+    assert box.low == pytest.approx((0.5 * (1.0 - 0.095), 0.1 * (1.0 - 0.19)))
+    assert box.high == pytest.approx((0.5 * 1.095, 0.1 * 1.19))
+    assert (box.share, box.boards, box.inside) == (0.95, 401 * 401, 1.0)
+    half = SpreadBox.about((0.5, 0.5), np.column_stack([r, s]), TRIANGLE)
+    # By symmetry about the border as many lie inside as outside.
+    assert half.inside == pytest.approx(0.5, abs=0.01)
