@@ -60,6 +60,7 @@ from .points import (
     PointKind as PointKind,
 )
 from .response_region import (
+    EDGE as EDGE,
     ResponseRegion as ResponseRegion,
     SpreadBox as SpreadBox,
 )

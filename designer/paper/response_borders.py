@@ -58,8 +58,8 @@ class ResponseBorders:
         return f"borders-{self.plan.second}"
 
     def figure(self) -> Figure:
-        """The borders in the plane, ω on a logarithmic axis."""
-        return curve_plots.curves(self.curves, self.plan, TITLE, self.windows, log=True)
+        """The borders in the plane."""
+        return curve_plots.curves(self.curves, self.plan, TITLE, self.windows)
 
     def table(self) -> str:
         """CSV, a row a point."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.border_curves import BorderCurve, CurvePlan
-from designer.bifurcations.response_region import ResponseRegion
+from designer.bifurcations.response_region import EDGE, ResponseRegion
 from designer.plots.response_colours import MARKS, OTHERS, SHADES
 from designer.plots.si_axes import si_x, si_y
 from designer.plots.titles import NAMES, curves_title
@@ -28,6 +28,9 @@ Label = tuple[str, float, float]
 
 BESIDE = 3
 """Points of a curve that lie beside one of codimension two."""
+WIDE = 5.0
+"""A window whose greatest value is this many times its least: windows of responses crowd at its
+lower end."""
 UPRIGHT = 0.012
 """Of the axes: width of a name that is written upwards, for want of room."""
 
@@ -46,15 +49,15 @@ def curves(
     name: str = "",
     labels: Sequence[Label] = (),
     region: ResponseRegion | None = None,
-    *,
-    log: bool = False,
 ) -> Figure:
     """Every curve by its kind: thick where it bounds a stable response, thin elsewhere; points of
     codimension two as marks. name : the model's title. labels : responses along the sweep.
 
     region : of one response, shaded, with the largest box about its nominal point and the largest
-    of all. log : whether the first parameter has a logarithmic axis.
+    of all. The first parameter has a logarithmic axis where its window is ``WIDE``.
     """
+    low, high = plan.window.first
+    log = 0.0 < WIDE * low < high
     figure = new_figure(8.6, 5.6)
     axes = figure.subplots()
     figure.suptitle(curves_title(name, plan, 104), x=0.012, ha="left", fontsize=8.5, color=INK)
@@ -72,12 +75,14 @@ def curves(
     handles.append(
         Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label=f"{second} = {plan.at:.6g}")
     )
-    handles += [] if region is None else _region(axes, region)
+    if region is not None:
+        handles += _region(axes, region, {curve.kind for curve in lines})
+        labels = [label for label in labels if not label[1] <= region.at[0] <= label[2]]
     if log:
         axes.set_xscale("log")
     _axes(axes, plan)
     if log:
-        axes.xaxis.set_major_locator(FixedLocator(_round_values(*plan.window.first)))
+        axes.xaxis.set_major_locator(FixedLocator(_round_values(low, high)))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     _named(axes, plan, labels)
@@ -113,12 +118,19 @@ def _meetings(axes: Axes, lines: Sequence[BorderCurve]) -> list[Line2D]:
     return handles
 
 
-def _region(axes: Axes, region: ResponseRegion) -> list[Any]:
-    """A response's region with its boxes; their legend."""
+def _region(axes: Axes, region: ResponseRegion, named: Set[str]) -> list[Any]:
+    """A response's region, a dot at each ray's end for what happens there, and the boxes; their
+    legend. named : kinds that are in the legend already."""
     shade: dict[str, Any] = {"color": SHADES[region.symmetric], "lw": 0, "alpha": 0.6}
     axes.fill(*region.border.T, zorder=1, **shade)
     axes.plot(*region.at, marker="+", ms=8, color=INK, ls="", zorder=5)
     handles: list[Any] = [Patch(label=f"{region.response}, seen from +", **shade)]
+    kinds = np.array(region.kinds)
+    for kind in dict.fromkeys(k for k in region.kinds if k != EDGE):
+        dots: dict[str, Any] = {"color": MARKS[kind][1] if kind in MARKS else MUTED}
+        dots |= {"ls": "", "marker": "o", "ms": 2.4}
+        axes.plot(*region.border[kinds == kind].T, zorder=4, **dots)
+        handles += [] if kind in named else [Line2D([], [], label=f"{kind} at a ray's end", **dots)]
     for box, line, text in (
         (region.around, ":", f"± {region.around.share:.1%} about +"),
         (region.best, "-", f"± {region.best.share:.1%}, the most"),
