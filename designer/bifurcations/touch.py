@@ -14,9 +14,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
-from designer.dynamics.kernel_algebra import motion_terms
 from designer.dynamics.mode_tables import augmented, augmented_row, step_length
 from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
+from designer.kernels.kernel_algebra import motion_terms
 
 FEWEST, MOST = 32, 20_000
 """Nodes in a drive period from which the motion is taken on."""

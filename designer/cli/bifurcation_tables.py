@@ -128,7 +128,7 @@ def _region(answer: Mapping[str, Any]) -> Iterator[str]:
     )
     best = region["best"]
     yield f"most room at {place(best['centre'])}: {best['share']:.2%} of the nominal values"
-    spread = found["spread"]
+    spread = region["spread"]
     if spread is not None:
         yield (
             f"{spread['share']:.0%} of {spread['boards']} boards act as if set from "

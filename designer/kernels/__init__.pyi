@@ -8,7 +8,10 @@ from . import (
     kernel_sweep as kernel_sweep,
 )
 from .kernel_algebra import (
+    exponential_terms as exponential_terms,
     factor as factor,
+    motion_terms as motion_terms,
+    rows_of_terms as rows_of_terms,
     substitute as substitute,
 )
 from .kernel_boards import (
