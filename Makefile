@@ -23,7 +23,7 @@ env: $(VENV)/.installed ## create $(VENV) with the locked requirements and this 
 
 # Two stamps, so that an edit of pyproject.toml does not download everything anew.
 $(VENV)/.locked: $(LOCK)
-	@echo "Creating $(VENV) from $(LOCK) (about a minute)"
+	@echo "Creating $(VENV) from $(LOCK) (1.7 GB; one to five minutes)"
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "designer needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
 	@$(PYTHON) -m venv --clear $(VENV)
 	@$(PIP) install --require-hashes --requirement $(LOCK)

@@ -32,7 +32,8 @@ PARTS = {
 MOTION = "motion between the stops"
 TEXT = (
     "compiling the exact engine's part for {part} "
-    "(first use of this part; up to half a minute, longer on a busy machine)…"
+    "(once after an installation, for this kind of model; up to half a minute, longer on a busy "
+    "machine)…"
 )
 
 

@@ -59,7 +59,7 @@ class PairSearch:
         start, whole, reached, rows, steps = 0, True, -1, 0, 0
         slices = len(values.deltas) * len(values.r)
         while start < slices:
-            doing(f"linear block, errors up to {level:.2g}: {start / slices:.0%} of the joins")
+            doing(f"integrators with errors up to {level:.2g}: {start / slices:.0%} of the joins")
             below = min(level, best)
             piece = slice_from(values, rules, below, start, patience - steps)
             left = patience - steps - piece.steps

@@ -75,7 +75,7 @@ class TermDives:
             rules = self.search.rules(level)
             low, high = rules.seconds
             shares = ((self.number + np.arange(CELLS)) * GOLDEN) % 1.0
-            doing(f"linear block, dives for an error below {level:.2g}: {self.steps / most:.0%}")
+            doing(f"integrators, dives for an error below {level:.2g}: {self.steps / most:.0%}")
             self._look(rules, level, low + (high - low) * shares)
         return self.error < before
 
@@ -85,7 +85,7 @@ class TermDives:
         for masses in self._sets():
             if self.steps >= most:
                 break
-            doing(f"linear block, neighbours of an error of {self.error:.2g}")
+            doing(f"integrators, neighbours of an error of {self.error:.2g}")
             level = LOWER * self.error
             rules = self.search.rules(level)._replace(fixed=self._fixed(masses))
             scales = minimax(self.search.offsets(self._known), self.search.columns)

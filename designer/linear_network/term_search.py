@@ -103,7 +103,7 @@ class TermSearch:
                     met.append(row)
             room = room * 4 if count == room and best is before else 8
             steps += taken
-        doing(f"linear block, fewest values of {len(met)} choices")
+        doing(f"integrators, fewest values of {len(met)} choices")
         word, chosen = self._program(np.array(met)).solve(limit, self.cost(best)[0])
         # The solver is not believed: its choice stands only if it is as good as the one known.
         if chosen is None or self.cost(chosen) > self.cost(best) or not self._good(chosen, limit):
@@ -159,7 +159,7 @@ class TermSearch:
     def _tell(self, level: float, rules: TermRules, t: float) -> None:
         low, high = rules.seconds
         share = min(max(t - low, 0.0) / (high - low + TINY), 1.0)
-        doing(f"linear block, errors up to {level:.2g}: {share:.0%} of the time scales")
+        doing(f"integrators with errors up to {level:.2g}: {share:.0%} of the time scales tried")
 
     @cached_property
     def _conditions(self) -> TermConditions:

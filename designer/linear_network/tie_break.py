@@ -63,9 +63,9 @@ def fewest_values(
     parts : (14,) a choice with an error of at most ``limit``. prices : price class of each
     capacitor. patience : steps of the loops.
     """
-    doing("linear block, choices of least error")
+    doing("integrators, choices of least error")
     pool, known = _pool(values, rules, parts, limit, prices, patience)
-    doing(f"linear block, fewest values of {len(pool)} choices")
+    doing(f"integrators, fewest values of {len(pool)} choices")
     status, chosen = _solve(values, rules, pool, limit, prices)
     # The solver is not believed: its choice stands only if it is as good as the one that is known.
     if chosen is None or not (

@@ -389,7 +389,7 @@ def best_beside(
         ):
             break
         between = left.popleft()
-        with part(f"beside the first linear block ({number + 1} of at most {most})"):
+        with part(f"other integrators ({number + 1} of at most {most})"):
             other = linear_block(order, within, between=between, level=linear.least)
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue

@@ -322,7 +322,9 @@ class Work:
             answers,
             budget=budget,
             jobs=self.jobs,
-            progress=self.progress.stage("blame", extent_of(plan, answers, budget).steps),
+            progress=self.progress.stage(
+                "blame, boards asked again", extent_of(plan, answers, budget).steps
+            ),
             parts=self.stores.blame_parts(plan),
         )
         self.stores.put_blame(plan, result)

@@ -40,7 +40,7 @@ def test_each_part_is_announced_once_and_by_name() -> None:
     assert len(said) == 2
     assert MOTION in said[0]
     assert PARTS["kernel_propagators"] in said[1]
-    assert all("first use of this part" in line and "busy machine" in line for line in said)
+    assert all("once after an installation" in line and "busy machine" in line for line in said)
 
 
 def test_every_kernel_that_is_not_of_motion_is_named() -> None:

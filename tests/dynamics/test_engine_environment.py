@@ -25,7 +25,9 @@ from tests.shared.model_text import PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = "format = 1\n" + PAPER_TABLE
-COMPILING = "compiling the exact engine's part for motion between the stops (first use of this part"
+COMPILING = (
+    "compiling the exact engine's part for motion between the stops (once after an installation"
+)
 PROMPT = 30.0
 """Seconds: on a busy machine too, what is not answered by then never is. Some 0.3 to 0.8 s were
 measured on an idle one; the runs that are interrupted here would take minutes."""

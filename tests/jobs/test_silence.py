@@ -154,9 +154,9 @@ def test_quiet_is_quiet_and_the_log_has_it(
     words = ["simulate", str(model), "--engine", "circuit", "-q", "--log", str(log)]
     assert entry.status(words) == 0
     assert capfd.readouterr() == ("", "")
-    assert "so far: linear block, errors up to" in log.read_text("utf-8")
+    assert "so far: integrators with errors up to" in log.read_text("utf-8")
     assert entry.status([word for word in words if word != "-q"]) == 0
-    assert "so far: linear block, errors up to" in capfd.readouterr().err
+    assert "so far: integrators with errors up to" in capfd.readouterr().err
 
 
 class Walk(ProgressLines):
@@ -188,7 +188,7 @@ class Walk(ProgressLines):
 
 STAGES = {
     "ngspice": "",
-    "responses of the model, parts": "swing|linear block|dead zone|beside the first|cost",
+    "responses of the model, parts": "swing|integrators|dead zone|cost",
     "start recipes, files of the design": "start recipe of response 1 of 1, direct|drawing",
     "KiCad project": "drawing",
     "ngspice, equation check": "6 of 6 runs",
@@ -197,7 +197,7 @@ STAGES = {
     "tolerance study, 2 boards, responses: 1": "",
     "ngspice, 4 runs": "",
     "report": "",  # the yields are written before the blame
-    "blame": "",
+    "blame, boards asked again": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""
 
