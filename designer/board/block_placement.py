@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -45,9 +46,18 @@ def block(
 
     near : the decoupling capacitors. mine : the parts of each section, by its name.
     """
+    return list(_block(package, tuple(near), tuple(map(tuple, mine.values()))))
+
+
+@lru_cache(maxsize=256)  # bill, project and report of one design ask for the same blocks
+def _block(
+    package: PlacedComponent,
+    near: tuple[PlacedComponent, ...],
+    sections: tuple[tuple[PlacedComponent, ...], ...],
+) -> tuple[PlacedComponent, ...]:
     out = _Block([package, *_decoupling(package, near)])
     summing = {p.net for p in package.component.pins if p.name == "-"} - PLANES
-    parts = [part for names in sorted(mine.values(), key=len, reverse=True) for part in names]
+    parts = [part for names in sorted(sections, key=len, reverse=True) for part in names]
     at_node = [p for p in parts if summing & set(p.component.nets.values())]
     for part in sorted(at_node, key=lambda p: p.box.height):
         out.add(part, summing)
@@ -56,7 +66,7 @@ def block(
         part = next((p for p in rest if out.touches(p)), rest[0])
         rest.remove(part)
         out.add(part, summing)
-    return out.spots
+    return tuple(out.spots)
 
 
 @dataclass
