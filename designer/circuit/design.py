@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -159,6 +160,23 @@ class Design:
         rows = reduction.system().displacement
         places = [self.circuit.states.index(stop.state) for stop in self.circuit.stops]
         return np.array([float(row[place]) for row, place in zip(rows, places, strict=True)])
+
+    def thresholds(self, number: int) -> dict[int, float]:
+        """The displacement [V] at which contact begins, by side (1 upper, -1 lower), as a distance
+        from rest; negative where the stop is in contact at rest. On the scale of the first mass.
+
+        number : index of the clearance.
+        """
+        scales, clearance = self.errors.scales, self.model.second_order().clearances[number]
+        volts = float(scales.volts[2 * clearance.mass])
+        realised = {}
+        for side, stop in clearance.sides:
+            key = f"gap {clearance.name} {'upper' if side > 0 else 'lower'}"
+            realised[side] = stop.gap * volts * math.exp(self.errors.errors.get(key, 0.0))
+        if number == 0:
+            stated = {1: scales.threshold, -1: scales.threshold_lower}
+            realised |= {side: stated[side] for side in realised}
+        return realised
 
     def in_model_units(self, orbit: Orbit, volts: Array) -> Orbit:
         """An orbit of a board, in volts and seconds, in model units. volts : as of ``volts``."""

@@ -31,6 +31,9 @@ COLUMNS = (
     "load",
     "start",
 )
+DIGITS = 6
+"""Significant ones of the scale card."""
+SIDES = {1: "upper", -1: "lower"}
 OMEGA_DIGITS = 6
 """Significant ones of ω where it follows from SI values; more where they tell responses apart."""
 MECHANISM = "mechanism_hz"
@@ -106,16 +109,33 @@ def scales_csv(modelfile: ModelFile, design: Design, responses: Sequence[ModelRe
     if modelfile.si is not None:
         slow = modelfile.si.time_scale / scales.seconds
         rows.append(("mechanism seconds per circuit second", slow, "s/s", b0))
-    if design.circuit.stops:
-        rows.append(("threshold of contact", scales.threshold, "V", b0))
-        if abs(scales.offcentre) > 1e-9:
-            rows.append(("threshold of contact, lower stop", scales.threshold_lower, "V", b0))
+    rows += [(name, volts, "V", b0) for name, volts in _thresholds(design)]
     for b in dict.fromkeys([b0, *(r.b for r in responses)]):
         rows += _amplitudes(modelfile, design, b)
     return csv_text(
         ("quantity", "value", "unit", "b"),
-        [{"quantity": q, "value": repr(float(v)), "unit": u, "b": repr(b)} for q, v, u, b in rows],
+        [
+            {"quantity": q, "value": f"{v:.{DIGITS}g}", "unit": u, "b": repr(b)}
+            for q, v, u, b in rows
+        ],
     )
+
+
+def _thresholds(design: Design) -> list[tuple[str, float]]:
+    """Where contact begins [V], as a distance from rest. Several clearances have a row for each
+    stop, on the scale of the mass that moves in it; one has a row, or two where its middle is off
+    rest."""
+    scales, clearances = design.errors.scales, design.model.second_order().clearances
+    if len(clearances) > 1:
+        return [
+            (f"threshold of contact, {c.name}, {SIDES[side]} stop, of v{2 * c.mass + 1}", volts)
+            for number, c in enumerate(clearances)
+            for side, volts in design.thresholds(number).items()
+        ]
+    rows = [("threshold of contact", scales.threshold)] if clearances else []
+    if clearances and abs(scales.offcentre) > 1e-9:
+        rows.append(("threshold of contact, lower stop", scales.threshold_lower))
+    return rows
 
 
 def _amplitudes(

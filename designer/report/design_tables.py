@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 
@@ -237,14 +236,7 @@ def _thresholds(design: Design) -> list[tuple[str, str]]:
 
 def _places(design: Design, number: int) -> str:
     """Voltages with their signs; ± where both stops stand alike."""
-    scales, clearance = design.errors.scales, design.model.second_order().clearances[number]
-    volts = float(scales.volts[2 * clearance.mass])
-    first = {1: scales.threshold, -1: scales.threshold_lower} if number == 0 else {}
-    places = []
-    for side, stop in clearance.sides:
-        key = f"gap {clearance.name} {'upper' if side > 0 else 'lower'}"
-        realised = stop.gap * volts * math.exp(design.errors.errors.get(key, 0.0))
-        places.append(side * first.get(side, realised))
+    places = [side * distance for side, distance in design.thresholds(number).items()]
     texts = [words.quantity(place, "V").replace("-", "−") for place in places]
     even = abs(sum(places)) <= EXACT * sum(map(abs, places)) and len(places) == 2
     return f"± {texts[0]}" if even else " and ".join(texts)

@@ -1,17 +1,31 @@
-"""``setup.csv`` says how to start each response, or why it cannot be started."""
+"""``setup.csv`` says how to start each response, or why it cannot be started; ``scales.csv`` where
+contact begins."""
 
 from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from designer.check.synthesis_result import synthesise
-from designer.circuit.design import settings
-from designer.folders.bench_tables import COLUMNS, NO_RECIPE, setup_csv, start_recipes
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.design import Certificate, Design, settings
+from designer.circuit.netlist import Resistor
+from designer.folders.bench_tables import (
+    COLUMNS,
+    NO_RECIPE,
+    scales_csv,
+    setup_csv,
+    start_recipes,
+)
 from designer.model.model_file import parse_model_file
+from tests.shared.chains import chain_text
+from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.system_text import clearance
 
 TEXT = (Path(__file__).resolve().parents[2] / "examples" / "rectifier.toml").read_text("utf-8")
 
@@ -49,3 +63,32 @@ def test_every_response_has_a_start() -> None:
             assert float(row[name]) == pytest.approx(value, rel=5e-5)
             assert len(row[name]) <= 8
         assert float(row["amplitude_vpp"]) == 2.0 * float(row["amplitude_v_peak"])
+
+
+def test_each_stop_of_several_clearances_has_its_threshold() -> None:
+    """Exact values, 3 V and 5 V per unit of x1 and x2; one threshold's resistor 5 % too large."""
+    uneven = {"upper": 0.3, "lower": 0.5, "stiffness": 5.0}
+    text = chain_text(
+        2,
+        clearance("A", "m1", "ground", **uneven),
+        clearance("B", "m2", "ground", upper=0.2, stiffness=8.0),
+    )
+    file = parse_model_file(text)
+    system = file.model.second_order()
+    circuit = exact_circuit(system, Scale(1e-3, np.array([3.0, 3.0, 5.0, 5.0]), 1.0))
+    parts = tuple(
+        replace(part, value=1.05 * part.value)
+        if isinstance(part, Resistor) and part.name == "R301"
+        else part
+        for part in circuit.parts
+    )
+    circuit = replace(circuit, parts=parts)
+    errors = coefficient_errors(circuit, system)
+    design = Design(file.model, circuit, errors, Certificate("bound", 0.0, ""), {}, {}, 0.0)
+    rows = list(csv.DictReader(io.StringIO(scales_csv(file, design, ()))))
+    thresholds = {r["quantity"]: r["value"] for r in rows if "threshold" in r["quantity"]}
+    assert thresholds == {
+        "threshold of contact, A, upper stop, of v1": "0.9",
+        "threshold of contact, A, lower stop, of v1": "1.5",
+        "threshold of contact, B, upper stop, of v3": "0.952381",
+    }
