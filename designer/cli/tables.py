@@ -198,16 +198,18 @@ def simulated(answer: Mapping[str, Any]) -> None:
         ),
         gap=1,
     )
+    in_si = bool(masses) and all("frequency_hz" in r for r in rows)
     for r in rows:
+        place = f"ω = {r['omega']:g}{' rad/s' if in_si else ''}"
         if r["starts"] is not None:
-            say(f"ω = {r['omega']:g}: {coexisting(r['starts'])}")
+            say(f"{place}: {coexisting(r['starts'], masses, in_si=in_si)}")
         if r["reason"]:
-            say(f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+            say(f"{place}: {r['response']}: {r['reason']}")
         if r["lyapunov_error"] is not None:
-            growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}"
-            say(f"ω = {r['omega']:g}: largest exponent {growth} (standard error)")
+            growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}{' 1/s' if in_si else ''}"
+            say(f"{place}: largest exponent {growth} (standard error)")
         for line in untrusted({"this response": r.get("trust")}):
-            say(f"ω = {r['omega']:g}: {line}")
+            say(f"{place}: {line}")
 
 
 def _reach(
@@ -230,22 +232,34 @@ def _reach(
     return cells
 
 
-def coexisting(starts: Mapping[str, Any]) -> str:
-    """Where the starts that were drawn from a box end, the largest share first."""
+def coexisting(
+    starts: Mapping[str, Any], masses: Sequence[str] = (), *, in_si: bool = False
+) -> str:
+    """Where the starts that were drawn from a box end, the largest share first.
+
+    masses : their names, if they have some. in_si : whether numbers are SI values.
+    """
+
+    def text(value: float, unit: str, digits: int = 4) -> str:
+        return value_text(value, unit, digits) if in_si else f"{value:.{digits}g}"
+
     parts = []
     names = Counter(a["response"] for a in starts["attractors"])
     for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
         name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
         if names[a["response"]] > 1 and a["x1_min"] is not None:
-            name += f" (x1 {a['x1_min']:.4g} to {a['x1_max']:.4g})"
+            name += f" (x1 {text(a['x1_min'], 'm')} to {text(a['x1_max'], 'm')})"
         parts.append(f"{name} {_share(a)}")
     if starts["not_settled"]["count"]:
         parts.append(f"not settled {_share(starts['not_settled'])}")
-    box = ", ".join(f"{name} ± {half:.3g}" for name, half in starts["box"].items())
+    named = {f"x{i + 1}": f" ({mass})" for i, mass in enumerate(masses)}
+    box = starts["box"].items()
+    units = {x: "m/s" if x.endswith("'") else "m" for x, _ in box}
+    halves = ", ".join(f"{x}{named.get(x, '')} ± {text(half, units[x], 3)}" for x, half in box)
     count = str(starts["count"])
     if starts["count"] < starts["asked"]:
         count += f" (of {starts['asked']}: the others would take too many steps)"
-    return f"of {count} starts at drive phase 0 in the box {box}: {'; '.join(parts)}"
+    return f"of {count} starts at drive phase 0 in the box {halves}: {'; '.join(parts)}"
 
 
 def compared(answer: Mapping[str, Any]) -> None:
