@@ -124,7 +124,10 @@ def bifurcation(
         progress=session.progress,
         **shared,
     )
-    return Output(result.answer, lambda: bifurcation_tables.show(result.answer, out, result.reused))
+    ends = (from_ or "", to or "")
+    return Output(
+        result.answer, lambda: bifurcation_tables.show(result.answer, out, result.reused, ends)
+    )
 
 
 def _limits(text: str) -> tuple[str, str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -15,16 +16,26 @@ LONGEST = 40
 """Lines of a table; the JSON object has them all."""
 
 
-def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
-    """What the verb found, and where it was written."""
-    {"sweep": _sweep, "map": _map, "basins": _basins}[answer["kind"]](answer)
+def show(
+    answer: Mapping[str, Any],
+    out: Path | None,
+    reused: bool,
+    ends: tuple[str, str] = ("", ""),
+) -> None:
+    """What the verb found, and where it was written. ends : of the sweep, as they were asked for,
+    which say the unit that comes first."""
+    if answer["kind"] == "sweep":
+        _sweep(answer, ends)
+    else:
+        {"map": _map, "basins": _basins}[answer["kind"]](answer)
     if out is not None:
         files(out, reused)
 
 
-def _sweep(answer: Mapping[str, Any]) -> None:
+def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     windows = answer["windows"]
+    in_si = "si_unit" in answer and any(_in_si_unit(end, answer["si_unit"]) for end in ends)
     widest = sorted(windows, key=lambda w: -w["steps"])[:LONGEST]
     si = answer.get("si_unit")
     chaos = any("lyapunov" in w for w in widest)
@@ -33,13 +44,11 @@ def _sweep(answer: Mapping[str, Any]) -> None:
         (
             {
                 "track": w["track"],
-                f"from{unit}": f"{w['from']:.6g}",
-                "to": f"{w['to']:.6g}",
-                **({f"{end} [{si}]": _si(w, end, si) for end in ("from", "to")} if si else {}),
+                **_ends(w, unit, si, in_si=in_si),
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
-                **({"λ": _exponents(w)} if chaos else {}),
+                **({f"λ{' [1/s]' if unit else ''}": _exponents(w)} if chaos else {}),
             }
             for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
         ),
@@ -48,7 +57,7 @@ def _sweep(answer: Mapping[str, Any]) -> None:
         say(f"and {len(windows) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
         say("\nBifurcation points")
-        for text in _points(answer["points"][:LONGEST], si):
+        for text in _points(answer["points"][:LONGEST], answer["unit"], si, in_si=in_si):
             say(text)
     if "shares" in answer:
         _shares(answer)
@@ -145,12 +154,41 @@ def _exponents(window: Mapping[str, Any]) -> str:
     return f"{low:.2g} to {high:.2g} (± {window['lyapunov_error']:.1g})"
 
 
-def _points(points: Sequence[Mapping[str, Any]], si: str | None) -> Iterator[str]:
-    """What happens at each point on its branch, and below it what the sweep's tracks show."""
+def _in_si_unit(asked: str, si: str) -> bool:
+    """Whether an end of the sweep was asked for as a text in this SI unit, with or without a
+    prefix, such as "4.5 Hz"."""
+    text = str(asked).strip()
+    return text.endswith(si) and not text.endswith("rad/s")
+
+
+def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) -> dict[str, str]:
+    """The ends of a window in the swept parameter's own unit and in the SI unit, if it has one.
+
+    in_si : whether the SI unit comes first.
+    """
+    names = ("from", "to")
+    own = {f"{end}{unit}": f"{window[end]:.6g}" for end in names}
+    other = {f"{end} [{si}]": _si(window, end, si) for end in names} if si else {}
+    return {**other, **own} if in_si else {**own, **other}
+
+
+def _points(
+    points: Sequence[Mapping[str, Any]], unit: str, si: str | None, *, in_si: bool
+) -> Iterator[str]:
+    """What happens at each point on its branch, and below it what the sweep's tracks show.
+
+    in_si : whether the place comes in the SI unit first.
+    """
     for p in points:
         # Folders of older versions have no caption.
         text = p.get("caption", f"{p['kind']} at {p['value']:.9g}: {p['before']} → {p['after']}")
-        yield f"{text} ({_si(p, 'value', si)})" if si else text
+        number = re.escape(f"{p['value']:.9g}{' ' + unit if unit else ''}")
+        place = re.search(rf"(\S+ = )?{number}(?=:)", text)
+        if si and place:
+            own, shown = place[0], _si(p, "value", si)
+            both = f"{shown} ({own})" if in_si else f"{own} ({shown})"
+            text = text.replace(own, both, 1)
+        yield text
         for c in p.get("changes", []):
             if c["track"] is not None:
                 yield f"  {c['track']}: {c['text']}"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from designer.cli import tables
+from designer.cli import bifurcation_tables, tables
 
 
 def answer(**more: Any) -> dict[str, Any]:
@@ -67,3 +67,47 @@ def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
     in_si = tables.coexisting(starts, ["hammer"], in_si=True)
     assert "in the box x1 (hammer) ± 4.5 mm, x1' ± 260 mm/s:" in in_si
     assert "1-1-0 (x1 -310 mm to 520 mm) 25 %" in in_si
+
+
+@pytest.mark.parametrize(
+    ("ends", "heads", "place"),
+    [
+        (
+            ("4 Hz", "6 Hz"),
+            "from [Hz] to [Hz] from [rad/s] to [rad/s]",
+            "at 4.90881 Hz (ω = 30.84298 rad/s): stable",
+        ),
+        (
+            ("25", "38 rad/s"),
+            "from [rad/s] to [rad/s] from [Hz] to [Hz]",
+            "at ω = 30.84298 rad/s (4.90881 Hz): stable",
+        ),
+    ],
+)
+def test_the_unit_that_was_asked_for_comes_first(
+    ends: tuple[str, str], heads: str, place: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    window = {"track": "up", "from": 25.0, "to": 38.0, "from_hz": 3.9789, "to_hz": 6.0479}
+    chaos = {"response": "aperiodic", "symmetric": None, "steps": 9}
+    caption = "pitchfork of 1-1-1 symmetric at ω = 30.84298 rad/s: stable above"
+    sweep = {
+        "kind": "sweep",
+        "unit": "rad/s",
+        "si_unit": "Hz",
+        "windows": [{**window, **chaos, "lyapunov": (1.0, 2.0), "lyapunov_error": 0.1}],
+        "points": [
+            {
+                "kind": "pitchfork",
+                "before": "1-1-1",
+                "after": "1-1-1",
+                "caption": caption,
+                "value": 30.84298,
+                "value_hz": 4.90881,
+            }
+        ],
+    }
+    bifurcation_tables.show(sweep, None, False, ends)
+    text = " ".join(capsys.readouterr().err.split())
+    assert f"track {heads} response" in text
+    assert "λ [1/s]" in text
+    assert place in text
