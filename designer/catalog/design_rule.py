@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from designer.base.units import format_quantity
+from designer.base.units import spaced_quantity
 
 Scope = Literal["circuit", "board"]
 Status = Literal["pass", "fail", "not run"]
@@ -174,9 +174,11 @@ def not_run(rule: DesignRule, why: str, override: Override | None = None) -> Rul
 
 
 def value_text(value: float, unit: str) -> str:
-    """A value with its unit, to three digits."""
+    """A value with its unit, to three digits, such as "18.5 kHz"."""
     if value != value or abs(value) == float("inf"):
         return "no number"
+    if not unit:
+        return f"{value:.3g}"
     if unit == "mm":
         return f"{value:.3g} mm"
-    return format_quantity(value, unit, 3) if unit else f"{value:.3g}"
+    return spaced_quantity(value, unit, 3).replace("\u00a0", " ")

@@ -325,7 +325,7 @@ def traded(answer: Mapping[str, Any]) -> None:
 
 
 def rules(answer: Mapping[str, Any]) -> None:
-    """Every rule with what was found; then what to do about those that fail."""
+    """Every rule with its figure and what was found; then what to do about those that fail."""
     from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 
     rows = answer["rules"]
@@ -335,6 +335,7 @@ def rules(answer: Mapping[str, Any]) -> None:
             {
                 "rule": r["id"],
                 "status": r["status"],
+                "figure": r["title"],
                 "found": r["found"],
                 "limit": r["limit"] + (" (model file)" if r["reason"] else ""),
             }

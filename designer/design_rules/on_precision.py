@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.design_rule import Finding
+from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
 from designer.design_rules.force_at_clearance import Forces, leftovers, thermal
 from designer.design_rules.subject import RuleSubject
@@ -52,7 +52,9 @@ def bias(s: RuleSubject) -> Iterator[Finding]:
         }
         total = sum(share.values()) * limit / s.drive
         yield Finding(
-            total, _most(share), more=_with_clearance(s, at, f"{limit:.3g} A at each input")
+            total,
+            _most(share),
+            more=_with_clearance(s, at, f"{value_text(limit, 'A')} at each input"),
         )
 
 
@@ -66,7 +68,9 @@ def noise(s: RuleSubject) -> Iterator[Finding]:
         amplifiers = sum((at.offset[a.name] * density) ** 2 for a in s.circuit.sections)
         warm = sum((at.between(r.a, r.b) * thermal(r.value)) ** 2 for r in resistors)
         total = float(np.sqrt(amplifiers * (white + flicker) + warm * white)) / s.drive
-        yield Finding(total, more=_with_clearance(s, at, f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz"))
+        yield Finding(
+            total, more=_with_clearance(s, at, f"{SLOWEST:g} Hz to {value_text(s.fastest, 'Hz')}")
+        )
 
 
 def leakage(s: RuleSubject) -> Iterator[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from designer.catalog.design_rule import Finding
+from designer.catalog.design_rule import Finding, value_text
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode
 from designer.circuit.noise_gains import conductance, stages
@@ -141,9 +141,11 @@ def slew(s: RuleSubject) -> Iterator[Finding]:
 
 def gain_bandwidth(s: RuleSubject) -> Iterator[Finding]:
     """Noise gain times the highest frequency that matters."""
-    more, limit = f"up to {s.fastest:.4g} Hz", bandwidth_limit(s.opamp)
+    limit, fastest = bandwidth_limit(s.opamp), value_text(s.fastest, "Hz")
     for stage in stages(s.circuit):
-        yield Finding(stage.bandwidth(s.fastest), stage.section.name, limit, more)
+        product = stage.bandwidth(s.fastest)
+        more = f"a noise gain of {product / s.fastest:.3g} times {fastest}"
+        yield Finding(product, stage.section.name, limit, more)
 
 
 def _at(name: str, peak: Peak) -> str:

@@ -100,10 +100,10 @@ def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
     for rule in answer["rules"]:
         by[rule["status"]].append(rule)
     board = answer["board"]
-    failing = [(r["id"], r["found"], r["limit"], r["do"]) for r in by[FAIL]]
-    holding = [(r["id"], r["found"], r["limit"]) for r in by[PASS]]
+    failing = [(r["id"], r["title"], r["found"], r["limit"], r["do"]) for r in by[FAIL]]
+    holding = [(r["id"], r["title"], r["found"], r["limit"]) for r in by[PASS]]
     waiting = [(r["id"], r["found"]) for r in by[NOT_RUN]]
-    heads = ("rule", "found", "limit")
+    heads = ("rule", "figure", "found", "limit")
     blocks: list[Block] = [
         Lead(_rules_lead(answer["counts"])),
         "No board was looked at." if board is None else f"The board that was looked at: {board}.",
@@ -157,7 +157,7 @@ NEEDED: Mapping[str, Sequence[str]] = {
     ),
     "rules": (
         "board", *(f"counts.{status}" for status in (FAIL, PASS, NOT_RUN)),
-        *(f"rules.{key}" for key in ("id", "status", "found", "limit", "do")),
+        *(f"rules.{key}" for key in ("id", "status", "title", "found", "limit", "do")),
     ),
     "trade": (
         "truths",

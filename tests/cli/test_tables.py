@@ -111,3 +111,16 @@ def test_the_unit_that_was_asked_for_comes_first(
     assert f"track {heads} response" in text
     assert "λ [1/s]" in text
     assert place in text
+
+
+def test_the_figure_of_a_design_rule_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    row = {
+        "id": "common-mode",
+        "status": "pass",
+        "title": "Room to the range's end",
+        "found": "11 V at U1B",
+        "limit": "at least 0 V",
+        "reason": None,
+    }
+    tables.rules({"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}})
+    assert "Room to the range's end 11 V at U1B" in " ".join(capsys.readouterr().err.split())

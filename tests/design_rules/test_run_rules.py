@@ -320,6 +320,6 @@ def test_a_junit_report_says_what_was_found() -> None:
     root = ElementTree.fromstring(rule_reports.junit("<&>", outcomes("U1A")))
     assert root[0].get("name") == "design rules: <&>"
     failure = root[0][0][0]
-    assert failure.get("message") == "found 13V at U1A; at most 12V"
+    assert failure.get("message") == "found 13 V at U1A; at most 12 V"
     assert BY_ID["swing"].do in str(failure.text)
     assert "the model file's limit: U1A" in str(root[0][1][0].text)
