@@ -25,6 +25,8 @@ _ROW = 1.6
 """Height of one spring, damper or force between neighbours."""
 _LANE, _DEEP = 3.0, 1.7
 """Height of a clearance above the row, and of a joint below it."""
+_SHIFT = 0.35
+"""Between the rods of clearances on one mass."""
 _GAP, _STOP = 1.3, 2.3
 """From a rod to a plate, and length of a stop's spring."""
 
@@ -145,16 +147,23 @@ class _Page(MechanicalSheet):
 
     def _shift(self, number: int) -> float:
         """Of a clearance's rod from the middle of its mass, where that carries several."""
-        gaps = [set(gap.between) - {GROUND} for gap in self.model.gaps]
-        alone = sum(not gaps[number].isdisjoint(names) for names in gaps) == 1
-        return 0.0 if alone else 0.35 * (number % 3 - 1)
+        return 0.0 if self._alone(self.model.gaps[number]) else _SHIFT * (number % 3 - 1)
+
+    def _alone(self, gap: Gap) -> bool:
+        """Whether no other clearance has a mass of this one."""
+        masses = set(gap.between) - {GROUND}
+        return sum(not masses.isdisjoint(other.between) for other in self.model.gaps) == 1
 
     def _clearance(self, y: float, gap: Gap, shift: float) -> None:
         """A rod on the mass between plates on springs, which stand on ground or on the other."""
         mass, other = gap.between if gap.between[0] != GROUND else gap.between[::-1]
-        rod = self._middle(self.row.index(mass)) + shift
+        middle = self._middle(self.row.index(mass))
+        rod = middle + shift
         self.line([rod, rod], [self.top, y + 0.6], INK, 2.0)
-        self.text(rod, y + 0.95, gap.name, size=9.5)
+        if self._alone(gap):
+            self.text(rod, y + 0.95, gap.name, size=9.5)
+        else:  # beside the rods, which go on to the lanes above
+            self.text(middle - _SHIFT - 0.2, y + 0.95, gap.name, "right", size=9.5)
         ends = []
         sides = ((1, gap.upper, "upper"), (-1, gap.lower, "lower"))
         turned = -1 if gap.between[0] == GROUND else 1

@@ -19,7 +19,16 @@ BRANCH = system_text(
     clearance("A", "a", "c", upper=0.5, lower=0.3, stiffness=12.0),
     table("force", on="c", amplitude=8.5, constant=-0.125),
 )
-SYSTEMS = {**FILES, "branch": BRANCH}
+SAME_MASS = system_text(
+    {"a": 1.5},
+    {("a", "ground"): 4.5},
+    {("a", "ground"): 0.25},
+    clearance("anvil", "a", "ground", upper=0.5, stiffness=12.0),
+    clearance("pad", "a", "ground", lower=0.3, stiffness=13.0),
+    clearance("stiffening_by_steps", "a", "ground", upper=0.75, lower=0.7, stiffness=14.0),
+    table("force", on="a", amplitude=8.5),
+)
+SYSTEMS = {**FILES, "branch": BRANCH, "same mass": SAME_MASS}
 
 
 def texts(figure: Figure) -> list[str]:
@@ -29,9 +38,9 @@ def texts(figure: Figure) -> list[str]:
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_every_value_is_drawn_inside_the_sheet(name: str) -> None:
     model = system(SYSTEMS[name])
-    figure = system_drawing(model, si=name != "branch")
+    figure = system_drawing(model, si=name in FILES)
     shown = " ".join(texts(figure)).replace("\n", " ").replace("−", "-")
-    for symbol, value, _ in element_rows(model, si=name != "branch"):
+    for symbol, value, _ in element_rows(model, si=name in FILES):
         if not symbol.endswith((".constant", ".depth", ".damping")):  # in the table alone
             assert value.lstrip("-") in shown, symbol
     axes = figure.axes[0]
@@ -41,7 +50,19 @@ def test_every_value_is_drawn_inside_the_sheet(name: str) -> None:
         assert left <= x.min() <= x.max() <= right
         assert low <= y.min() <= y.max() <= high
     svg = figure_style.to_svg(figure)
-    assert svg == figure_style.to_svg(system_drawing(model, si=name != "branch"))
+    assert svg == figure_style.to_svg(system_drawing(model, si=name in FILES))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_no_line_crosses_the_name_of_a_clearance(name: str) -> None:
+    model = system(SYSTEMS[name])
+    figure = system_drawing(model, si=name in FILES)
+    axes, names = figure.axes[0], {gap.name for gap in model.gaps}
+    paths = [axes.transData.transform_path(line.get_path()) for line in axes.lines]
+    boxes = {t.get_text(): t.get_window_extent() for t in axes.texts if t.get_text() in names}
+    assert set(boxes) == names
+    for text, box in boxes.items():
+        assert not any(path.intersects_bbox(box, filled=False) for path in paths), text
 
 
 def test_masses_stand_in_a_row_from_the_ground() -> None:
