@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,8 @@ from designer.plots.titles import NAMES, title
 
 WIDE = 0.012
 """Of the sweep: narrower windows get no label."""
+NARROW = 0.004
+"""Of the sweep: narrower windows get no border, which would hide them."""
 SECOND_AXIS = 0.42
 """How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
 Coloured = tuple[str, Array, list[Steady]]
@@ -126,6 +129,9 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     )
     for speed, stop in zip(speeds, plan.subject.stops, strict=True):
         text = f"impact velocity {stop.velocity}\non {stop.name}"
+        if len(speeds) > 1:  # their panels are too low for the stop's name beside them
+            heading, text = f"on {stop.name}", f"impact velocity\n{stop.velocity}"
+            speed.set_title(heading, loc="left", pad=2.0, fontsize=8, color=MUTED, weight="normal")
         speed.set_ylabel(_label(text, units.get("v", "")))
         si_y(speed, si.get("x1'"))
     growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
@@ -321,11 +327,23 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
             top = 1.0 if window.track in (DOWN, UP) else 0.3
             ends = (window.low - half, window.high + half)
             axes.axvspan(*ends, ymax=top, color=CHAOS, lw=0, zorder=1.5)
-    named = [w for w in windows if read_counts(w.response)]
+    named = sorted((w for w in windows if read_counts(w.response)), key=lambda w: w.low)
     last = -np.inf
-    for window in sorted(named, key=lambda w: w.low):
+    for window in named:
+        axes.axvspan(
+            window.low - half, window.high + half, color=SHADES[bool(window.symmetric)], lw=0
+        )
+    for before, window in pairwise(named):
+        narrowest = min(w.high - w.low for w in (before, window)) + 2.0 * half
+        borders = abs(window.low - before.high - 2.0 * half) < half
+        if (
+            narrowest >= NARROW * span
+            and borders
+            and bool(before.symmetric) is bool(window.symmetric)
+        ):
+            axes.axvline(window.low - half, color="white", lw=0.8)
+    for window in named:
         low, high = window.low - half, window.high + half
-        axes.axvspan(low, high, color=SHADES[bool(window.symmetric)], lw=0)
         centre = 0.5 * (low + high)
         text = window.response
         wide = len(text) * 0.0068 * span
@@ -334,7 +352,8 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
             last = centre + 0.5 * wide
         elif high - low >= WIDE * span / 2 and centre - 0.004 * span > last:
             tilt: dict[str, Any] = {"rotation": 60, "ha": "left", "va": "bottom"}
-            axes.text(centre - 0.004 * span, 1.1, text, fontsize=6.5, color=INK, **tilt)
+            axes.text(centre - 0.004 * span, 1.3, text, fontsize=6.5, color=INK, **tilt)
+            axes.plot([centre] * 2, [0.5, 1.4], color=MUTED, lw=0.6, clip_on=False)
             last = centre + 0.008 * span
 
 
@@ -354,8 +373,9 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
                 families = list(dict.fromkeys(_family(s) for s in steps))
                 some = ", ".join(families[:3]) + (" …" if len(families) > 3 else "")
                 handles.append(Line2D([], [], color=colour, label=f"also {some}", **dot))
-    handles.append(Patch(fc=SHADES[True], label="symmetric"))
-    handles.append(Patch(fc=SHADES[False], label="not symmetric"))
+    shown = {bool(w.symmetric) for w in sweep.windows if read_counts(w.response)}
+    words = {True: "symmetric", False: "not symmetric"}
+    handles += [Patch(fc=SHADES[s], label=text) for s, text in words.items() if s in shown]
     if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
         handles.append(Patch(fc=CHAOS, label="aperiodic"))
     return handles

@@ -76,3 +76,32 @@ def _gap(table: Mapping[str, Any], mass: int, other: int) -> Gap:
         value_of(table.get("damping", 0.0)),
         value_of(table.get("preload", 0.0)),
     )
+
+
+HAMMER = """\
+format = 2
+title = "Hammer on anvil and pad"
+[[mass]]
+name = "hammer"
+mass = "2 kg"
+[[spring]]
+between = ["hammer", "ground"]
+stiffness = "8 kN/m"
+[[damper]]
+between = ["hammer", "ground"]
+damping = "20 N s/m"
+[[clearance]]
+name = "anvil"
+between = ["hammer", "ground"]
+upper = "0.8 mm"
+stiffness = "40 kN/m"
+[[clearance]]
+name = "pad"
+between = ["hammer", "ground"]
+lower = "1.5 mm"
+stiffness = "6 kN/m"
+[[force]]
+on = "hammer"
+amplitude = "12 N"
+"""
+"""A model file in SI units: one mass with two clearances of one stop each."""

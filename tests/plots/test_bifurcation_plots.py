@@ -1,0 +1,36 @@
+"""The picture of a sweep of a model with two stops in two clearances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from designer.bifurcations import sweep
+from designer.bifurcations.sweep import SweepPlan
+from designer.model.model_file import parse_model_file
+from designer.model.swept_model import ModelSubject
+from designer.plots.bifurcation_plots import diagram
+from tests.shared.figure_text import clipped, overlapping
+from tests.shared.mechanism_file import HAMMER
+
+LAST_OF_THE_FIRST = 41.0
+"""rad/s: 1-2-0;0-1 ends by grazing between 41 and 42."""
+
+
+def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
+    file = parse_model_file(HAMMER)
+    values = np.linspace(LAST_OF_THE_FIRST, 61.0, 21)
+    swept = sweep.run(SweepPlan(ModelSubject(file.model, scales=file.si), "omega", values))
+    assert [w.response for w in swept.windows] == ["1-2-0;0-1", "1-1-0;0-1"]
+    figure = diagram(swept)
+    assert (clipped(figure), overlapping(figure)) == ([], [])
+    panels = [axes.get_title(loc="left") for axes in figure.axes]
+    assert panels == ["", "", "on the upper stop of anvil", "on the lower stop of pad", ""]
+    strip = figure.axes[0]
+    places = {line.get_color(): set(np.asarray(line.get_xdata())) for line in strip.lines}
+    (border,) = places.pop("white")
+    assert border == pytest.approx(LAST_OF_THE_FIRST + 0.5)
+    assert list(places.values()) == [{LAST_OF_THE_FIRST}]  # to the tilted name
+    # Nothing is symmetric, so the key does not say what symmetric looks like.
+    (legend,) = figure.legends
+    assert [t.get_text() for t in legend.get_texts()] == ["followed down", "not symmetric"]
