@@ -24,6 +24,8 @@ from designer.schematic.kicad_project import Project
 from tests.catalog.test_catalog import own_opamp
 from tests.shared.paper_cases import PAPER
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 MODEL = """
 format = 1
 title = "Linear pair"
