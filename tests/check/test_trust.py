@@ -39,7 +39,7 @@ from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.yields.study import trust_of_yield
 from designer.yields.yield_count import Yield
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import SMALL
 
 STIFFEST = 1.0 - 2.0**-52
 """The stiffest stop but one that a double can ask for: one impact excites 7e7 of the frequency."""
@@ -305,18 +305,6 @@ def test_a_study_says_why_ngspice_has_no_answer(capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().err
     assert "ngspice gave no answer: timestep too small" in said
     assert re.search(r"ngspice not to be trusted here: .* \(by 0.005\)", said)
-
-
-SMALL = (
-    "format = 1\n"
-    + PAPER_TABLE
-    + """\
-[[response]]
-omega = 0.85
-expect = "1-2-2"
-"""
-    + COARSE_CIRCUIT
-)
 
 
 @pytest.mark.parametrize(

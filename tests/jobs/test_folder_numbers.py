@@ -14,7 +14,7 @@ from designer.cli import command_line, entry
 from designer.jobs import folder_numbers, search_job, study_job, trade_job
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
-from tests.yields.test_study import SMALL
+from tests.shared.model_text import SMALL
 
 STUDY = {"samples": 50, "seed": 7, "until": 0.1, "layers": ["samples"]}
 

@@ -16,8 +16,8 @@ from designer.jobs.folder_numbers import of_study
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.report.measured_table import boards_csv, response_labels
+from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import quick_folder
-from tests.yields.test_study import SMALL
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 

@@ -17,7 +17,7 @@ import pytest
 
 from designer.cli import command_line, entry
 from tests.shared.doc_commands import PAGES, ROOT, Command, Snippet, commands, snippets
-from tests.yields.test_study import SMALL
+from tests.shared.model_text import SMALL
 
 pytestmark = pytest.mark.docs
 

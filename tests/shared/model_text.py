@@ -24,6 +24,18 @@ side_conditions = ["swing", "load"]
 """For tests that ask nothing of the parts: chosen in a tenth of the time that E24 takes with every
 side condition, within half a per cent of the paper's model."""
 
+SMALL = (
+    "format = 1\n"
+    + PAPER_TABLE
+    + """\
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+"""
+    + COARSE_CIRCUIT
+)
+"""A whole file: one response of the paper, coarse parts, no title."""
+
 
 def dimensionless(model: MechanicalModel) -> Dimensionless:
     """A model of format 1, which has the paper's parameters."""

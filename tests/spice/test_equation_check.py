@@ -32,24 +32,14 @@ from designer.spice.equation_check import (
 )
 from designer.spice.pool import SpicePool
 from tests.shared.exact_circuits import Scale, exact_circuit
-from tests.shared.model_text import COARSE_CIRCUIT
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
 
 COARSE = (
-    """
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.3
-b = 0.25
-[[response]]
-omega = 0.85
-"""
+    "format = 1\n"
+    + PAPER_TABLE.replace("f20 = 0.0", "f20 = 0.3")
+    + "[[response]]\nomega = 0.85\n"
     + COARSE_CIRCUIT
 )
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

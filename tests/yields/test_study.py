@@ -39,7 +39,7 @@ from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.tolerance_study import Stores, Work, tolerance
 from tests.folders.test_study_cache import MAP
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan
 from tests.yields.test_blame_analysis import _Memory
@@ -47,16 +47,6 @@ from tests.yields.test_blame_analysis import _Memory
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
 ROOT = Path(__file__).resolve().parents[2]
-SMALL = (
-    "format = 1\n"
-    + PAPER_TABLE
-    + """\
-[[response]]
-omega = 0.85
-expect = "1-2-2"
-"""
-    + COARSE_CIRCUIT
-)
 
 
 # ---------------------------------------------------------------------------------------------
