@@ -16,6 +16,7 @@ from .csv_tables import (
     csv_text as csv_text,
 )
 from .defaults import (
+    CURVE_DEPTH as CURVE_DEPTH,
     DRAWN_STARTS as DRAWN_STARTS,
     SAMPLES as SAMPLES,
     SEARCH_SAMPLES as SEARCH_SAMPLES,

@@ -17,6 +17,9 @@ TRADE_BOARDS = 400
 DRAWN_STARTS = 200
 """Initial states that ``simulate`` draws, for the shares of the attractors."""
 
+CURVE_DEPTH = 1
+"""How many times in a row other bifurcation curves are begun where curves meet."""
+
 
 def cores() -> int:
     """How many cores this process may use: the default of ``jobs``."""

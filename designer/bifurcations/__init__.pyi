@@ -22,11 +22,13 @@ from .basins import (
     BasinPlan as BasinPlan,
     Basins as Basins,
 )
+from .border_curve import (
+    BorderCurve as BorderCurve,
+    read_curve as read_curve,
+)
 from .border_curves import (
     BLOCKS as BLOCKS,
-    BorderCurve as BorderCurve,
     CurvePlan as CurvePlan,
-    read_curve as read_curve,
 )
 from .branch_survey import (
     Survey as Survey,

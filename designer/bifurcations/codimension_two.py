@@ -16,13 +16,19 @@ by Brent's method along the curve, every value of it on a converged point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from designer.base.arrays import Array
-from designer.bifurcations.conditions import Grazing, Multiplier, MultiplierPair, grazings
+from designer.bifurcations.conditions import (
+    Condition,
+    Grazing,
+    Multiplier,
+    MultiplierPair,
+    grazings,
+)
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.points import PointKind
 
@@ -44,9 +50,12 @@ FALLEN = 1e-7
 
 HALVINGS, TRIES = 34, (5, 12)
 """Of an interval in which counts change; after so many of them the point itself is tried for."""
-NEAREST, CORNER = 1e-6, 2e-2
-"""In scaled units: first step from a curve's last point to the grazing that stops it, and how far
-off that may be."""
+CORNER = 2e-2
+"""In scaled units: farthest from a curve's last point to the grazing that stops it."""
+
+
+BESIDE = (1e-7, 1e-9)
+"""Of the displacement's peak: distances from a stop that lead on to the touch itself."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +68,11 @@ class CodimensionTwo:
     """The orbit there."""
     position: float
     """Where along the curve: the whole part is the number of the point before it."""
-    other: PointKind | None = None
-    """Kind of the other curve that meets this one here; None where it is the curve's own."""
+    other: Condition | None = None
+    """What holds along the other curve of the same orbits that passes here, set up at the point;
+    None where there is none."""
+    extra: Array = field(default_factory=lambda: np.zeros(0))
+    """(unknowns,) values of the other condition's own unknowns here."""
 
     @property
     def values(self) -> tuple[float, float]:
@@ -101,14 +113,18 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
     out: dict[Event, float] = {}
     if isinstance(p.condition, Multiplier):
         at, beside = p.condition.value, PointKind.FOLD if kind is not PointKind.FOLD else flip
-        name = "1:1 resonance" if at > 0.0 else "1:2 resonance"
-        out[name, None] = float(characteristic.deriv()(at))
+        # A half-period multiplier -1 twice is 1 twice in the period.
+        name = "1:1 resonance" if at > 0.0 or system.symmetric else "1:2 resonance"
+        out[name, PointKind.TORUS] = float(characteristic.deriv()(at))
         out[meeting(kind, beside), beside] = float(characteristic(-at))
         if kind is PointKind.FOLD:
             out["cusp", None] = _second_derivative(system, p, p.condition)
     elif isinstance(p.condition, MultiplierPair):
-        for name, off in _resonances(p.condition.total, symmetric=system.symmetric).items():
-            out[name, None] = off
+        total = p.condition.total
+        real = {"1:1 resonance": PointKind.FOLD if total > 0.0 else flip}
+        real |= {} if system.symmetric else {"1:2 resonance": flip}
+        for name, off in _resonances(total, symmetric=system.symmetric).items():
+            out[name, real.get(name)] = off
         others = p.condition.others(p.multipliers)
         for value, beside in ((1.0, PointKind.FOLD), (-1.0, flip)):
             out[meeting(kind, beside), beside] = float(np.prod(value - others).real)
@@ -156,19 +172,30 @@ def locate(
     for event, value in before.events.items():
         if value * after.events.get(event, 0.0) < 0.0:
             found.append((event, _root(system, a, b, event)))
-    if not np.array_equal(a.impacts, b.impacts):
-        kind = a.condition.kind
-        event = (meeting(kind, PointKind.GRAZING), PointKind.GRAZING)
-        found.append((event, _bisected(system, a, b)))
     ended = _falls_together(system, before, after)
     if ended:
         found.append(((ended, None), _nearest_to_partner(system, before, after)))
     out = [
-        CodimensionTwo(name, root[1], index + root[0], other)
-        for (name, other), root in found
+        CodimensionTwo(event[0], root[1], index + root[0], _other(root[1], event))
+        for event, root in found
         if root is not None
     ]
+    if not np.array_equal(a.impacts, b.impacts):
+        touched = _bisected(system, a, b)
+        out += [] if touched is None else [replace(touched, position=index + touched.position)]
     return sorted(out, key=lambda c: c.position)
+
+
+def _other(p: CurvePoint, event: Event) -> Condition | None:
+    """What holds along the other curve at an event on a curve; None where there is none."""
+    name, kind = event
+    if kind is None:
+        return None
+    if kind is not PointKind.TORUS:
+        return Multiplier.at(kind, p.jacobian)
+    if isinstance(p.condition, Multiplier) and name.endswith("resonance"):
+        return MultiplierPair(2.0 * p.condition.value)
+    return MultiplierPair.at(p.jacobian) if _pair(p) else None
 
 
 Root = tuple[float, CurvePoint]
@@ -196,9 +223,13 @@ def _root(system: ExtendedSystem, a: CurvePoint, b: CurvePoint, event: Event) ->
     return None if jumped else (share, known[share])
 
 
-def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Root | None:
-    """Where the counts of impacts change between two points: closed in on, then solved for."""
-    low, high, found = 0.0, 1.0, a
+def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> CodimensionTwo | None:
+    """Where the counts of impacts change between two points: closed in on, then solved for.
+
+    Its position is the share of the way.
+    """
+    name = meeting(a.condition.kind, PointKind.GRAZING)
+    low, high, found, beyond = 0.0, 1.0, a, b
     for halving in range(HALVINGS):
         middle = 0.5 * (low + high)
         point = system.between(a, b, middle)
@@ -207,69 +238,73 @@ def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Root | No
         if np.array_equal(point.impacts, a.impacts):
             low, found = middle, point
         else:
-            high = middle
-        if halving in TRIES and (root := _touching(system, found, high - low, a, b)):
-            return low, root
-    return (low, found) if high - low < 1e-6 else None
+            high, beyond = middle, point
+        if halving in TRIES:
+            reach = 2.0 * (high - low) * system.distance(a.z, b.z)
+            if touched := _touching(system, found, reach):
+                return CodimensionTwo(name, touched[0], low, *touched[1:])
+    if high - low >= 1e-6:
+        # No point lies between them at a corner; it is smooth from the side that is clear.
+        reach = 2.0 * (high - low) * system.distance(a.z, b.z)
+        for p in (found, beyond):
+            if touched := _touching(system, p, reach):
+                return CodimensionTwo(name, touched[0], low, *touched[1:])
+        return None
+    grazing, phase = next(iter(_turning(system, found)), (None, 0.0))
+    return CodimensionTwo(name, found, low, grazing, np.array([phase]))
 
 
 def _touching(
-    system: ExtendedSystem, p: CurvePoint, width: float, a: CurvePoint, b: CurvePoint
-) -> CurvePoint | None:
-    """The point near p at which a turning point touches its stop, no farther than ``width`` of the
-    way from a to b."""
-    reach = 2.0 * width * system.distance(a.z, b.z)
+    system: ExtendedSystem, p: CurvePoint, reach: float
+) -> tuple[CurvePoint, Grazing, Array] | None:
+    """The point no farther than ``reach`` from p at which a turning point touches its stop, with
+    that condition and its unknowns."""
     for grazing, phase in _turning(system, p)[:2]:
         found = system.meet(p, grazing, np.array([phase]))
-        if found is not None and system.distance(p.z, found.z) <= reach:
-            return found
+        found = _from_clear_of(system, p, grazing, phase) if found is None else found
+        if found is not None and system.distance(p.z, found[0].z) <= reach:
+            return found[0], grazing, found[1]
     return None
+
+
+def _from_clear_of(
+    system: ExtendedSystem, p: CurvePoint, grazing: Grazing, phase: float
+) -> tuple[CurvePoint, Array] | None:
+    """The meeting of a curve with a grazing from where the turning point is clear of its stop.
+
+    Where it touches, multipliers change with the square root of the penetration, which misleads
+    Newton's method. So the nearest orbit that grazes comes first; then the curve at two small
+    distances from the stop, and the line through both. None on a grazing curve.
+    """
+    if isinstance(p.condition, Grazing):
+        return None
+    n = system.states
+    _, touch = system.instead(p, grazing, np.array([phase]))
+    if touch is None:
+        return None
+    near, extra = replace(p, z=np.delete(touch.z, n)), touch.z[n : n + 1]
+    met = []
+    for clear in BESIDE:
+        found = system.meet(near, replace(grazing, clear=clear), extra)
+        if found is None:
+            return None
+        near, extra = found
+        met.append(np.concatenate([near.z, extra]))
+    onward = (BESIDE[1] - grazing.clear) / (BESIDE[0] - BESIDE[1])
+    on = met[1] + onward * (met[1] - met[0])
+    return system.meet(replace(near, z=on[:-1]), grazing, on[-1:])
 
 
 def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> CodimensionTwo | None:
     """Where a curve that cannot be followed past its point number ``index`` meets grazing: there it
-    has a corner, for beyond it the multipliers change with the square root of the penetration.
-
-    On that side the curve hugs the grazing curve, by the square of the distance from the meeting.
-    Along the grazing curve all is smooth, so it is followed to where the other kind happens too.
-    """
+    has a corner, for beyond it the multipliers change with the square root of the penetration."""
     if isinstance(p.condition, Grazing):
         return None
-    kind = p.condition.kind
-    event = meeting(kind, PointKind.GRAZING), kind
-    for grazing, phase in _turning(system, p)[:2]:
-        touching, origin = system.instead(p, grazing, np.array([phase]))
-        found = None if origin is None else _first_along(touching, origin, event)
-        if found is None:
-            continue
-        own = replace(
-            found,
-            z=np.delete(found.z, system.states),
-            tangent=p.tangent,
-            condition=p.condition.renewed(found.jacobian),
-        )
-        if system.distance(p.z, own.z) <= CORNER:
-            return CodimensionTwo(event[0], own, float(index + 1), PointKind.GRAZING)
-    return None
-
-
-def _first_along(system: ExtendedSystem, origin: CurvePoint, event: Event) -> CurvePoint | None:
-    """The nearest point to the origin along its curve at which an event happens, either way, in
-    steps that double; None within ``CORNER``."""
-    ends, step = {1.0: origin, -1.0: origin}, NEAREST
-    while step < CORNER:
-        for way, before in list(ends.items()):
-            guess = before.z + way * step * system.scale * before.tangent
-            after = system.correct(guess, before.tangent, before.condition)
-            if after is None:
-                del ends[way]
-                continue
-            ends[way] = after
-            one, other = (events(system, p).get(event, np.nan) for p in (before, after))
-            if one * other < 0.0 and (root := _root(system, before, after, event)):
-                return root[1]
-        step *= 2.0
-    return None
+    touched = _touching(system, p, CORNER)
+    if touched is None:
+        return None
+    name = meeting(p.condition.kind, PointKind.GRAZING)
+    return CodimensionTwo(name, touched[0], float(index + 1), *touched[1:])
 
 
 def _turning(system: ExtendedSystem, p: CurvePoint) -> list[tuple[Grazing, float]]:

@@ -224,13 +224,15 @@ class Grazing:
     """Grazing."""
     unknowns: int = 1
     """The phase of the turning point, in drive periods."""
+    clear: float = CLEAR
+    """How far clear of its stop the turning point is held; see ``CLEAR``."""
 
     def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
         """(2,) height, and its rate by the phase, over the peak."""
         found = height(flow, x, self.n, self.touch, float(extra[0]))
         if found is None:
             return None
-        clear = CLEAR if self.touch.tip else -CLEAR
+        clear = self.clear if self.touch.tip else -self.clear
         return np.array([found[0] / self.size + clear, found[1] / self.size])
 
     def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:

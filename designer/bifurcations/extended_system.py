@@ -131,11 +131,13 @@ class ExtendedSystem:
         """
         return self._solve(guess, border[None], condition, border if along is None else along)
 
-    def meet(self, p: CurvePoint, other: Condition, extra: Array) -> CurvePoint | None:
+    def meet(
+        self, p: CurvePoint, other: Condition, extra: Array
+    ) -> tuple[CurvePoint, Array] | None:
         """The orbit near a point of a curve that obeys another condition too, by Newton's method.
 
-        extra : the other's own unknowns there. The answer is a point of the same curve; its
-        tangent is that of p. None where there is none.
+        extra : the other's own unknowns at p. The answer is a point of the same curve, whose
+        tangent is that of p, and the other's unknowns there. None where there is none.
         """
         both = Both(p.condition, other)
         split = len(p.z) - 2
@@ -146,9 +148,17 @@ class ExtendedSystem:
         if found is None:
             return None
         own = np.concatenate([found.z[:split], found.z[-2:]])
-        return replace(
+        point = replace(
             found, z=own, tangent=p.tangent, condition=p.condition.renewed(found.jacobian)
         )
+        return point, found.z[split:-2]
+
+    def tangent(self, z: Array, condition: Condition) -> Array | None:
+        """(unknowns,) of the curve at a point that obeys the equations, unit, in scaled units; None
+        where the flow does not come to an end."""
+        value = self._value(z, condition)
+        rows = None if value is None else self._derivatives(z, value, condition)
+        return None if rows is None else np.asarray(np.linalg.svd(rows)[2][-1])
 
     def instead(
         self, p: CurvePoint, other: Condition, extra: Array

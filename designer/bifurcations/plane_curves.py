@@ -8,7 +8,7 @@ window.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,11 @@ POINTS = 1500
 """Most points of one curve in one direction."""
 CAME_BACK = 1e-4
 """In scaled units: a first point that lies so near the way between two others closes the curve."""
+
+
+AT_ORIGIN = 1e-5
+"""In scaled units: a point of codimension two that lies so near to one that a curve was begun at,
+and has its name, is that one."""
 
 
 @dataclass(frozen=True)
@@ -117,16 +122,23 @@ def followed(
     response: str,
     window: PlaneWindow,
     *,
+    ways: Sequence[float] = (1.0, -1.0),
+    begun_at: str = "",
     progress: Callable[[], None] = lambda: None,
 ) -> PlaneCurve:
-    """The curve through a point, both ways, once round where it is a loop."""
-    up = _follow(system, origin, window, progress)
-    kind = origin.condition.kind
-    if up.end == CLOSED:
-        ends = (CLOSED, CLOSED)
-        return PlaneCurve(system, kind, response, up.points, ends, up.met)
+    """The curve through a point, both ways, once round where it is a loop.
+
+    ways : 1 along the tangent, -1 against it; one alone where the curve ends at the point. begun_at
+    : name of the point where it is one of codimension two, which is not listed a second time.
+    """
     turned = replace(origin, tangent=-origin.tangent)
-    down = _follow(system, turned, window, progress)
+    begun = origin if ways[0] > 0.0 else turned
+    up = _follow(system, begun, window, begun_at, progress)
+    kind = origin.condition.kind
+    if up.end == CLOSED or len(ways) < 2:
+        ends = (CLOSED if up.end == CLOSED else begun_at, up.end)
+        return PlaneCurve(system, kind, response, up.points, ends, up.met)
+    down = _follow(system, turned, window, begun_at, progress)
     back = len(down.points) - 1
     points = tuple(replace(p, tangent=-p.tangent) for p in down.points[:0:-1]) + up.points
     met = [replace(c, position=back - c.position) for c in down.met[::-1]]
@@ -159,16 +171,35 @@ def _begun(
     halved = bifurcation.symmetric and flow.system.mirror is not None
     peaks = peaks_near(flow, x)
     jacobian = solved.jacobian * peaks / peaks[:, None]
+    values = (bifurcation.value, second)
     for condition, extra in _conditions(bifurcation, jacobian, flow, symmetric=halved):
-        scale = np.concatenate([peaks, np.ones(len(extra)), window.widths])
-        system = ExtendedSystem(plane, n, halved, len(x), scale)
-        z = np.concatenate([x, extra, [bifurcation.value, second]])
+        system = system_at(plane, values, x, n, extra, window, symmetric=halved)
+        z = np.concatenate([x, extra, values])
         border = np.zeros(len(z))
         border[-1] = 1.0
         found = system.correct(z, border, condition)
         if found is not None and abs(found.values[0] - bifurcation.value) < _near(bifurcation):
             return system, found
     return None
+
+
+def system_at(
+    plane: FlowPlane,
+    values: tuple[float, float],
+    x: Array,
+    n: int,
+    extra: Array,
+    window: PlaneWindow,
+    *,
+    symmetric: bool,
+) -> ExtendedSystem:
+    """The equations of a curve near an orbit of period n with state x at the strobe.
+
+    values : of both parameters there. extra : the condition's own unknowns.
+    """
+    peaks = peaks_near(plane.build(*values), x)
+    scale = np.concatenate([peaks, np.ones(len(extra)), window.widths])
+    return ExtendedSystem(plane, n, symmetric, len(x), scale)
 
 
 def _near(bifurcation: Bifurcation) -> float:
@@ -191,7 +222,11 @@ def _conditions(
 
 
 def _follow(
-    system: ExtendedSystem, origin: CurvePoint, window: PlaneWindow, progress: Callable[[], None]
+    system: ExtendedSystem,
+    origin: CurvePoint,
+    window: PlaneWindow,
+    begun_at: str,
+    progress: Callable[[], None],
 ) -> _Followed:
     """From the origin on in the direction of its tangent."""
     points, met = [origin], list[CodimensionTwo]()
@@ -215,6 +250,8 @@ def _follow(
         new, end_here = (new, "") if edge is None else edge
         before, current = current, watched(system, new)
         here = locate(system, before, current, len(points) - 1)
+        if len(points) == 1:
+            here = [c for c in here if c.name != begun_at or not _at_origin(system, c, origin)]
         last = next((c for c in here if c.name in ENDS or _pair_ends(c)), None)
         if last is not None:
             met += here[: here.index(last) + 1]
@@ -240,6 +277,10 @@ def _follow(
         met.append(last)
         end = last.name
     return _Followed(tuple(points), end, tuple(met))
+
+
+def _at_origin(system: ExtendedSystem, c: CodimensionTwo, origin: CurvePoint) -> bool:
+    return system.distance(c.point.z, origin.z) < AT_ORIGIN
 
 
 def _pair_ends(c: CodimensionTwo) -> bool:

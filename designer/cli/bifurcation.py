@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from designer.base.defaults import SEED
+from designer.base.defaults import CURVE_DEPTH, SEED
 from designer.base.errors import InputError
 from designer.cli.app import Out, Output, Seed, Session, Source, option, verb
 
@@ -69,6 +69,15 @@ def bifurcation(
         tuple[str, str, str] | None,
         option("--and", "NAME A B", "Continue the points as curves over this parameter too."),
     ] = None,
+    depth: Annotated[
+        int | None,
+        option(
+            "--depth",
+            "K",
+            "With --and: K times in a row, begin the other curves where curves meet "
+            f"[{CURVE_DEPTH}].",
+        ),
+    ] = None,
     region: Annotated[
         str | None,
         option("--region", "V", "With --and: where the response at this value of --over lives."),
@@ -113,6 +122,7 @@ def bifurcation(
         keep=keep,
         map_=map_,
         and_=and_,
+        depth=depth,
         region=region,
         basins=basins,
         circuit=circuit,

@@ -95,6 +95,7 @@ def _shares(answer: Mapping[str, Any]) -> None:
 def _curves(answer: Mapping[str, Any]) -> None:
     """Every curve, and below them the points of codimension two."""
     first, second = answer["parameter"], answer["and"]["name"]
+    switched = any(c.get("begun_at") for c in answer["curves"])
     table(
         f"Bifurcation curves over {first} and {second}",
         (
@@ -109,6 +110,7 @@ def _curves(answer: Mapping[str, Any]) -> None:
                         ("from", "to"), (c["points"][0], c["points"][-1]), c["ends"], strict=True
                     )
                 },
+                **({"begun at": _begun_at(c)} if switched else {}),
             }
             for number, c in enumerate(answer["curves"][:LONGEST], 1)
         ),
@@ -116,7 +118,22 @@ def _curves(answer: Mapping[str, Any]) -> None:
     for number, c in enumerate(answer["curves"][:LONGEST], 1):
         for met in c["codimension_two"]:
             a, b = met["values"]
-            say(f"curve {number}: {met['kind']} at {first} = {a:.9g}, {second} = {b:.9g}")
+            text = f"curve {number}: {met['kind']} at {first} = {a:.9g}, {second} = {b:.9g}"
+            say(text + _other_curve(met))
+
+
+def _begun_at(curve: Mapping[str, Any]) -> str:
+    """Where a curve was switched to."""
+    at = curve.get("begun_at")
+    return f"curve {at['curve']}, {at['kind']}" if at else ""
+
+
+def _other_curve(met: Mapping[str, Any]) -> str:
+    """What became of the other curve at a point of codimension two; "" in older answers."""
+    if not met.get("status"):
+        return ""
+    kind = "other curve" if met["other"] is None else met["other"]["kind"]
+    return f" ({kind}: " + (f"curve {met['curve']})" if met["curve"] else f"{met['status']})")
 
 
 def _region(answer: Mapping[str, Any]) -> Iterator[str]:

@@ -12,7 +12,8 @@ import numpy as np
 from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.bifurcations import border_curves, parameter_map
-from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.border_curve import BorderCurve
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapCell, MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.dynamics.orbit import Orbit, OrbitStatus

@@ -9,10 +9,31 @@ import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
 from designer.base.parquet_entry import ParquetForm
-from designer.bifurcations.border_curves import BLOCKS, BorderCurve, read_curve
+from designer.bifurcations.border_curve import BorderCurve, CurveOrigin, read_curve
+from designer.bifurcations.border_curves import BLOCKS
 from designer.folders.work_files import WorkFiles
 
-_MEETING = pa.struct([("kind", pa.string()), ("values", pa.list_(pa.float64()))])
+_TOUCH = pa.struct(
+    [
+        ("clearance", pa.int64()),
+        ("side", pa.int64()),
+        ("tip", pa.bool_()),
+        ("phase", pa.float64()),
+        ("size", pa.float64()),
+    ]
+)
+_OTHER = pa.struct(
+    [
+        ("kind", pa.string()),
+        ("n", pa.int64()),
+        ("state", pa.list_(pa.float64())),
+        ("stable", pa.bool_()),
+        ("touch", _TOUCH),
+    ]
+)
+_VALUES = ("values", pa.list_(pa.float64()))
+_MEETING = pa.struct([("kind", pa.string()), _VALUES, ("other", _OTHER)])
+_ORIGIN = pa.struct([("curve", pa.int64()), ("kind", pa.string()), _VALUES])
 _FORM = ParquetForm(
     pa.schema(
         [
@@ -23,6 +44,7 @@ _FORM = ParquetForm(
             ("stable", pa.list_(pa.bool_())),
             ("ends", pa.list_(pa.string())),
             ("codimension_two", pa.list_(_MEETING)),
+            ("begun_at", _ORIGIN),
         ]
     )
 )
@@ -36,31 +58,45 @@ class CurveBlocks:
     """Where the blocks lie."""
 
     @staticmethod
-    def names() -> list[str]:
-        """File names of all blocks, inside the folder."""
-        return [f"curves.parquet/block-{k:06d}.parquet" for k in range(BLOCKS)]
+    def names(depth: int) -> list[str]:
+        """File names of all blocks, inside the folder. depth : see ``border_curves.CurvePlan``."""
+        return [CurveBlocks.name(k) for k in range(BLOCKS * (1 + depth))]
+
+    @staticmethod
+    def name(block: int) -> str:
+        """File name of a block, inside the folder."""
+        return f"curves.parquet/block-{block:06d}.parquet"
 
     def read(self, block: int) -> list[BorderCurve] | None:
         """The curves of a finished block of this very work, or None."""
-        rows = self.files.read(self.names()[block], _FORM, block=block)
+        rows = self.files.read(self.name(block), _FORM, block=block)
         return None if rows is None else [read_curve(row) for row in rows]
 
     def write(self, block: int, curves: Sequence[BorderCurve]) -> None:
         """Keep a finished block, a row a curve."""
         rows = [curve.as_dict() for curve in curves]
-        self.files.write(self.names()[block], _FORM, rows, block=block)
+        self.files.write(self.name(block), _FORM, rows, block=block)
 
 
 def curves_csv(curves: Sequence[BorderCurve], first: str, second: str) -> str:
     """A row a point: the curve's number, kind, response, symmetry, both values, whether the orbit
-    is stable on one side; points of codimension two follow their curve, with their name as kind."""
-    columns = ("curve", "kind", "response", "symmetric", first, second, "stable")
+    is stable on one side, and where the curve was begun if it was switched to; points of
+    codimension two follow their curve, with their name as kind."""
+    columns = ("curve", "kind", "response", "symmetric", first, second, "stable", "begun_at")
     rows = []
     for number, c in enumerate(curves, 1):
         head = {"curve": str(number), "response": c.response, "symmetric": str(c.symmetric).lower()}
+        head["begun_at"] = origin_text(c.begun_at)
         for (a, b), stable in zip(c.points.tolist(), c.stable, strict=True):
             at = {"kind": c.kind, first: repr(a), second: repr(b), "stable": str(stable).lower()}
             rows.append({**head, **at})
-        for name, a, b in c.codimension_two:
-            rows.append({**head, "kind": name, first: repr(a), second: repr(b), "stable": ""})
+        for met in c.codimension_two:
+            a, b = met.values
+            at = {"kind": met.name, first: repr(a), second: repr(b), "stable": ""}
+            rows.append({**head, **at})
     return csv_text(columns, rows)
+
+
+def origin_text(origin: CurveOrigin | None) -> str:
+    """Such as "fold-flip of curve 3"; "" of a curve through a point of the sweep."""
+    return "" if origin is None else f"{origin.name} of curve {origin.curve}"

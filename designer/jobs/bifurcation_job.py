@@ -92,6 +92,7 @@ def bifurcation(
     keep: int | None = None,
     map_: tuple[str, float | str, float | str, int] | None = None,
     and_: tuple[str, float | str, float | str] | None = None,
+    depth: int | None = None,
     region: float | str | None = None,
     basins: bool = False,
     circuit: bool = False,
@@ -109,7 +110,8 @@ def bifurcation(
 
     model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
     texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. ``and_`` : (name,
-    from, to) of a second parameter, over which the sweep's points are continued as curves. region :
+    from, to) of a second parameter, over which the sweep's points are continued as curves. depth :
+    how many times in a row the other curves at points of codimension two are begun too. region :
     a value of the swept parameter: the region in both parameters of the response there. shares :
     random starts at each value, of which it is counted on which attractor they end; box : (state,
     least, greatest) of where they are drawn from; seed : of the draw. out : a folder to write into;
@@ -134,6 +136,7 @@ def bifurcation(
         keep=keep,
         second=map_,
         and_=and_,
+        depth=depth,
         region=region,
         basins=basins,
         circuit=circuit,

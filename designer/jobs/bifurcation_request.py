@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import SEED, at_least
+from designer.base.defaults import CURVE_DEPTH, SEED, at_least
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.schema import one_of
@@ -28,6 +28,8 @@ from designer.model.swept_model import ModelSubject
 from designer.spread import random_streams
 
 MOST_STEPS, MOST_STARTS, MOST_PERIODS = 100_000, 64, 1_000_000
+MOST_DEPTH = 100
+"""Of curves that are begun at points of codimension two of others."""
 MOST_CELLS = 4_000_000
 """Of a map or a basin."""
 BASIN_STEPS = 200
@@ -68,6 +70,9 @@ class Request:
     """(name, from, to, steps) of a map's or a basin's other axis."""
     and_: tuple[str, float | str, float | str] | None = None
     """(name, from, to) of the second parameter that the sweep's points are continued over."""
+    depth: int | None = None
+    """How many times in a row other curves are begun at points of codimension two; None for the
+    default."""
     region: float | str | None = None
     """Value of the swept parameter at which a response lives whose region is sought."""
     basins: bool = False
@@ -159,7 +164,8 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
         raise InputError(None, "--and", f"{name} from {low:g} to {high:g}", expected)
     values = plan.values
     window = PlaneWindow((float(values[0]), float(values[-1])), (low, high))
-    return CurvePlan(subject, plan.parameter, name, float(at), window)
+    depth = CURVE_DEPTH if request.depth is None else request.depth
+    return CurvePlan(subject, plan.parameter, name, float(at), window, depth)
 
 
 def region_at(request: Request, plan: SweepPlan, modelfile: ModelFile) -> float | None:
@@ -256,6 +262,12 @@ def _check_options(request: Request) -> None:
         raise InputError(None, "--shares", request.shares, "a sweep: none of --map and --basins")
     if request.box and request.shares is None:
         raise InputError(None, "--box", request.box[0][0], "a number of starts too: --shares")
+    if request.depth is not None:
+        at_least("--depth", request.depth, 0)
+        if request.depth > MOST_DEPTH:
+            raise InputError(None, "--depth", request.depth, f"at most {MOST_DEPTH}")
+        if request.and_ is None:
+            raise InputError(None, "--depth", request.depth, "a second parameter too: --and")
     if request.region is not None and request.and_ is None:
         raise InputError(None, "--region", request.region, "a second parameter too: --and")
     if request.periods is not None:

@@ -20,7 +20,8 @@ from designer.bifurcations import (
     window_ends,
 )
 from designer.bifurcations.basin_shares import BasinShares
-from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.border_curve import BorderCurve
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.response_region import ResponseRegion, SpreadBox
 from designer.bifurcations.sweep import Sweep, SweepPlan
@@ -48,7 +49,7 @@ def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
     if work.shares is not None:
         names += [*ShareBlocks.names(work.shares), "shares.csv"]
     if work.curves is not None:
-        names += [*CurveBlocks.names(), *CURVE_FILES]
+        names += [*CurveBlocks.names(work.curves.depth), *CURVE_FILES]
     return names
 
 
@@ -189,5 +190,5 @@ def _curves(
     if folder is not None:
         store = CurveBlocks(work.files(folder))
     over = f"bifurcation curves over {plan.first} and {plan.second}"
-    step = work.progress.stage(over, border_curves.BLOCKS)
+    step = work.progress.stage(over, border_curves.BLOCKS * (1 + plan.depth))
     return border_curves.run(plan, points, work.jobs, store, step)

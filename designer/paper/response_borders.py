@@ -21,7 +21,8 @@ from designer.base.figure_style import picture
 from designer.base.page import paragraphs
 from designer.base.progress import Progress
 from designer.bifurcations import border_curves
-from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.border_curve import BorderCurve
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.windows import BranchWindow, window
 from designer.circuit.paper_values import MODEL
@@ -78,7 +79,7 @@ def response_borders(
     at = MODEL.parameter(second)
     plan = CurvePlan(ModelSubject(MODEL), "omega", second, at, plane_window)
     points = [end.point for w in windows for end in (w.low, w.high) if end.point is not None]
-    step = progress.stage(f"Borders over ω and {second}", border_curves.BLOCKS)
+    step = progress.stage(f"Borders over ω and {second}", border_curves.BLOCKS * (1 + plan.depth))
     curves = border_curves.run(plan, points, jobs, progress=step)
     named = tuple((w.response, w.low.value, w.high.value) for w in windows)
     return ResponseBorders(plan, tuple(curves), named)

@@ -14,7 +14,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.bifurcations.border_curves import BorderCurve, CurvePlan
+from designer.bifurcations.border_curve import BorderCurve
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.response_region import EDGE, ResponseRegion
 from designer.plots.response_colours import MARKS, OTHERS, SHADES
 from designer.plots.si_axes import si_x, si_y
@@ -31,6 +32,8 @@ BESIDE = 3
 WIDE = 5.0
 """A window whose greatest value is this many times its least: windows of responses crowd at its
 lower end."""
+SWITCHED = (0, (3.5, 1.2))
+"""Dashes of a curve that was begun where others meet."""
 UPRIGHT = 0.012
 """Of the axes: width of a name that is written upwards, for want of room."""
 
@@ -69,6 +72,8 @@ def curves(
     ]
     if not all(all(c.stable) for c in lines):
         handles.append(Line2D([], [], color=MUTED, lw=0.6, label="no stable orbit beside it"))
+    if any(c.begun_at is not None for c in lines):
+        handles.append(Line2D([], [], color=MUTED, lw=1.6, ls=SWITCHED, label="begun at a meeting"))
     handles += _meetings(axes, lines)
     second = NAMES.get(plan.second, plan.second)
     axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
@@ -91,12 +96,14 @@ def curves(
 
 
 def _line(axes: Axes, curve: BorderCurve) -> None:
-    """A curve, thin; on top of it thick what bounds a stable response."""
-    colour = MARKS[curve.kind][1]
-    axes.plot(*curve.points.T, color=colour, lw=0.6, zorder=2)
+    """A curve, thin; on top of it thick what bounds a stable response. Dashed where it was begun at
+    a point of codimension two."""
+    look: dict[str, Any] = {"color": MARKS[curve.kind][1]}
+    look |= {} if curve.begun_at is None else {"ls": SWITCHED}
+    axes.plot(*curve.points.T, lw=0.6, zorder=2, **look)
     thick = curve.points.copy()
     thick[~np.array(curve.stable)] = np.nan
-    axes.plot(*thick.T, color=colour, lw=1.6, zorder=3)
+    axes.plot(*thick.T, lw=1.6, zorder=3, **look)
 
 
 def _meetings(axes: Axes, lines: Sequence[BorderCurve]) -> list[Line2D]:
@@ -105,10 +112,11 @@ def _meetings(axes: Axes, lines: Sequence[BorderCurve]) -> list[Line2D]:
     widths = np.ptp(np.concatenate([curve.points for curve in lines]), axis=0) if lines else 1.0
     places: dict[str, list[tuple[float, float]]] = {}
     for curve in lines:
-        for name, a, b in curve.codimension_two:
-            away = np.linalg.norm((curve.points - [a, b]) / np.maximum(widths, 1e-300), axis=1)
-            if any(curve.stable[k] for k in np.argsort(away)[:BESIDE]):
-                places.setdefault(name, []).append((a, b))
+        for met in curve.codimension_two:
+            off = (curve.points - met.values) / np.maximum(widths, 1e-300)
+            nearest = np.argsort(np.linalg.norm(off, axis=1))[:BESIDE]
+            if any(curve.stable[k] for k in nearest):
+                places.setdefault(met.name, []).append(met.values)
     handles = []
     for k, (name, at) in enumerate(sorted(places.items())):
         look: dict[str, Any] = {"marker": MEETINGS[k % len(MEETINGS)], "ms": 4, "mew": 0.8}

@@ -16,10 +16,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 from designer.base.arrays import Array
-from designer.bifurcations.codimension_two import CodimensionTwo
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.flow_family import Family, FlowPlane
-from designer.bifurcations.plane_curves import PlaneWindow, continued
+from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -100,16 +99,16 @@ class Oscillators:
         return z[:n], phi
 
 
-def on_the_fold_curve(
+def curve_of_the_fold(
     plane: FlowPlane, states: int, omega: float, second: float, window: PlaneWindow
-) -> tuple[CodimensionTwo, ...]:
-    """Points of codimension two on the curve of a fold of the orbit that rest leads to at ω."""
+) -> PlaneCurve:
+    """The curve of a fold of the orbit that rest leads to at ω."""
     over = plane.along_first(second)
     begun = start(over, settle(over.flow(omega), np.zeros(states)), omega)
     fold = next(p for p in locate(trace(begun, *window.first)) if p.kind is PointKind.FOLD)
     followed = continued(plane, fold, second, window)
     assert followed is not None
-    return followed.codimension_two
+    return followed
 
 
 def solved(equations: Callable[[Array], Array], begun: Array) -> Array:
@@ -126,6 +125,13 @@ def plane_of(system: Callable[[float], Oscillators], c: float, omega: float) -> 
         Family("c", 0.0, 1.0, lambda c: system(c).flow(omega)),
         lambda w, c: system(c).flow(w),
     )
+
+
+def two_coupled(c: float) -> Oscillators:
+    """The first mass has the bent resonance, the second doubles its period; a spring between."""
+    stiffness = np.array([[1.02, -0.02], [-0.02, 0.34]])
+    force, stops = np.array([1.0, 0.32]), ((5.0, 3.0), (0.1, 0.96))
+    return Oscillators(np.array([c, 0.05]), stiffness, force, stops)
 
 
 @pytest.mark.slow
@@ -148,7 +154,7 @@ def test_the_cusp_in_which_both_folds_of_a_bent_resonance_meet() -> None:
         return np.array([*(end - x), det, (beside[0] - beside[1]) / 2e-5])
 
     plane, window = plane_of(damped, 0.14, 1.06), PlaneWindow((1.035, 1.12), (0.13, 0.18))
-    (cusp,) = on_the_fold_curve(plane, 2, 1.06, 0.14, window)
+    (cusp,) = curve_of_the_fold(plane, 2, 1.06, 0.14, window).codimension_two
     assert cusp.name == "cusp"
     root = solved(equations, cusp.point.z + 1e-5)
     assert cusp.values == pytest.approx(root[2:], abs=1e-8)
@@ -157,20 +163,13 @@ def test_the_cusp_in_which_both_folds_of_a_bent_resonance_meet() -> None:
 
 @pytest.mark.slow
 def test_the_fold_flip_of_two_coupled_oscillators() -> None:
-    """The first mass has the bent resonance, the second doubles its period; a spring between."""
-
-    def coupled(c: float) -> Oscillators:
-        stiffness = np.array([[1.02, -0.02], [-0.02, 0.34]])
-        force, stops = np.array([1.0, 0.32]), ((5.0, 3.0), (0.1, 0.96))
-        return Oscillators(np.array([c, 0.05]), stiffness, force, stops)
-
     def equations(u: Array) -> Array:
-        end, M = coupled(u[5]).period(u[:4], u[4])
+        end, M = two_coupled(u[5]).period(u[:4], u[4])
         eye = np.eye(4)
         return np.array([*(end - u[:4]), np.linalg.det(M - eye), np.linalg.det(M + eye)])
 
-    plane, window = plane_of(coupled, 0.07, 1.1), PlaneWindow((1.09, 1.22), (0.068, 0.08))
-    (met,) = on_the_fold_curve(plane, 4, 1.1, 0.07, window)
+    plane, window = plane_of(two_coupled, 0.07, 1.1), PlaneWindow((1.09, 1.22), (0.068, 0.08))
+    (met,) = curve_of_the_fold(plane, 4, 1.1, 0.07, window).codimension_two
     assert met.name == "fold-flip"
     root = solved(equations, met.point.z + 1e-6)
     assert met.values == pytest.approx(root[4:], abs=1e-8)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from designer.base.arrays import Array
-from designer.bifurcations.border_curves import BorderCurve, read_curve
+from designer.bifurcations.border_curve import BorderCurve, read_curve
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.conditions import (
     Condition,

@@ -38,7 +38,7 @@ def _build(c: float, omega: float, damper: float) -> Flow:
 
 
 @cache
-def _curve(
+def curve(
     kind: PointKind, first: str, omega: float, window: PlaneWindow, damper: float
 ) -> PlaneCurve:
     """Through the point of a kind nearest to where rest leads to at c = 0.05."""
@@ -58,7 +58,7 @@ def _curve(
     return followed
 
 
-def _monodromy(x: Array, c: float, omega: float, n: int, damper: float) -> tuple[Array, Array]:
+def monodromy(x: Array, c: float, omega: float, n: int, damper: float) -> tuple[Array, Array]:
     """State after n periods, and the variational solution, by DOP853 restarted at every event; its
     jump there is that of the force (Aizerman and Gantmakher)."""
     t, end, touched = 0.0, 2.0 * np.pi * n / omega, bool(x[0] > GAP)
@@ -92,7 +92,7 @@ def _resonance(value: float, x: Array, place: Array, n: int, damper: float) -> A
     determinant 1."""
 
     def equations(u: Array) -> Array:
-        end, matrix = _monodromy(u[:2], float(u[2]), float(u[3]), n, damper)
+        end, matrix = monodromy(u[:2], float(u[2]), float(u[3]), n, damper)
         return np.array([*(end - u[:2]), np.trace(matrix) - value, np.linalg.det(matrix) - 1.0])
 
     found = fsolve(equations, [*x, *(place + 1e-5)], xtol=1e-11)
@@ -111,7 +111,7 @@ DAMPERS = (0.0, 0.01)
 def test_torus_curve_of_an_impacting_orbit_ends_in_a_resonance(damper: float) -> None:
     """That of 3-2-0; its pair is a quarter of a turn on the way, and becomes real."""
     window = PlaneWindow((-0.05, 0.05), (1.85, 1.91))
-    followed = _curve(PointKind.TORUS, "c", 1.89, window, damper)
+    followed = curve(PointKind.TORUS, "c", 1.89, window, damper)
     along = followed.values[:, 0]
     assert np.abs(along).max() < 1e-9 if not damper else (along < -1e-3).all()
     assert "1:1 resonance" in followed.ends
@@ -128,7 +128,7 @@ def test_torus_curve_of_an_impacting_orbit_ends_in_a_resonance(damper: float) ->
 @pytest.mark.parametrize("damper", DAMPERS)
 def test_doubling_curve_of_an_impacting_orbit_meets_its_resonance(damper: float) -> None:
     window = PlaneWindow((2.0, 2.3), (-0.05, 0.1))
-    followed = _curve(PointKind.DOUBLING, "omega", 2.1, window, damper)
+    followed = curve(PointKind.DOUBLING, "omega", 2.1, window, damper)
     (met,) = [c for c in followed.codimension_two if c.name == "1:2 resonance"]
     place = np.array(met.values[::-1])
     exact = _resonance(-2.0, met.point.z[:2], place, 1, damper)

@@ -317,9 +317,9 @@ def test_curves_over_a_second_parameter(
         ["edge of b", "edge of b"],
     )
     assert min(abs(w - answer["points"][0]["value"]) for w, _ in curve["points"]) < 1e-9
-    assert answer["and"] == {"name": "b", "from": 0.22, "to": 0.28, "at": 0.25}
+    assert answer["and"] == {"name": "b", "from": 0.22, "to": 0.28, "at": 0.25, "depth": 1}
     header, *rows = (out / "curves.csv").read_text().splitlines()
-    assert header == "curve,kind,response,symmetric,omega,b,stable"
+    assert header == "curve,kind,response,symmetric,omega,b,stable,begun_at"
     assert len(rows) == len(curve["points"])
     kept = [
         row
