@@ -2,9 +2,7 @@ from . import (
     basin_shares as basin_shares,
     basins as basins,
     border_curves as border_curves,
-    captions as captions,
     parameter_map as parameter_map,
-    point_captions as point_captions,
     response_region as response_region,
     sweep as sweep,
     window_ends as window_ends,
@@ -24,6 +22,7 @@ from .basins import (
 )
 from .border_curve import (
     BorderCurve as BorderCurve,
+    CurveOrigin as CurveOrigin,
     read_curve as read_curve,
 )
 from .border_curves import (
@@ -54,11 +53,10 @@ from .parameter_map import (
 from .plane_curves import (
     PlaneWindow as PlaneWindow,
 )
-from .point_captions import (
-    caption as caption,
-)
 from .points import (
+    SIDES as SIDES,
     Bifurcation as Bifurcation,
+    Birth as Birth,
     PointKind as PointKind,
 )
 from .response_region import (

@@ -13,8 +13,6 @@ from designer.base.errors import InputError
 from designer.bifurcations import (
     basin_shares,
     border_curves,
-    captions,
-    point_captions,
     response_region,
     sweep,
     window_ends,
@@ -32,7 +30,7 @@ from designer.folders.curve_store import CurveBlocks, curves_csv
 from designer.folders.share_store import ShareBlocks, shares_csv
 from designer.folders.sweep_store import SweepStore
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
-from designer.plots import titles
+from designer.plots import captions, point_captions, titles
 from designer.spread.spread import draw_many
 
 SPREAD_BOARDS = 200

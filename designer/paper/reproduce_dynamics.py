@@ -25,7 +25,6 @@ from designer.base.progress import Progress
 from designer.base.report_pieces import check_report_folder
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
-from designer.bifurcations.point_captions import caption
 from designer.bifurcations.windows import all_windows, outside
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
@@ -50,6 +49,7 @@ from designer.paper.response_borders import SECOND, response_borders
 from designer.paper.response_order import gaps
 from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
 from designer.plots import bifurcation_plots
+from designer.plots.point_captions import caption
 
 FORMAT = 1
 COMMAND = "designer reproduce dynamics --out reports/paper-dynamics"

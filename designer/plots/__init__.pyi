@@ -1,10 +1,12 @@
 from . import (
     bifurcation_plots as bifurcation_plots,
     blame_plots as blame_plots,
+    captions as captions,
     curve_plots as curve_plots,
     map_plots as map_plots,
     model_drawing as model_drawing,
     orbit_plots as orbit_plots,
+    point_captions as point_captions,
     simulate_plots as simulate_plots,
     study_plots as study_plots,
     system_drawing as system_drawing,
@@ -12,6 +14,9 @@ from . import (
 )
 from .map_plots import (
     map_files as map_files,
+)
+from .point_captions import (
+    caption as caption,
 )
 from .record_plots import (
     record_figure as record_figure,

@@ -15,7 +15,6 @@ from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.continuation import End, start, trace
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.parameter_map import MapPlan
-from designer.bifurcations.point_captions import caption
 from designer.bifurcations.points import PointKind, locate
 from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.attractors import settle
@@ -25,6 +24,7 @@ from designer.folders.sweep_store import GridStore, SweepStore
 from designer.folders.work_files import WorkFiles
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
+from designer.plots.point_captions import caption
 from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
 from tests.shared.system_text import clearance, system_text, table

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.bifurcations.point_captions import caption, doubled, label
 from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.bifurcations.sweep import DOWN, Sweep
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
+from designer.plots.point_captions import caption, doubled, label
 
 LAG = 2
 """Steps past a point within which its change has to show: motion near one settles slowly."""

@@ -10,9 +10,7 @@ import pytest
 
 from designer.bifurcations import (
     basins,
-    captions,
     parameter_map,
-    point_captions,
     sweep,
     window_ends,
 )
@@ -27,7 +25,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course
 from designer.model.swept_model import ModelSubject
-from designer.plots import bifurcation_plots, titles
+from designer.plots import bifurcation_plots, captions, point_captions, titles
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.figure_text import clipped, overlapping
 

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from designer.bifurcations.branch_switch import birth
-from designer.bifurcations.captions import changes
 from designer.bifurcations.continuation import Branch, start, trace
-from designer.bifurcations.point_captions import caption
 from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.dynamics.attractors import settle
@@ -23,6 +21,8 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 from designer.model import swept_model
 from designer.model.swept_model import ModelSubject
+from designer.plots.captions import changes
+from designer.plots.point_captions import caption
 from tests.bifurcations.test_continuation import PAPER, PLAIN, monodromy
 from tests.shared.oracles import Trajectory, integrate
 
