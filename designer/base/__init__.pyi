@@ -236,6 +236,7 @@ from .sexpr import (
 from .si_unit import (
     DIGITS as DIGITS,
     Unit as Unit,
+    prefixed as prefixed,
     suffix as suffix,
     value_text as value_text,
 )

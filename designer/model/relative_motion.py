@@ -7,7 +7,7 @@ a mass, y of the base, and in a clearance the difference that the stops see.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,28 @@ class RelativeMotion:
     """Amplitude of the base's motion in it."""
     stops: tuple[tuple[int, float], ...]
     """(side, displacement) where contact begins, 1 upper and -1 lower."""
+    scale: float = 1.0
+    """How many of the units that values are shown in are one unit of the model."""
+    unit: str = ""
+    """Unit that displacements are shown in, such as "mm"; "" for the model's own without a name."""
+
+    def in_unit(self, scale: float, unit: str) -> RelativeMotion:
+        """The same motion of a model in metres in another unit, of which ``scale`` are a metre."""
+        return replace(
+            self,
+            row=scale * self.row,
+            base=scale * self.base,
+            stops=tuple((side, scale * place) for side, place in self.stops),
+            scale=scale,
+            unit=unit,
+        )
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """What the axes of displacement and velocity are called, with their units."""
+        if not self.unit:
+            return self.symbol, self.rate
+        return f"{self.symbol} [{self.unit}]", f"{self.rate} [{self.unit}/s]"
 
     @property
     def label(self) -> str:

@@ -48,7 +48,7 @@ def phase_portrait(
     clearance: int = 0,
 ) -> Figure:
     """One response in the plane of displacement and velocity in a clearance, all engines over each
-    other, in model units.
+    other, in the motion's units.
 
     The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
     mark where an impact begins; beyond the stops there is contact. motion : in the clearance with
@@ -95,7 +95,7 @@ def time_traces(
     axes.yaxis.set_major_locator(MaxNLocator(4))
     length = f"{1e3 / checked.excitation.frequency:.3g} ms"
     axes.set_xlabel(f"drive periods ({length} each on the bench)", size=8)
-    axes.set_ylabel(motion.symbol)
+    axes.set_ylabel(motion.axes[0])
     return figure
 
 
@@ -177,7 +177,7 @@ def _portrait(
     model = checked.model.orbit
     for side, place in motion.stops:
         at_stop = (model.impact_sides == side) & (model.impact_clearances == clearance)
-        entry = model.impact_velocities[at_stop]
+        entry = motion.scale * model.impact_velocities[at_stop]
         axes.plot(
             np.full(len(entry), place),
             entry,
@@ -191,8 +191,9 @@ def _portrait(
     axes.set_ylim(*ylim)
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))
-    axes.set_xlabel(motion.symbol)
-    axes.set_ylabel(motion.rate)
+    x_label, y_label = motion.axes
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
     names = [f"{name} {orbit.response}" for name, orbit in orbits.items()]
     text = "   ".join(names)
     if len(text) > WIDEST_TITLE:

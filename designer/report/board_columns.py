@@ -131,7 +131,8 @@ def shown_boards(data: ReportData) -> list[Answer]:
 
 
 def _orbits(data: ReportData) -> Iterator[dict[str, Any]]:
-    """The motions of ``shown_boards`` in model units, clearance by clearance."""
+    """The motions of ``shown_boards`` in the units of its portraits, clearance by
+    clearance."""
     shown = shown_boards(data)
     samples = sorted({a.sample for a in shown})
     boards = data.plan.boards(range(data.plan.samples)).take(samples)

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
+from designer.base.si_unit import prefixed
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import Numbers, components, pin_numbers, to_buy
@@ -20,6 +23,7 @@ from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
 from designer.model.relative_motion import RelativeMotion, relative_motions
+from designer.model.si_units import in_si
 from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
@@ -96,9 +100,17 @@ class ReportData:
         return tuple(traces(self.design, c) for c in self.checked)
 
     def motions(self, response: int) -> tuple[RelativeMotion, ...]:
-        """What moves in each clearance at a response, by its own stops."""
-        model = self.design.model.at(self.checked[response].model.b)
-        return relative_motions(model.second_order())
+        """What moves in each clearance at a response, by its own stops; of a model whose numbers
+        are SI values in the unit that suits the largest displacement, such as mm."""
+        checked = self.checked[response].model
+        model = self.design.model.at(checked.b)
+        motions = relative_motions(model.second_order())
+        if not in_si(self.si, model):
+            return motions
+        places = [abs(gap) for motion in motions for gap in motion.gaps]
+        moved = checked.orbit.extremes[0::2] if len(checked.orbit.extremes) else np.zeros(0)
+        metres, unit = prefixed(max([*places, *np.abs(moved).ravel().tolist()], default=1.0), "m")
+        return tuple(motion.in_unit(1.0 / metres, unit) for motion in motions)
 
     @cached_property
     def stops(self) -> tuple[PredictedStop, ...]:

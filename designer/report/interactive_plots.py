@@ -126,9 +126,9 @@ def _orbit(
     c: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion, clearance: int
 ) -> Model:
     """Phase portrait over the displacement in time, every engine over each other."""
-    portrait = _figure(315, motion.symbol, motion.rate)
+    portrait = _figure(315, *motion.axes)
     portrait.title = Title(text=_title(c), text_color=INK)
-    wave = _figure(180, "drive periods", motion.symbol)
+    wave = _figure(180, "drive periods", motion.axes[0])
     for plot, along in ((portrait, "width"), (wave, "height")):
         _shade(plot, motion.stops, along)
     lines: list[Any] = []
@@ -146,8 +146,8 @@ def _orbit(
     _impacts(portrait, c, motion, clearance)
     tips = [
         ("", "$name"),
-        (motion.symbol, f"@x{_NUMBER}"),
-        (motion.rate, f"@v{_NUMBER}"),
+        (motion.axes[0], f"@x{_NUMBER}"),
+        (motion.axes[1], f"@v{_NUMBER}"),
         ("periods", f"@t{_NUMBER}"),
     ]
     _hover(portrait, lines, tips)
@@ -196,7 +196,7 @@ def _shade(plot: figure, stops: Sequence[tuple[int, float]], dimension: str) -> 
 def _impacts(plot: figure, c: CheckedResponse, motion: RelativeMotion, clearance: int) -> None:
     orbit, places = c.model.orbit, dict(motion.stops)
     here = (orbit.impact_clearances == clearance) & np.isin(orbit.impact_sides, list(places))
-    sides, velocities = orbit.impact_sides[here], orbit.impact_velocities[here]
+    sides, velocities = orbit.impact_sides[here], motion.scale * orbit.impact_velocities[here]
     if not len(sides):
         return
     columns = {

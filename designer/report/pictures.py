@@ -32,11 +32,11 @@ from designer.report.plot_names import portrait_name, stop_name
 from designer.schematic import schematic_drawing
 
 INTRO = (
-    "Displacement x₁ and velocity x₁′ of mass 1, in the model's units, over one response; below, "
+    "Displacement x₁ and velocity x₁′ of mass 1 over one response; below, "
     "x₁ over time. The engines lie on each other where they agree."
 )
 EVERY_CLEARANCE = (
-    "Displacement and velocity in each clearance, in the model's units, over one response; below, "
+    "Displacement and velocity in each clearance over one response; below, "
     "the displacement over time. The engines lie on each other where they agree."
 )
 KEY = (
@@ -154,7 +154,7 @@ def _card(data: ReportData, response: int, clearance: int, element: Element) -> 
     c = data.checked[response]
     curves, omega = data.traces[response], words.number(c.model.omega)
     system = data.design.model.at(c.model.b).second_order()
-    motion = relative_motions(system)[clearance]
+    motion = data.motions(response)[clearance]
     engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
     if c.ngspice is not None:
         engines += f", ngspice {c.ngspice.response}"

@@ -197,6 +197,25 @@ def test_a_clearance_between_masses_is_seen_by_what_moves_in_it() -> None:
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x₁ − x₂", "x₁′ − x₂′")
 
 
+def test_a_model_in_metres_is_shown_in_millimetres() -> None:
+    """One figure read twice: in the model's units, and a thousand times as large."""
+    checked, traces = _checked(_orbit(1, 1, 0)), {"model": _trace()}
+    shown = MOTION.in_unit(1e3, "mm")
+    for draw in (orbit_plots.phase_portrait, orbit_plots.time_traces):
+        (own,), (axes,) = (draw(checked, traces, m).axes for m in (MOTION, shown))
+        across = 1 if draw is orbit_plots.time_traces else 1e3
+        for line, larger in zip(own.lines, axes.lines, strict=True):
+            if len(np.asarray(line.get_xdata())) > 2:
+                x, y = line.get_xydata().T  # type: ignore[union-attr]
+                assert larger.get_xdata() == pytest.approx(across * x)
+                assert larger.get_ydata() == pytest.approx(1e3 * y)
+        assert axes.get_ylim() == pytest.approx(1e3 * np.array(own.get_ylim()))
+    (axes,) = orbit_plots.phase_portrait(checked, traces, shown).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x₁ [mm]", "x₁′ [mm/s]")
+    (impact,) = (line for line in axes.lines if line.get_marker() == ">")
+    assert impact.get_xydata() == pytest.approx(np.array([[250.0, 400.0]]))
+
+
 def test_failed_ngspice_is_named_but_not_drawn() -> None:
     gate = GateResult(SETTINGS, False, np.nan, SimulationFailed("timestep too small"), (200,))
     figure = orbit_plots.phase_portrait(_checked(gate=gate), _traces(), MOTION)

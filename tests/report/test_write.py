@@ -44,9 +44,10 @@ from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.blank_figures import blank_figures
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.kicad_cases import case_files
+from tests.shared.mechanism_file import HAMMER
 from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
-from tests.shared.report_data import changed
+from tests.shared.report_data import changed, plain_report
 
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}
@@ -582,6 +583,22 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     assert "2\u00a0kg" in page.text
     assert "M₁ X₁″ + C₁ (X₁′ − X₂′) + K₁ (X₁ − X₂) = P₁ sin ΩT" in page.text
     assert "f(x₁)" not in page.text
+
+
+def test_portraits_of_a_model_in_metres_are_in_millimetres() -> None:
+    data, file = plain_report(), parse_model_file(HAMMER)
+    model = replace(data.checked[0].model, b=file.model.b)
+    orbit = replace(model.orbit, extremes=np.array([[2.4e-3, -1.9e-3], [0.3, -0.3]]))
+    checked = (replace(data.checked[0], model=replace(model, orbit=orbit)),)
+    data = changed(
+        data, checked=checked, modelfile=file, design=replace(data.design, model=file.model)
+    )
+    upper, lower = data.motions(0)
+    assert upper.axes == ("x₁ [mm]", "x₁′ [mm/s]")
+    assert upper.gaps == pytest.approx((0.8,))
+    assert lower.gaps == pytest.approx((-1.5,))
+    at = upper.of(np.zeros(1), np.array([[-2e-3, 0.25]]), 69.0)
+    assert at == pytest.approx(np.array([[-2.0, 250.0]]))
 
 
 def test_a_place_that_cannot_be_written(whole: ReportData, tmp_path: Path) -> None:
