@@ -87,7 +87,7 @@ def _portraits(made: Synthesis) -> dict[str, tuple[str, Figure]]:
         system = made.design.model.at(response.model.b).second_order()
         drawn = traces(made.design, response)
         for index, motion in enumerate(relative_motions(system)):
-            figure = orbit_plots.phase_portrait(response, drawn, motion, index)
+            figure = orbit_plots.phase_portrait(response, drawn, motion)
             caption = (
                 f"{response.circuit.response} at ω = {response.model.omega:.4g}: {motion.label}"
                 f"{_named(system, index)}, the model (broad line), the exact circuit (broken line) "

@@ -82,6 +82,7 @@ from .model_file import (
 )
 from .relative_motion import (
     RelativeMotion as RelativeMotion,
+    different_motions as different_motions,
     ground_of as ground_of,
     relative_motions as relative_motions,
     shown_stops as shown_stops,

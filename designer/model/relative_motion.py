@@ -6,13 +6,14 @@ a mass, y of the base, and in a clearance the difference that the stops see.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem
+from designer.dynamics.orbit import Orbit
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -31,6 +32,8 @@ class RelativeMotion:
     """Amplitude of the base's motion in it."""
     stops: tuple[tuple[int, float], ...]
     """(side, displacement) where contact begins, 1 upper and -1 lower."""
+    clearances: tuple[int, ...] = ()
+    """The index of the clearance of each stop."""
     scale: float = 1.0
     """How many of the units that values are shown in are one unit of the model."""
     unit: str = ""
@@ -69,6 +72,12 @@ class RelativeMotion:
         """Where the stops stand."""
         return tuple(place for _, place in self.stops)
 
+    def impacts(self, orbit: Orbit) -> Iterator[tuple[int, float, Array]]:
+        """(side, displacement, (k,) velocities) of an orbit's impacts on each stop."""
+        for (side, place), clearance in zip(self.stops, self.clearances, strict=True):
+            here = (orbit.impact_sides == side) & (orbit.impact_clearances == clearance)
+            yield side, place, self.scale * orbit.impact_velocities[here]
+
     def of(self, time: Array, states: Array, omega: float) -> Array:
         """(k, 2) displacement and velocity along a trace: time (k,), states (k, 2 masses)."""
         phase = omega * time
@@ -79,9 +88,28 @@ class RelativeMotion:
 def relative_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
     """One for each clearance in their order; that of the first mass where there is none."""
     if system.clearances:
-        return tuple(_of(system, stop) for stop in system.clearances)
+        return tuple(_of(system, k) for k in range(len(system.clearances)))
     row = np.eye(1, system.size)[0]
     return (RelativeMotion("x₁", _names(system, [0]), row, system.base, ()),)
+
+
+def different_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
+    """Those of ``relative_motions`` that differ: clearances in which the same displacement is seen
+    have one, with the stops of all of them."""
+    different: dict[tuple[str, float], RelativeMotion] = {}
+    for motion in relative_motions(system):
+        key = (motion.symbol, motion.base)
+        known = different.get(key)
+        different[key] = (
+            motion
+            if known is None
+            else replace(
+                known,
+                stops=known.stops + motion.stops,
+                clearances=known.clearances + motion.clearances,
+            )
+        )
+    return tuple(different.values())
 
 
 def shown_stops(system: SecondOrderSystem) -> tuple[tuple[int, int], ...]:
@@ -102,7 +130,8 @@ def ground_of(model: MechanicalModel) -> Array:
     return ground
 
 
-def _of(system: SecondOrderSystem, stop: Clearance) -> RelativeMotion:
+def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
+    stop = system.clearances[number]
     masses = [stop.mass] if stop.other is None else [stop.mass, stop.other]
     fixed = system.fixed_stops and stop.other is None
     symbols = [subscripted(f"x{mass + 1}") for mass in masses]
@@ -115,6 +144,7 @@ def _of(system: SecondOrderSystem, stop: Clearance) -> RelativeMotion:
         system.displacement(stop),
         system.base if fixed else 0.0,
         stops,
+        (number,) * len(stops),
     )
 
 

@@ -45,17 +45,15 @@ def phase_portrait(
     checked: CheckedResponse,
     traces: Mapping[str, Trace],
     motion: RelativeMotion,
-    clearance: int = 0,
 ) -> Figure:
-    """One response in the plane of displacement and velocity in a clearance, all engines over each
-    other, in the motion's units.
+    """One response in the plane of displacement and velocity in a clearance, or in several that see
+    the same displacement; all engines over each other, in the motion's units.
 
     The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
-    mark where an impact begins; beyond the stops there is contact. motion : in the clearance with
-    the number ``clearance``.
+    mark where an impact begins; beyond the stops there is contact.
     """
     figure = new_figure(3.5, 3.2)
-    _portrait(figure.subplots(), checked, traces, motion, clearance)
+    _portrait(figure.subplots(), checked, traces, motion)
     return figure
 
 
@@ -157,7 +155,6 @@ def _portrait(
     checked: CheckedResponse,
     traces: Mapping[str, Trace],
     motion: RelativeMotion,
-    clearance: int,
 ) -> None:
     orbits = _orbits(checked)
     curves = {
@@ -174,10 +171,7 @@ def _portrait(
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
-    model = checked.model.orbit
-    for side, place in motion.stops:
-        at_stop = (model.impact_sides == side) & (model.impact_clearances == clearance)
-        entry = motion.scale * model.impact_velocities[at_stop]
+    for side, place, entry in motion.impacts(checked.model.orbit):
         axes.plot(
             np.full(len(entry), place),
             entry,

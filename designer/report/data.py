@@ -22,7 +22,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
-from designer.model.relative_motion import RelativeMotion, relative_motions
+from designer.model.relative_motion import RelativeMotion, different_motions
 from designer.model.si_units import in_si
 from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
@@ -100,11 +100,12 @@ class ReportData:
         return tuple(traces(self.design, c) for c in self.checked)
 
     def motions(self, response: int) -> tuple[RelativeMotion, ...]:
-        """What moves in each clearance at a response, by its own stops; of a model whose numbers
+        """What moves in the clearances at a response, with its own stops: clearances in which the
+        same displacement is seen have one motion. Of a model whose numbers
         are SI values in the unit that suits the largest displacement, such as mm."""
         checked = self.checked[response].model
         model = self.design.model.at(checked.b)
-        motions = relative_motions(model.second_order())
+        motions = different_motions(model.second_order())
         if not in_si(self.si, model):
             return motions
         places = [abs(gap) for motion in motions for gap in motion.gaps]

@@ -62,7 +62,7 @@ def plots(data: ReportData) -> dict[str, str]:
     drawn: dict[str, Any] = {}
     for i, (c, traces) in enumerate(zip(data.checked, data.traces, strict=True)):
         for k, motion in enumerate(data.motions(i)):
-            drawn[portrait_name(i, k)] = _orbit(c, traces, motion, k)
+            drawn[portrait_name(i, k)] = _orbit(c, traces, motion)
     for k, stop in enumerate(data.stops):
         drawn[stop_name(k)] = _stop(stop)
     if data.checked:
@@ -122,9 +122,7 @@ def _hover(plot: figure, renderers: Sequence[Any], tips: Sequence[tuple[str, str
     plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tips)))
 
 
-def _orbit(
-    c: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion, clearance: int
-) -> Model:
+def _orbit(c: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion) -> Model:
     """Phase portrait over the displacement in time, every engine over each other."""
     portrait = _figure(315, *motion.axes)
     portrait.title = Title(text=_title(c), text_color=INK)
@@ -143,7 +141,7 @@ def _orbit(
     board = ColumnDataSource({"t": [], "x": [], "v": []}, name=BOARD)
     for plot, x, y in ((portrait, "x", "v"), (wave, "t", "x")):
         plot.line(x, y, source=board, color=VERDICTS[Verdict.LOST], line_width=2)
-    _impacts(portrait, c, motion, clearance)
+    _impacts(portrait, c, motion)
     tips = [
         ("", "$name"),
         (motion.axes[0], f"@x{_NUMBER}"),
@@ -193,16 +191,18 @@ def _shade(plot: figure, stops: Sequence[tuple[int, float]], dimension: str) -> 
         plot.add_layout(Span(location=place, level="underlay", **line))
 
 
-def _impacts(plot: figure, c: CheckedResponse, motion: RelativeMotion, clearance: int) -> None:
-    orbit, places = c.model.orbit, dict(motion.stops)
-    here = (orbit.impact_clearances == clearance) & np.isin(orbit.impact_sides, list(places))
-    sides, velocities = orbit.impact_sides[here], motion.scale * orbit.impact_velocities[here]
-    if not len(sides):
+def _impacts(plot: figure, c: CheckedResponse, motion: RelativeMotion) -> None:
+    impacts = [
+        (side, place, speed)
+        for side, place, velocities in motion.impacts(c.model.orbit)
+        for speed in velocities.tolist()
+    ]
+    if not impacts:
         return
-    columns = {
-        "x": [places[int(side)] for side in sides],
-        "v": velocities,
-        "angle": [-0.5 * math.pi * float(side) for side in sides],
+    columns: dict[str, Any] = {
+        "x": [place for _, place, _ in impacts],
+        "v": [speed for *_, speed in impacts],
+        "angle": [-0.5 * math.pi * float(side) for side, *_ in impacts],
     }
     look: dict[str, Any] = {"marker": "triangle", "size": 9, "line_color": "#ffffff"}
     marks = plot.scatter(

@@ -15,7 +15,7 @@ from designer.circuit.coefficients import EXACT
 from designer.fabrication.board_picture import Side, board_svg
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
-from designer.model.relative_motion import relative_motions
+from designer.model.relative_motion import different_motions
 from designer.plots import (
     blame_plots,
     map_plots,
@@ -139,35 +139,36 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
     system = data.design.model.second_order()
     key = orbit_plots.legend(ngspice=ngspice, stops=bool(system.clearances))
     cards = [
-        _card(data, response, clearance, element)
+        _card(data, response, view, element)
         for response in range(len(data.checked))
-        for clearance in range(max(1, len(system.clearances)))
+        for view in range(len(data.motions(response)))
     ]
-    alone = [motion.symbol for motion in relative_motions(system)] == ["x₁"]
+    alone = [motion.symbol for motion in different_motions(system)] == ["x₁"]
     return Gallery(
         INTRO if alone else EVERY_CLEARANCE, Picture(svg=element(key, KEY)), tuple(cards)
     )
 
 
-def _card(data: ReportData, response: int, clearance: int, element: Element) -> Picture:
-    """One response, seen in one clearance."""
+def _card(data: ReportData, response: int, view: int, element: Element) -> Picture:
+    """One response, by one of its motions (``ReportData.motions``)."""
     c = data.checked[response]
     curves, omega = data.traces[response], words.number(c.model.omega)
     system = data.design.model.at(c.model.b).second_order()
-    motion = data.motions(response)[clearance]
+    motion = data.motions(response)[view]
     engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
     if c.ngspice is not None:
         engines += f", ngspice {c.ngspice.response}"
     place, caption = "", _caption(data, response, c)
     if len(system.clearances) > 1:
-        place = f" in {system.clearances[clearance].name}"
+        names = dict.fromkeys(system.clearances[k].name for k in motion.clearances)
+        place = f" in {' and '.join(names)}"
         caption = f"{motion.label}{place} · {caption}"
-    portrait = orbit_plots.phase_portrait(c, curves, motion, clearance)
+    portrait = orbit_plots.phase_portrait(c, curves, motion)
     shows = element(portrait, f"Phase portrait{place} at ω = {omega}: {engines}.")
     shows += element(
         orbit_plots.time_traces(c, curves, motion), f"{motion.symbol} over time at ω = {omega}."
     )
-    plot = portrait_name(response, clearance)
+    plot = portrait_name(response, view)
     return Picture("", caption, svg=shows, warning=words.problem(c), plot=plot)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 
-def portrait_name(response: int, clearance: int) -> str:
-    """Of one response in one clearance, by their numbers."""
-    return f"portrait {response} {clearance}"
+def portrait_name(response: int, motion: int) -> str:
+    """Of one response by one of its motions, by their numbers."""
+    return f"portrait {response} {motion}"
 
 
 def stop_name(clearance: int) -> str:

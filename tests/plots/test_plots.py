@@ -32,7 +32,7 @@ from tests.shared.figure_text import clipped, overlapping
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SETTINGS = SolverSettings("trap", 1e-5)
-MOTION = RelativeMotion("x₁", "", np.array([1.0, 0.0]), 0.0, ((1, 0.25), (-1, -0.25)))
+MOTION = RelativeMotion("x₁", "", np.array([1.0, 0.0]), 0.0, ((1, 0.25), (-1, -0.25)), (0, 0))
 
 
 def _orbit(n: int = 1, p: int = 1, q: int = 1) -> Orbit:
@@ -175,7 +175,9 @@ def test_impacts_stand_on_the_stops() -> None:
 
 
 def test_a_model_without_stops_has_no_contact_in_its_pictures() -> None:
-    figure = orbit_plots.phase_portrait(_checked(), _traces(), replace(MOTION, stops=()))
+    figure = orbit_plots.phase_portrait(
+        _checked(), _traces(), replace(MOTION, stops=(), clearances=())
+    )
     assert not figure.axes[0].patches
     upper = replace(MOTION, stops=MOTION.stops[:1])
     assert len(orbit_plots.time_traces(_checked(), _traces(), upper).axes[0].patches) == 1
@@ -183,11 +185,13 @@ def test_a_model_without_stops_has_no_contact_in_its_pictures() -> None:
 
 def test_a_clearance_between_masses_is_seen_by_what_moves_in_it() -> None:
     """The second clearance: its own displacement, its own stops, its own impacts."""
-    motion = RelativeMotion("x₁ − x₂", "", np.array([1.0, -1.0]), 0.0, ((1, 0.1), (-1, -0.4)))
+    motion = RelativeMotion(
+        "x₁ − x₂", "", np.array([1.0, -1.0]), 0.0, ((1, 0.1), (-1, -0.4)), (1, 1)
+    )
     sides, stops = np.array([1.0, 1.0, -1.0]), np.array([0, 1, 1])
     orbit = replace(_orbit(1, 2, 1), impact_sides=sides, impact_clearances=stops)
     traces = {"model": _trace()}
-    (axes,) = orbit_plots.phase_portrait(_checked(orbit), traces, motion, 1).axes
+    (axes,) = orbit_plots.phase_portrait(_checked(orbit), traces, motion).axes
     marks = {str(m.get_marker()): np.asarray(m.get_xdata()) for m in axes.lines}
     assert (marks[">"].tolist(), marks["<"].tolist()) == ([0.1], [-0.4])
     (line,) = (m for m in axes.lines if len(m.get_xdata()) > 100)  # type: ignore[arg-type]
@@ -195,6 +199,16 @@ def test_a_clearance_between_masses_is_seen_by_what_moves_in_it() -> None:
     assert np.asarray(line.get_xdata()) == pytest.approx(states[:, 0] - states[:, 2])
     assert np.asarray(line.get_ydata()) == pytest.approx(states[:, 1] - states[:, 3])
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x₁ − x₂", "x₁′ − x₂′")
+
+
+def test_stops_of_two_clearances_stand_in_one_portrait() -> None:
+    """The upper stops of two clearances of one displacement, each with its own impacts."""
+    motion = replace(MOTION, stops=((1, 0.1), (1, 0.3)), clearances=(0, 1))
+    sides, stops = np.array([1.0, 1.0, 1.0]), np.array([0, 1, 1])
+    orbit = replace(_orbit(1, 3, 0), impact_sides=sides, impact_clearances=stops)
+    (axes,) = orbit_plots.phase_portrait(_checked(orbit), {}, motion).axes
+    places = [np.asarray(m.get_xdata()).tolist() for m in axes.lines if m.get_marker() == ">"]
+    assert places == [[0.1], [0.3, 0.3]]
 
 
 def test_a_model_in_metres_is_shown_in_millimetres() -> None:

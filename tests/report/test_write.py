@@ -593,11 +593,10 @@ def test_portraits_of_a_model_in_metres_are_in_millimetres() -> None:
     data = changed(
         data, checked=checked, modelfile=file, design=replace(data.design, model=file.model)
     )
-    upper, lower = data.motions(0)
-    assert upper.axes == ("x₁ [mm]", "x₁′ [mm/s]")
-    assert upper.gaps == pytest.approx((0.8,))
-    assert lower.gaps == pytest.approx((-1.5,))
-    at = upper.of(np.zeros(1), np.array([[-2e-3, 0.25]]), 69.0)
+    (motion,) = data.motions(0)  # both clearances see x₁
+    assert motion.axes == ("x₁ [mm]", "x₁′ [mm/s]")
+    assert motion.gaps == pytest.approx((0.8, -1.5))
+    at = motion.of(np.zeros(1), np.array([[-2e-3, 0.25]]), 69.0)
     assert at == pytest.approx(np.array([[-2.0, 250.0]]))
 
 
