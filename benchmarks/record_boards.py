@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +18,12 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
-from designer.dynamics.orbit import Orbit
-from designer.spice import deck, numerics_gate
-from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import Reading, clearance_rows, read
-from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
+from designer.spice.simulator import SimulationFailed
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
-from designer.verdicts.ngspice_runs import way_to_rung
+from designer.workbench.ngspice_motion import NgspiceMotion, full_subject, motion_job
 
 RECORDED = 20
 """Drive periods that are kept of each run."""
@@ -74,15 +69,16 @@ def runs(
     }
     with SpicePool(jobs, timeout=300.0) as pool:
         keys = list(subjects)
-        for number, result in pool.map(_job(subjects[key]) for key in keys):
+        runs_ = (motion_job(subjects[key], RECORDED, POINTS) for key in keys)
+        for number, result in pool.map(runs_):
             key = keys[number]
             if isinstance(result, SimulationFailed):
                 print(f"{key}: {result.reason}")
                 continue
-            orbit, signals = result
             subject = subjects[key]
-            _keep(_file(folder, key), subject, orbit, signals)
-            print(f"{key}: exact {subject.orbit.response}, ngspice {orbit.response}", flush=True)
+            _keep(_file(folder, key), subject, result)
+            shown = result.orbit.response
+            print(f"{key}: exact {subject.orbit.response}, ngspice {shown}", flush=True)
     for path in sorted(folder.glob("*.npz")):
         run = _kept(path)
         if run.sample in samples:
@@ -104,60 +100,16 @@ def _subjects(
         for k, (orbit, drive) in enumerate(zip(orbits, drives, strict=True)):
             if len(orbit.start):
                 excitation = Excitation(drive.omega / (2.0 * np.pi), -drive.amplitude)
-                way = way_to_rung(orbit)
-                yield (
-                    (k, sample),
-                    GateSubject(
-                        ensemble.reduction(sample), excitation, orbit, discard=way, rung="full"
-                    ),
-                )
-
-
-def _job(subject: GateSubject) -> SpiceJob[tuple[Orbit, dict[str, Array]]]:
-    """The run: at least ``RECORDED`` periods after what is discarded."""
-    circuit, period = subject.circuit, subject.period
-    contact = numerics_gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
-    steps = numerics_gate.first_steps(subject, contact)
-    periods = max(numerics_gate.length(subject), subject.discard + RECORDED)
-    reading = Reading(
-        period=period,
-        discard=subject.discard,
-        nets=circuit.state_nets,
-        shift=subject.shift,
-        clearances=clearance_rows(subject.system),
-        generator=circuit.generator.net,
-    )
-    text = deck.write(
-        circuit,
-        subject.board,
-        subject.excitation,
-        SolverSettings("trap", period / steps, 1e-4),
-        title="a board on the bench",
-        stop_time=periods * period,
-        initial=subject.orbit.start,
-        rung=subject.rung,
-        kept_from=max(subject.discard - 1, 0) * period,
-    )
-    nets = (*circuit.outputs, circuit.generator.net)
-    return SpiceJob(text, nets, periods * period, partial(_reduce, reading=reading))
-
-
-def _reduce(waveforms: Waveforms, reading: Reading) -> tuple[Orbit, dict[str, Array]]:
-    """ngspice's orbit, and the last periods at equal intervals."""
-    end = np.floor(waveforms.axis[-1] / reading.period * (1.0 + 1e-9)) * reading.period
-    time = end - reading.period * RECORDED * np.linspace(1.0, 0.0, RECORDED * POINTS + 1)
-    signals = {
-        net: np.interp(time, waveforms.axis, wave) for net, wave in waveforms.signals.items()
-    }
-    return read(waveforms, reading).orbit, signals
+                yield (k, sample), full_subject(ensemble.reduction(sample), excitation, orbit)
 
 
 def _file(folder: Path, key: tuple[int, int]) -> Path:
     return folder / f"{key[0]}-{key[1]:04d}.npz"
 
 
-def _keep(path: Path, subject: GateSubject, orbit: Orbit, signals: Mapping[str, Array]) -> None:
+def _keep(path: Path, subject: GateSubject, motion: NgspiceMotion) -> None:
     drive, place = subject.excitation, path.stem.split("-")
+    orbit, signals = motion.orbit, motion.signals
     peak = float(np.abs(signals[subject.circuit.state_nets[subject.system.moving]]).max())
     partial_file = path.with_suffix(".partial.npz")
     np.savez(

@@ -531,7 +531,7 @@ def rules(
     return Output(result.answer, show, result.passed)
 
 
-@verb("Make", "designer bench out/model --record scope.csv --out out/board-1", "overwrite")
+@verb("Make", "designer bench out/model --record scope.csv --out out/board-1", "jobs", "overwrite")
 def bench(
     session: Session,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A design folder.")],
@@ -557,6 +557,10 @@ def bench(
     out: Annotated[
         Path | None, option("--out", "DIR", "Write the answer, its page and pictures there.")
     ] = None,
+    ngspice: Annotated[
+        bool,
+        option("--ngspice/--no-ngspice", None, "Lay ngspice's motion over each record [yes]."),
+    ] = True,
     **shared: Any,
 ) -> Output:
     """Say what records of a board show, and how sure that is; exit status 1 where it is not sure or
@@ -572,6 +576,7 @@ def bench(
         channels=roles,
         fit=fit,
         boards=boards,
+        ngspice=ngspice,
         out=out,
         progress=session.progress,
         **shared,

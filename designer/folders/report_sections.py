@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
-from designer.base.design_folder import REPORTS, Folder
+from designer.base.design_folder import DESIGN, REPORTS, Folder
+from designer.base.errors import InputError
 from designer.base.keyed_store import Note, quiet
-from designer.base.manifest import StageName, file_hash
+from designer.base.manifest import StageName, file_hash, read_json
 from designer.base.page import PageSection
 
 SHOWN: Mapping[StageName, Sequence[str]] = {
@@ -17,9 +20,35 @@ SHOWN: Mapping[StageName, Sequence[str]] = {
 """Stages that the report shows, in its order, each with the files that it names."""
 
 
+BENCHED = "bench.json"
+"""What ``bench`` answers of a board, in a directory of its own."""
+
+
 def later_sections(folder: Folder) -> tuple[PageSection, ...]:
-    """A section for each stage in ``SHOWN`` that is finished and as it was written."""
-    return tuple(_sections(folder))
+    """A section for each stage in ``SHOWN`` that is finished and as it was written; then one for
+    the boards on the bench."""
+    return (*_sections(folder), *_bench(folder))
+
+
+def design_hash(folder: Path) -> str:
+    """The hash of the design in a folder; "" where there is none."""
+    path = folder / DESIGN
+    return file_hash(DESIGN, path.read_bytes()) if path.is_file() else ""
+
+
+def _bench(folder: Folder) -> Iterator[PageSection]:
+    """The boards whose answers lie in directories of the folder, but those of another design."""
+    own = design_hash(folder.path)
+    answers = {}
+    for path in sorted(folder.path.rglob(BENCHED)):
+        with contextlib.suppress(InputError):
+            answer = read_json(path)
+            if answer.get("design_sha256") == own:
+                answers[path.parent.relative_to(folder.path).as_posix()] = answer
+    if answers:
+        from designer.report.verb_sections import bench_section  # it needs matplotlib
+
+        yield bench_section(answers)
 
 
 def _sections(folder: Folder) -> Iterator[PageSection]:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.atomic_write import appearing
-from designer.base.design_folder import is_design_folder
-from designer.base.errors import MISSING, InputError
+from designer.base.defaults import cores
+from designer.base.design_folder import Folder, is_design_folder
+from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.frames import frame, table_html
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
@@ -19,6 +20,9 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.design import GeneratorSetting
 from designer.folders.design_source import read_design
 from designer.folders.origin import provenance
+from designer.folders.report_sections import BENCHED as NAME, design_hash, renew_report
+from designer.spice.pool import SpicePool, require_ngspice
+from designer.spice.simulator import SimulationFailed
 from designer.workbench.advice import Advice
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
@@ -31,7 +35,7 @@ from designer.workbench.spread_estimate import estimated_spread, measured_list
 if TYPE_CHECKING:
     import pandas as pd
 
-NAME, PAGE, LIST = "bench.json", "bench.html", "boards.csv"
+PAGE, LIST = "bench.html", "boards.csv"
 LISTED = 20
 """Boards in the list for each fitted one, as probable as its records leave it."""
 PLACE = "a directory that can be written"
@@ -116,8 +120,10 @@ def bench(
     channels: Mapping[str, str] | None = None,
     fit: bool = False,
     boards: bool = False,
+    ngspice: bool = True,
     out: Path | str | None = None,
     overwrite: bool = False,
+    jobs: int | None = None,
     progress: Progress | None = None,
 ) -> BenchAnswer:
     """The verb ``bench``: read records of boards of a design and say what they show.
@@ -125,9 +131,12 @@ def bench(
     omega : the drive frequency of all of them in the model's units; found where None. channels :
     channel by net, for all of them; found where None. fit : also look for the board behind the
     records, and for what to turn on it. boards : the records are of several boards, each with a
-    folder of its own that has its name; fits them, and says how far they differ. out : a directory
+    folder of its own that has its name; fits them, and says how far they differ. ngspice : also lay
+    ngspice's motion of the board over each record, once the rest is written; needs ``out``, and
+    does without where ngspice is missing. jobs : the most ngspice runs at a time. out : a directory
     for ``bench.json``, ``bench.html``, a picture of each record and, of several boards,
-    ``boards.csv``; ``overwrite`` replaces files of these names.
+    ``boards.csv``; ``overwrite`` replaces files of these names. Where it lies in the design folder
+    the folder's report shows these records too.
 
     Raises
     ------
@@ -167,27 +176,72 @@ def bench(
         "fit": fit or boards,
         "boards": boards,
     }
-    origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
-    seconds_a_radian = scales.seconds
-    answer = {
+    common = {
         "format": 1,
         "title": synthesis.modelfile.title,
-        "records": [_record_json(each, seconds_a_radian) for each in benched],
         "boards": [board.as_dict() for board in fitted.values()],
         "spread": [k.as_dict() for k in estimated_spread([*fits.values()])]
         if boards and fits
         else [],
         "files": [] if place is None else [NAME, PAGE, *names, *lists],
-        "provenance": origin,
-        "cost": {"seconds": time.perf_counter() - began},
+        "design_sha256": design_hash(path),
+        "provenance": provenance(synthesis.modelfile, catalog.hash, settings=settings),
     }
-    result = BenchAnswer(plain(answer), tuple(benched), tuple(fitted.values()))
-    if place is not None:
-        progress.stage("pictures")
-        _write(place, names, result)
-        if lists:
-            _put(place / LIST, measured_list(fits, LISTED).encode("utf-8"))
-    return result
+
+    def result(records: Sequence[BenchedRecord]) -> BenchAnswer:
+        answer = {
+            **common,
+            "records": [_record_json(each, scales.seconds) for each in records],
+            "cost": {"seconds": time.perf_counter() - began},
+        }
+        return BenchAnswer(plain(answer), tuple(records), tuple(fitted.values()))
+
+    answered = result(benched)
+    if place is None:
+        return answered
+    progress.stage("pictures")
+    _write(place, names, answered)
+    if lists:
+        _put(place / LIST, measured_list(fits, LISTED).encode("utf-8"))
+    if place.resolve().is_relative_to(path.resolve()):
+        renew_report(Folder(path), progress.note)
+    if ngspice and any(each.overlay is not None for each in benched):
+        progress.stage("ngspice")
+        answered = result(_with_ngspice(benched, prediction, jobs or cores(), progress))
+        _write(place, names, answered)
+    return answered
+
+
+def _with_ngspice(
+    benched: Sequence[BenchedRecord], prediction: BoardPrediction, jobs: int, progress: Progress
+) -> list[BenchedRecord]:
+    """The records with ngspice's motion of the fitted board, or of the nominal one, over each."""
+    out, runs, which = list(benched), [], []
+    for i, each in enumerate(benched):
+        if each.overlay is not None:
+            fit = None if each.board is None or not _fits(each) else each.board.fit
+            number = sum(1 for b in benched[:i] if b.board is each.board and _fits(b))
+            runs.append(each.overlay.ngspice_job(prediction, fit, number))
+            which.append((i, fit is not None))
+    try:
+        with SpicePool(min(jobs, len(runs))) as pool:
+            require_ngspice(pool)
+            for number, motion in pool.map(runs):
+                i, fitted = which[number]
+                overlay = benched[i].overlay
+                if overlay is None or isinstance(motion, SimulationFailed):
+                    progress.note(f"{benched[i].path.name}: no answer of ngspice")
+                    continue
+                laid = overlay.with_ngspice(motion, prediction, fitted=fitted)
+                out[i] = replace(benched[i], overlay=laid)
+    except EnvironmentMissing as error:
+        progress.note(f"{error}; the pictures are without it")
+    return out
+
+
+def _fits(record: BenchedRecord) -> bool:
+    """Whether a record has a say in a fit: it has a period."""
+    return record.named.counts is not None
 
 
 def _fitted(
@@ -271,6 +325,7 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
     """seconds : of the circuit for a unit of the model's time."""
     name, motion = benched.named, benched.named.motion
     record, overlay, setting = motion.record, benched.overlay, benched.setting
+    wave = None if overlay is None else overlay.ngspice
     return {
         "file": benched.path.name,
         "kind": record.kind,
@@ -306,6 +361,13 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "exact_circuit": None
         if overlay is None
         else {"response": overlay.orbit.response, "difference": dict(overlay.errors)},
+        "ngspice": None
+        if wave is None
+        else {
+            "response": wave.response,
+            "fitted": wave.fitted,
+            "difference": dict(wave.errors),
+        },
         "fitted": None if benched.board is None else [f.as_dict() for f in benched.board.figures],
         "advice": None if benched.advice is None else benched.advice.as_dict(),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import CIRCUIT_COLOUR, MUTED, new_figure, styled
+from designer.base.figure_style import (
+    CIRCUIT_COLOUR,
+    MUTED,
+    NGSPICE_COLOUR,
+    new_figure,
+    styled,
+)
 from designer.workbench.folding import samples_of
 from designer.workbench.naming import NamedMotion
 from designer.workbench.overlay import Overlay
@@ -28,7 +34,7 @@ RAW_PERIODS = 4
 @styled
 def record_figure(named: NamedMotion, overlay: Overlay | None) -> Figure:
     """Left the first displacement against its rate, right every recorded net over the phase of the
-    drive: samples, the curve of all laps, the exact circuit."""
+    drive: samples, the curve of all laps, the exact circuit, ngspice."""
     nets = named.nets
     figure = new_figure(7.6, 1.1 + 1.35 * max(len(nets), 2))
     parts: Any = figure.subfigures(1, 2, width_ratios=[0.8, 1.2])
@@ -43,7 +49,7 @@ def record_figure(named: NamedMotion, overlay: Overlay | None) -> Figure:
             _trace(axes, named, overlay, net)
     panels[-1].set_xlabel("drive periods")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, markerscale=4.0)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, markerscale=4.0)
     return figure
 
 
@@ -54,9 +60,10 @@ def _portrait(axes: Axes, named: NamedMotion, overlay: Overlay | None) -> None:
     curve, rate = named.curve.curve[:, place], named.curve.rate[:, place] * hertz
     axes.plot(_closed(curve), _closed(rate) / 1e3, color=RECORD_COLOUR, lw=1.1)
     if overlay is not None:
-        wave = overlay.predicted[:, place]
-        slope = (np.roll(wave, -1) - np.roll(wave, 1)) * (0.5 * overlay.points * hertz)
-        axes.plot(_closed(wave), _closed(slope) / 1e3, color=CIRCUIT_COLOUR, lw=0.8, ls="--")
+        for waves, look in _predicted(overlay):
+            wave = waves[:, place]
+            slope = (np.roll(wave, -1) - np.roll(wave, 1)) * (0.5 * overlay.points * hertz)
+            axes.plot(_closed(wave), _closed(slope) / 1e3, **look)
     for zone in named.dead_zones.values():
         for end in zone.ends.values():
             axes.axvline(end, color=MUTED, lw=0.6, ls=":")
@@ -85,19 +92,16 @@ def _trace(axes: Axes, named: NamedMotion, overlay: Overlay | None, net: str) ->
     laps = np.tile(curve.curve[:, place], periods // curve.n)
     axes.plot(_phases(laps, periods), laps, color=RECORD_COLOUR, lw=1.1, label="record")
     if overlay is not None:
-        lap = overlay.predicted[:, overlay.nets.index(net)]
-        wave = np.resize(lap, periods * overlay.points)
-        look: dict[str, Any] = {
-            "color": CIRCUIT_COLOUR,
-            "lw": 0.8,
-            "ls": "--",
-            "label": "exact circuit, nominal",
-        }
-        axes.plot(_phases(wave, periods), wave, **look)
+        for waves, look in _predicted(overlay):
+            wave = np.resize(waves[:, overlay.nets.index(net)], periods * overlay.points)
+            axes.plot(_phases(wave, periods), wave, **look)
+        difference = f"difference {100.0 * overlay.errors[net]:.2g} % of the peak"
+        if overlay.ngspice is not None:
+            difference += f", ngspice's {100.0 * overlay.ngspice.errors[net]:.2g} %"
         axes.text(
             1.0,
             1.02,
-            f"difference {100.0 * overlay.errors[net]:.2g} % of the peak",
+            difference,
             transform=axes.transAxes,
             ha="right",
             va="bottom",
@@ -105,6 +109,26 @@ def _trace(axes: Axes, named: NamedMotion, overlay: Overlay | None, net: str) ->
         )
     axes.set_ylabel(f"{net} [V]")
     axes.set_xlim(0.0, periods)
+
+
+def _predicted(overlay: Overlay) -> Iterator[tuple[Array, dict[str, Any]]]:
+    """(k, nets) waves of each engine, with how they are drawn."""
+    exact: dict[str, Any] = {
+        "color": CIRCUIT_COLOUR,
+        "lw": 0.8,
+        "ls": "--",
+        "label": "exact circuit, nominal",
+    }
+    yield overlay.predicted, exact
+    if overlay.ngspice is not None:
+        board = "fitted board" if overlay.ngspice.fitted else "nominal"
+        look: dict[str, Any] = {
+            "color": NGSPICE_COLOUR,
+            "lw": 0.9,
+            "ls": ":",
+            "label": f"ngspice, {board}",
+        }
+        yield overlay.ngspice.waves, look
 
 
 def _raw(portrait: Axes, panels: Sequence[Axes], named: NamedMotion) -> None:

@@ -22,6 +22,7 @@ from .record_page import (
 )
 from .verb_sections import (
     SECTIONS as SECTIONS,
+    bench_section as bench_section,
     is_whole as is_whole,
     older_section as older_section,
 )

@@ -43,6 +43,7 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
             "shows": lambda r: shown_words(r),
             "wanted there": lambda r: r["wanted"] or "",
             "exact circuit": lambda r: (r["exact_circuit"] or {}).get("response", ""),
+            "ngspice": lambda r: ngspice_words(r["ngspice"]),
         },
     )
     sections = [
@@ -128,6 +129,13 @@ def shown_words(record: Mapping[str, Any]) -> str:
     return f"{others}: not sure"
 
 
+def ngspice_words(answer: Mapping[str, Any] | None) -> str:
+    """What a board shows in ngspice, and which board; "" where it was not run."""
+    if answer is None:
+        return ""
+    return f"{answer['response']} ({'fitted board' if answer['fitted'] else 'nominal'})"
+
+
 def drive_words(record: Mapping[str, Any]) -> str:
     """The drive of a record: frequency, and amplitude where it was recorded."""
     volts, hertz = record["amplitude_v_peak"], f"{record['frequency_hz']:.5g} Hz"
@@ -158,5 +166,7 @@ def _blocks(record: Mapping[str, Any], drawing: Markup) -> Iterator[str | Pictur
             f"{symmetric[record['symmetric']]}."
         )
     caption = "Blue: the record, all laps on one another. Dashed: the exact circuit, nominal."
+    if record["ngspice"] is not None:
+        caption += " Dotted: ngspice on full op-amps."
     yield Picture(caption=caption, svg=drawing)
-    yield SmallPrint("Differences from the exact circuit have the scope's gain and offset in them.")
+    yield SmallPrint("Differences from both engines have the scope's gain and offset in them.")

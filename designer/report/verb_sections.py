@@ -1,4 +1,5 @@
-"""Sections of a report about what other verbs answered of the same design: cure, rules, trade.
+"""Sections of a report about what other verbs answered of the same design: cure, rules, trade,
+bench.
 
 Each is made from the JSON object that the verb wrote beside the report, and from nothing else.
 """
@@ -21,7 +22,7 @@ from designer.base.page import (
 )
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 from designer.fidelity import trade_files
-from designer.report import words
+from designer.report import record_page, words
 
 Answer = Mapping[str, Any]
 
@@ -140,6 +141,26 @@ def _boards(boards: Sequence[Answer]) -> PageSection | None:
     if not boards:
         return None
     return PageSection("Yields of both engines", trade_files.board_blocks(boards))
+
+
+def bench_section(answers: Mapping[str, Answer]) -> PageSection:
+    """Boards on the bench. answers : ``bench.json`` of each, by the folder that holds it."""
+    rows = [(place, r) for place, answer in answers.items() for r in answer["records"]]
+    asked = [r["as_wanted"] for _, r in rows if r["as_wanted"] is not None]
+    columns: dict[str, Callable[[tuple[str, Answer]], str]] = {
+        "board": lambda row: row[0],
+        "record": lambda row: row[1]["file"],
+        "ω": lambda row: words.number(row[1]["omega"]),
+        "shows": lambda row: record_page.shown_words(row[1]),
+        "wanted there": lambda row: row[1]["wanted"] or "",
+        "advice": lambda row: (row[1]["advice"] or {}).get("words", ""),
+    }
+    blocks: list[Block] = [
+        Lead(f"Records that surely show what is wanted there: {sum(asked)} of {len(asked)}."),
+        table_of(rows, columns),
+        FileLinks(tuple(f"{place}/bench.html" for place in answers)),
+    ]
+    return PageSection("On the bench", blocks, "bench")
 
 
 def _titled(title: str, block: Block) -> PageSection | None:

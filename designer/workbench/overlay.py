@@ -1,4 +1,5 @@
-"""A record laid over the prediction: the nominal board's exact orbit under the recorded drive."""
+"""A record laid over the prediction: the nominal board's exact orbit under the recorded drive, and
+a board's motion in ngspice there."""
 
 from __future__ import annotations
 
@@ -10,16 +11,35 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.design import GeneratorSetting
+from designer.circuit.netlist import Excitation
+from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive
+from designer.spice.simulator import SpiceJob
+from designer.workbench.board_fit import BoardFit
 from designer.workbench.folding import POINTS as CURVE_POINTS
 from designer.workbench.naming import NamedMotion
+from designer.workbench.ngspice_motion import NgspiceMotion, full_subject, motion_job
 from designer.workbench.prediction import POINTS, BoardPrediction, nearest
 
 ASKED = 3
 """Wanted responses, the nearest in frequency, from whose orbits the nominal board is settled."""
+
+
+@dataclass(frozen=True)
+class NgspiceWave:
+    """The motion of a board in ngspice, laid over a record."""
+
+    response: str
+    """What it shows there: n-p-q or status."""
+    fitted: bool
+    """Whether it is the board that was fitted to the record; else the nominal one."""
+    waves: Array
+    """(k, nets) its waves at the phases of the overlay's [V]."""
+    errors: Mapping[str, float]
+    """By net, as those of the overlay."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +61,50 @@ class Overlay:
     """(k, nets) the orbit's waves at the same phases [V]."""
     points: int = POINTS
     """Of both, in a drive period."""
+    ngspice: NgspiceWave | None = None
+    """The same in ngspice on full op-amps; None where it was not run."""
 
     @property
     def errors(self) -> Mapping[str, float]:
         """By net: root of the mean square of the difference over the orbit's peak. The scope's own
         errors of gain and offset are in it."""
-        off = np.sqrt(((self.recorded - self.predicted) ** 2).mean(axis=0))
-        peaks = np.abs(self.predicted).max(axis=0)
+        return self._errors(self.predicted)
+
+    def _errors(self, waves: Array) -> dict[str, float]:
+        off = np.sqrt(((self.recorded - waves) ** 2).mean(axis=0))
+        peaks = np.abs(waves).max(axis=0)
         return dict(zip(self.nets, (float(x) for x in off / peaks), strict=True))
+
+    @property
+    def excitation(self) -> Excitation:
+        """The generator's setting that the exact circuit has."""
+        return Excitation(self.setting.frequency_hz, self.setting.amplitude_v_peak)
+
+    def ngspice_job(
+        self, prediction: BoardPrediction, fit: BoardFit | None = None, number: int = 0
+    ) -> SpiceJob[NgspiceMotion]:
+        """The run of a board under the drive of the overlay: the nominal one, or that of a fit.
+
+        number : which of the fit's records this is.
+        """
+        reduction, orbit = prediction.reduction, self.orbit
+        if fit is not None:
+            circuit = prediction.circuit
+            reduction = Reduction(circuit, fit.prior.boards(fit.centre[None]).board(0))
+            start = fit.orbits[number].start[: len(circuit.states)]
+            orbit = settle(Flow(reduction.system(), self.excitation.drive), start)
+        periods = len(self.predicted) // self.points
+        return motion_job(full_subject(reduction, self.excitation, orbit), periods, self.points)
+
+    def with_ngspice(
+        self, motion: NgspiceMotion, prediction: BoardPrediction, *, fitted: bool
+    ) -> Overlay:
+        """The same with ngspice's motion, or its mirror twin where that is nearer, in phase."""
+        table = np.column_stack([motion.signals[net][:-1] for net in self.nets])
+        waves = [_in_phase(self.recorded, image) for image in _images(table, prediction)]
+        best = min(waves, key=lambda wave: sum(self._errors(wave).values()))
+        shown = NgspiceWave(motion.orbit.response, fitted, best, self._errors(best))
+        return replace(self, ngspice=shown)
 
 
 def overlaid(named: NamedMotion, prediction: BoardPrediction) -> Overlay | None:

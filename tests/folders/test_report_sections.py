@@ -17,7 +17,7 @@ from designer.base.manifest import StageName
 from designer.base.page import Page, PageSection, markdown
 from designer.base.plain_json import dumps
 from designer.fidelity import trade_files
-from designer.folders.report_sections import SHOWN, renew_report
+from designer.folders.report_sections import BENCHED, SHOWN, design_hash, renew_report
 from designer.report.page_html import render_page
 from designer.report.verb_sections import NEEDED, SECTIONS, is_whole
 from tests.shared.house import ROOT
@@ -182,6 +182,35 @@ def test_a_second_time_changes_nothing_and_the_manifest_knows_the_report(path: P
     assert reports(path) == with_cure
     assert (path / "manifest.json").read_bytes() == manifest
     (path / "cure.json").write_text("{}", encoding="utf-8")  # damaged: it is told of no more
+    renew_report(Folder(path))
+    assert reports(path) == bare
+
+
+def test_records_of_boards_in_the_folder_are_shown_with_their_pages(path: Path) -> None:
+    bare = reports(path)
+    row = {"omega": 0.85, "response": "1-2-2", "sure": True, "others": [], "wanted": "1-2-2",
+           "advice": None}  # fmt: skip
+    rows = [
+        {**row, "file": "first.csv", "as_wanted": True},
+        {**row, "file": "second.csv", "sure": False, "others": ["1-2-1"], "as_wanted": False},
+    ]
+    boards, design = path / "boards", design_hash(path)
+    for name, of in (("A", design), ("earlier", "another")):
+        (boards / name).mkdir(parents=True)
+        answer = {"format": 1, "design_sha256": of, "records": rows}
+        (boards / name / BENCHED).write_text(dumps(answer), encoding="utf-8")
+    (boards / "broken").mkdir()
+    (boards / "broken" / BENCHED).write_text("{", encoding="utf-8")
+    renew_report(Folder(path))
+    html, text = reports(path)
+    assert '<a href="boards/A/bench.html">' in html
+    assert "[boards/A/bench.html](boards/A/bench.html)" in text
+    for page in (html, text):
+        assert "what is wanted there: 1 of 2." in page
+        assert "not sure" in page
+        assert "earlier" not in page
+    assert Folder(path).changed("study") is None
+    shutil.rmtree(boards)
     renew_report(Folder(path))
     assert reports(path) == bare
 

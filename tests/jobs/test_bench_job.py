@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from designer.base.errors import InputError
+from designer.base.errors import EnvironmentMissing, InputError
 from designer.cli import entry as cli
 from designer.jobs import bench_job
 from designer.jobs.bench_job import bench, channels_of
@@ -40,7 +41,7 @@ def csv_of(number: int, path: Path) -> Path:
 def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path) -> None:
     files = [csv_of(2, tmp_path / "a.csv"), csv_of(8, tmp_path / "b.csv")]
     out = tmp_path / "board"
-    result = bench(folder, files, out=out)
+    result = bench(folder, files, out=out, ngspice=False)
     assert (
         json.loads((out / "bench.json").read_text("utf-8"))["records"] == (result.answer["records"])
     )
@@ -78,6 +79,40 @@ def test_the_verb_prints_the_object(
 
 
 @pytest.mark.slow
+def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
+    """A record of another run of ngspice: its nominal board moves alike, in phase."""
+    out = tmp_path / "board"
+    result = bench(folder, [csv_of(2, tmp_path / "a.csv")], out=out)
+    (record,) = json.loads((out / "bench.json").read_text("utf-8"))["records"]
+    assert record["ngspice"]["response"] == "1-2-2"
+    assert not record["ngspice"]["fitted"]
+    exact, wave = record["exact_circuit"]["difference"], record["ngspice"]["difference"]
+    for net in ("v1", "fv"):
+        assert wave[net] == pytest.approx(exact[net], abs=0.02)
+    assert result.answer["records"] == [record]
+    assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), EnvironmentMissing("no ngspice")])
+def test_what_stands_before_ngspice_is_kept(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    def stop(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(bench_job, "require_ngspice", stop)
+    out = tmp_path / "board"
+    ends = (
+        pytest.raises(KeyboardInterrupt) if isinstance(error, KeyboardInterrupt) else nullcontext()
+    )
+    with ends:
+        bench(folder, [csv_of(2, tmp_path / "a.csv")], out=out)
+    (record,) = json.loads((out / "bench.json").read_text("utf-8"))["records"]
+    assert (record["response"], record["ngspice"]) == ("1-2-2", None)
+    assert (out / "bench.html").exists()
+
+
+@pytest.mark.slow
 def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
     """Two boards with a record each: figures, advice for every response, a list to study."""
     files = []
@@ -97,6 +132,9 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
         assert {a["expected"] for a in board["advice"]} >= {"1-1-1", "1-2-2", "1-8-8"}
         assert record["advice"]["expected"] == record["wanted"] == record["response"]
         assert record["advice"]["words"] == "leave it as it is set"
+        wave = record["ngspice"]
+        assert (wave["response"], wave["fitted"]) == (record["response"], True)
+        assert max(wave["difference"].values()) < 0.06  # the scope's gain is off by 2 % at most
     names = set(pd.read_csv(out / "boards.csv")["board"])
     assert names == {f"{board} {k}" for board in "AB" for k in range(1, 21)}
     page = (out / "bench.html").read_text("utf-8")

@@ -65,7 +65,14 @@ def test_the_contract_names_the_options_that_there_are(verb: str) -> None:
     general = re.search(r"^Options: (.*)$", section("Verbs"), re.MULTILINE)
     assert general is not None
     everywhere = set(re.findall(r"--?[a-z-]+", general[1]))
-    longer = {"--verbose", "--quiet", "--points", "--blame", "--browser"}  # of -v, -q, --no-…
+    longer = {
+        "--verbose",
+        "--quiet",
+        "--points",
+        "--blame",
+        "--browser",
+        "--ngspice",
+    }  # of -v, -q, --no-…
     assert set(there) - said - everywhere - longer == set()
 
 
