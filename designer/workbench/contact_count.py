@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 
@@ -88,7 +89,22 @@ class ContactCount:
     """Where the impacts are, as a fraction of the lap."""
 
 
-def count(evidence: ContactEvidence, sure: float = SURE) -> ContactCount:
+class ExtremeEvidence(Protocol):
+    """What decides on the extremes of a trace."""
+
+    @property
+    def trace(self) -> Array:
+        """(k,) the displacement beyond the stop along a lap [V]."""
+
+    @property
+    def noise(self) -> float:
+        """Standard error of the trace from one of its extremes to the next [V]."""
+
+    def ratio(self, at: int) -> float:
+        """Logarithm of the likelihood of contact over that of none at a point of the lap."""
+
+
+def count(evidence: ExtremeEvidence, sure: float = SURE) -> ContactCount:
     """The impacts on one stop over a closed lap. sure : logarithm of the ratio of the likelihoods
     at which an extreme is decided."""
     trace = evidence.trace

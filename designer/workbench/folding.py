@@ -97,26 +97,26 @@ def _splines(
 ) -> tuple[Array, Array, Array]:
     """Curves, rates and squares of what is left of some channels, with so many knots a lap."""
     phase = (samples.time * frequency) % n
-    basis = _basis(phase * count / n, count)
+    basis = spline_basis(phase * count / n, count)
     normal = (basis.T @ basis).tocsc()
     ridge = RIDGE * float(abs(normal).max())
     solver = splu(normal + ridge * sparse.identity(count, format="csc"))
     weights = solver.solve(basis.T @ samples.values[:, of])
     squares = ((samples.values[:, of] - basis @ weights) ** 2).sum(axis=0)
     grid = np.arange(n * POINTS) * count / (n * POINTS)
-    rates = _basis(grid, count, rate=True) @ weights * (count / n)
-    return np.asarray(_basis(grid, count) @ weights), np.asarray(rates), squares
+    rates = spline_basis(grid, count, rate=True) @ weights * (count / n)
+    return np.asarray(spline_basis(grid, count) @ weights), np.asarray(rates), squares
 
 
 def best_knots(
-    samples: Samples, frequency: float, choices: Sequence[int] = KNOTS
+    samples: Samples, frequency: float, choices: Sequence[int] = KNOTS, n: int = 1
 ) -> tuple[int, ...]:
     """Knots of a period for each channel, of some choices by generalised cross-validation (Craven
-    and Wahba, Numer. Math. 31, 1979)."""
+    and Wahba, Numer. Math. 31, 1979) on laps of n periods."""
     count = len(samples.time)
-    tried = [k for k in choices if SAMPLES_A_KNOT * k <= count] or [choices[0]]
+    tried = [k for k in choices if SAMPLES_A_KNOT * k * n <= count] or [choices[0]]
     scores = np.array(
-        [fold(samples, frequency, 1, k).squares / (1.0 - k / count) ** 2 for k in tried]
+        [fold(samples, frequency, n, k).squares / (1.0 - k * n / count) ** 2 for k in tried]
     )
     return tuple(tried[k] for k in scores.argmin(axis=0))
 
@@ -137,7 +137,7 @@ def rates_at(samples: Samples, frequency: float, curve: Fold) -> Array:
     return np.asarray(curve.rate[place])
 
 
-def _basis(place: Array, count: int, *, rate: bool = False) -> sparse.csr_array:
+def spline_basis(place: Array, count: int, *, rate: bool = False) -> sparse.csr_array:
     """(k, count) values, or rates, of the closed uniform cubic B-splines at ``place`` (k,), in
     knots."""
     cell = np.floor(place).astype(np.int64)

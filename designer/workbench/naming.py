@@ -21,7 +21,13 @@ from designer.base.arrays import Array
 from designer.dynamics.counts import MAX_PERIOD, Counts
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, OrbitStatus
 from designer.workbench.board_curve import SURE as BOARD_SURE, board_evidence
-from designer.workbench.contact_count import SURE, ContactCount, ContactEvidence, count
+from designer.workbench.contact_count import (
+    SURE,
+    ContactCount,
+    ContactEvidence,
+    ExtremeEvidence,
+    count,
+)
 from designer.workbench.dead_zone_curve import DeadZoneCurve, fitted
 from designer.workbench.folding import (
     KNOTS,
@@ -106,12 +112,11 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
     nets = tuple(net for net in motion.channels if net != motion.generator)
     channels = [motion.channels[net] for net in nets]
     samples = samples_of(motion.record, channels, motion.frequency)
-    knots = best_knots(samples, motion.frequency)
-    lap = _whole_lap(samples, motion, knots)
+    lap = _whole_lap(samples, motion)
     if lap is None:
         return _without_period(motion, nets, _moving(nets, prediction), samples)
-    n, doubt = lap
-    curve = fold(samples, motion.frequency, n, _room(samples, n, knots))
+    curve, doubt = lap
+    n = curve.n
     zones = dict(_zones(curve, nets, prediction.stops))
     counted = [
         _counted(curve, nets, stop, zones.get(stop.clearance), prediction, k)
@@ -147,11 +152,10 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
 # -- the period -------------------------------------------------------------------------------
 
 
-def _whole_lap(
-    samples: Samples, motion: RecordedMotion, knots: Sequence[int]
-) -> tuple[int, str] | None:
-    """The least period, with what speaks against it; None where the record repeats after none that
-    it is long enough to show."""
+def _whole_lap(samples: Samples, motion: RecordedMotion) -> tuple[Fold, str] | None:
+    """The curve of the least period, with what speaks against it; None where the record repeats
+    after none that it is long enough to show."""
+    knots = best_knots(samples, motion.frequency)
     coarse, most = min(*knots, COARSE), int(min(MAX_PERIOD, motion.periods / FEWEST_LAPS))
     folds = [
         fold(samples, motion.frequency, n, coarse)
@@ -162,11 +166,13 @@ def _whole_lap(
     for further in folds[1:]:
         if _gain(best, further) > DIFFERENT:
             best = further
+    if best.n > 1:  # what one period leaves over has hidden what is fine in the curve
+        knots = best_knots(samples, motion.frequency, n=best.n)
     whole = fold(samples, motion.frequency, best.n, _room(samples, best.n, knots))
     if not (whole.left < NOISE_ROOM * samples.noise).all():
         return None
     short = motion.periods < LAPS * best.n
-    return best.n, f"it lasts {motion.periods:.3g} drive periods" if short else ""
+    return whole, f"it lasts {motion.periods:.3g} drive periods" if short else ""
 
 
 def _gain(shorter: Fold, longer: Fold) -> float:
@@ -328,7 +334,7 @@ def _by_output(
 def _by_board(
     counted: Mapping[int, ContactCount | None],
     clearance: int,
-    evidence: Mapping[tuple[int, int], ContactEvidence],
+    evidence: Mapping[tuple[int, int], ExtremeEvidence],
 ) -> dict[int, ContactCount | None]:
     """The impacts on each stop of a clearance: what the curve leaves open as the curve of the board
     has it, if the first allows that."""

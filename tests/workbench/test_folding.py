@@ -16,6 +16,7 @@ from designer.workbench.folding import POINTS, best_knots, fold, samples_of
 from designer.workbench.record import Record
 
 FREQUENCY, SIGMA = 83.1, 0.02
+TIME = np.linspace(0.0, 12.3 / FREQUENCY, 6000)
 
 
 def wave(phase: Array) -> Array:
@@ -42,6 +43,17 @@ def test_the_curve_is_right_within_its_own_error() -> None:
     assert curve.left[0] == pytest.approx(SIGMA, rel=0.05)
     rate = np.gradient(wave(np.arange(POINTS) / POINTS), 1.0 / POINTS)
     assert np.abs(curve.rate[5:-5, 0] - rate[5:-5]).max() < 0.05 * np.abs(rate).max()
+
+
+def test_knots_are_chosen_on_the_whole_lap() -> None:
+    """What a period leaves over of a motion of two hides how fine the curve is."""
+    made, fine = record(12.3, 6000, 0.5), 0.05 * np.cos(80.0 * np.pi * FREQUENCY * TIME)
+    samples = samples_of(Record(TIME, {"CH1": made.signals["CH1"] + fine}, "made"), ["CH1"], 83.1)
+    left = {
+        n: fold(samples, FREQUENCY, 2, best_knots(samples, FREQUENCY, n=n)).left[0] for n in (1, 2)
+    }
+    assert left[1] > 1.5 * SIGMA
+    assert left[2] == pytest.approx(SIGMA, rel=0.05)
 
 
 def test_many_samples_are_averaged_and_few_are_not() -> None:
