@@ -33,6 +33,8 @@ from .origin import (
     provenance as provenance,
 )
 from .report_sections import (
+    BENCHED as BENCHED,
+    design_hash as design_hash,
     later_sections as later_sections,
     renew_report as renew_report,
 )
