@@ -10,10 +10,10 @@ import typer.core
 import typer.main
 
 from designer.base.errors import InputError
-from designer.cli import bifurcation, explore, tools, verbs
+from designer.cli import bifurcation, explore, make_verbs, tools, verbs
 from designer.cli.app import VERBS, app
 
-REGISTERED = (verbs, bifurcation, explore, tools)
+REGISTERED = (verbs, make_verbs, bifurcation, explore, tools)
 """The modules of the verbs: importing one registers what it has."""
 
 

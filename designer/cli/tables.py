@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -76,7 +76,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         f"Responses, {answer['samples']} samples{of_file}",
         (
             {
-                **_response_cells(r, rows),
+                **response_cells(r, rows),
                 "model": r["model"] if r["found"] else f"{r['model']} (not what is wanted)",
                 "circuit": r["circuit"],
                 "ngspice": r["ngspice"] or "-",
@@ -147,7 +147,7 @@ def _further(answer: Mapping[str, Any]) -> None:
         "Further yields",
         (
             {
-                **_response_cells(r, rows),
+                **response_cells(r, rows),
                 **{kind: _decided(of(r) or {}) for kind, of in kinds_present.items()},
                 **(_both_engines(r) if both else {}),
             }
@@ -175,91 +175,6 @@ def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:
             f"{differ['count']} of {differ['asked']}",
         ]
     return dict(zip(("both engines %", "95 %", "differ"), cells, strict=True))
-
-
-def simulated(answer: Mapping[str, Any]) -> None:
-    """The responses on one engine."""
-    head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
-    rows = answer["responses"]
-    masses = answer.get("masses", ())
-    table(
-        head,
-        (
-            {
-                **(_response_cells_in_si if masses else _response_cells)(r, rows),
-                "response": r["response"]
-                + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
-                "symmetric": YES_NO[r["symmetric"]],
-                **_reach(r, rows, masses),
-                "twin": "-" if r["twin"] is None else r["twin"]["response"],
-                "others": ", ".join(o["response"] for o in r["others"]) or "-",
-            }
-            for r in rows
-        ),
-        gap=1,
-    )
-    in_si = bool(masses) and all("frequency_hz" in r for r in rows)
-    for r in rows:
-        place = f"ω = {r['omega']:g}{' rad/s' if in_si else ''}"
-        if r["starts"] is not None:
-            say(f"{place}: {coexisting(r['starts'], masses, in_si=in_si)}")
-        if r["reason"]:
-            say(f"{place}: {r['response']}: {r['reason']}")
-        if r["lyapunov_error"] is not None:
-            growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}{' 1/s' if in_si else ''}"
-            say(f"{place}: largest exponent {growth} (standard error)")
-        for line in untrusted({"this response": r.get("trust")}):
-            say(f"{place}: {line}")
-
-
-def _reach(
-    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], masses: Sequence[str]
-) -> dict[str, str]:
-    """How far the masses go: the first one, or each of those that have names."""
-    in_si = "frequency_hz" in rows[0]
-    cells = {}
-    for i, name in enumerate(masses):
-        ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
-        ends_text = (value_text(x, "m") if in_si else f"{x:.6g}" for x in ends)
-        cells[f"x{i + 1} ({name})"] = " to ".join(ends_text) or "-"
-    if masses:
-        return cells
-    si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
-    for head, key in {"x1 max": "x1_max", "x1 min": "x1_min"}.items():
-        cells[head] = "-" if row[key] is None else f"{row[key]:.6g}"
-    for head, key in si.items():
-        cells[head] = "-" if row[key] is None else value_text(row[key], "m")
-    return cells
-
-
-def coexisting(
-    starts: Mapping[str, Any], masses: Sequence[str] = (), *, in_si: bool = False
-) -> str:
-    """Where the starts that were drawn from a box end, the largest share first.
-
-    masses : their names, if they have some. in_si : whether numbers are SI values.
-    """
-
-    def text(value: float, unit: str, digits: int = 4) -> str:
-        return value_text(value, unit, digits) if in_si else f"{value:.{digits}g}"
-
-    parts = []
-    names = Counter(a["response"] for a in starts["attractors"])
-    for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
-        name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
-        if names[a["response"]] > 1 and a["x1_min"] is not None:
-            name += f" (x1 {text(a['x1_min'], 'm')} to {text(a['x1_max'], 'm')})"
-        parts.append(f"{name} {_share(a)}")
-    if starts["not_settled"]["count"]:
-        parts.append(f"not settled {_share(starts['not_settled'])}")
-    named = {f"x{i + 1}": f" ({mass})" for i, mass in enumerate(masses)}
-    box = starts["box"].items()
-    units = {x: "m/s" if x.endswith("'") else "m" for x, _ in box}
-    halves = ", ".join(f"{x}{named.get(x, '')} ± {text(half, units[x], 3)}" for x, half in box)
-    count = str(starts["count"])
-    if starts["count"] < starts["asked"]:
-        count += f" (of {starts['asked']}: the others would take too many steps)"
-    return f"of {count} starts at drive phase 0 in the box {halves}: {'; '.join(parts)}"
 
 
 def compared(answer: Mapping[str, Any]) -> None:
@@ -361,73 +276,6 @@ def rules(answer: Mapping[str, Any]) -> None:
         say(f"  {why}: {', '.join(ids)}")
 
 
-def benched(answer: Mapping[str, Any]) -> None:
-    """What each record shows; then what is not sure, and what would tell."""
-    rows = answer["records"]
-    table(
-        "Records",
-        (
-            {
-                "record": r["file"],
-                "ω": f"{r['omega']:.4g}",
-                "drive": f"{r['frequency_hz']:.5g} Hz",
-                "shows": r["response"],
-                "sure": YES_NO[r["sure"]],
-                "wanted there": r["wanted"] or "-",
-                "exact circuit": (r["exact_circuit"] or {}).get("response", "-"),
-            }
-            for r in rows
-        ),
-    )
-    for r in rows:
-        if r["others"]:
-            say(f"{r['file']}: {r['response']}, or {' or '.join(r['others'])}")
-        if r["reason"]:
-            say(f"{r['file']}: not sure, for {r['reason']}. What would tell: {r['would_tell']}.")
-    for board in answer["boards"]:
-        _fitted(board)
-    for kind in answer["spread"]:
-        say(
-            f"{kind['kind']} differ by {kind['factor']:.2g} times what [spread] says "
-            f"({kind['low']:.2g} to {kind['high']:.2g})"
-        )
-
-
-def _fitted(board: Mapping[str, Any]) -> None:
-    """What the records tell of a board, and what to turn on it."""
-    of = f" {board['board']}" if board["board"] else ""
-    if board["reason"]:
-        say(f"The board{of} was not found: {board['reason']}")
-        return
-    rows = (
-        {
-            "figure": f["name"],
-            "unit": f["unit"],
-            "this board": f"{f['value']:.5g}",
-            "95 %": f"{f['low']:.5g} to {f['high']:.5g}",
-            "nominal": f"{f['nominal']:.5g}",
-        }
-        for f in board["figures"]
-    )
-    table(f"The board{of}, as its records tell it", rows)
-    advised = (
-        {
-            "wanted": a["expected"],
-            "ω": f"{a['omega']:.4g}",
-            "shows as set": next(iter(a["shown"])),
-            "advice": a["words"],
-            "then, % of boards": f"{100 * a['share']:.0f}",
-        }
-        for a in board["advice"]
-    )
-    table("What to turn", advised)
-    if board["doubtful"]:
-        say(
-            f"The records differ from the board that was found by {board['misfit']:.1f} times what "
-            "noise explains: it may not be one of this spread, or the generator was set otherwise."
-        )
-
-
 def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     written = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
@@ -479,23 +327,13 @@ def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
     return trust
 
 
-def _response_cells(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def response_cells(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The first cells of a response: its frequency and the wanted n-p-q."""
     return {
         "ω": f"{row['omega']:g}",
         **_mechanism(row, rows, "frequency_hz"),
         "expected": row["expected"] or "-",
     }
-
-
-def _response_cells_in_si(
-    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
-) -> dict[str, str]:
-    """The same cells for a model whose plain numbers are SI values, where it has any."""
-    cells = _response_cells(row, rows)
-    if "mechanism" not in cells:
-        return cells
-    return {"ω [rad/s]": cells["ω"], "frequency": cells["mechanism"], "expected": cells["expected"]}
 
 
 def _mechanism(
@@ -510,12 +348,6 @@ def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
     if counted.get("census") and ends["low"] == ends["high"]:
         return f"all {counted['samples']}"
     return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"
-
-
-def _share(counted: Mapping[str, Any]) -> str:
-    """With its 95 % interval."""
-    low, high = 100 * counted["low"], 100 * counted["high"]
-    return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
 
 
 def _percent(rate: float | None) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from designer.cli import bifurcation_tables, tables
+from designer.cli import bifurcation_tables, simulate_tables, tables
 
 
 def answer(**more: Any) -> dict[str, Any]:
@@ -57,14 +57,14 @@ def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
         "count": 16,
         "asked": 16,
     }
-    text = tables.coexisting(starts)
+    text = simulate_tables.coexisting(starts)
     ends = "% (0 to 100)"
     first, second = f"1-1-0 (x1 -1.2 to 0.9) 50 {ends}", f"1-1-0 (x1 -0.31 to 0.52) 25 {ends}"
     assert f"{first}; {second}; 2-2-1 12.5 {ends}" in text
     assert text.count("aperiodic 6.25 %") == 2
     assert "in the box x1 ± 2:" in text
     starts["box"] = {"x1": 0.0045, "x1'": 0.26}
-    in_si = tables.coexisting(starts, ["hammer"], in_si=True)
+    in_si = simulate_tables.coexisting(starts, ["hammer"], in_si=True)
     assert "in the box x1 (hammer) ± 4.5 mm, x1' ± 260 mm/s:" in in_si
     assert "1-1-0 (x1 -310 mm to 520 mm) 25 %" in in_si
 
