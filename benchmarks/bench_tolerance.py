@@ -26,7 +26,8 @@ from designer.base.defaults import cores
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import describe, shoot

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
 from designer.spice.deck import SolverSettings, write
 from designer.spice.numerics_gate import RELTOL, STEPS_PER_PERIOD
 from designer.verdicts.verdict import StudyPlan

@@ -12,7 +12,8 @@ from benchmarks.references import Problem, truth
 from designer.base.arrays import Array
 from designer.check import trust
 from designer.dynamics.attractors import peaks_near, settle
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless

@@ -26,7 +26,8 @@ from designer.bifurcations.parameter_map import COURSE
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import describe, shoot
 from designer.dynamics.counts import Pairs
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import UPPER, Course, DrivenSystem, stopped
 from designer.kernels.kernel_orbit import CHAOS

@@ -18,7 +18,8 @@ from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.attractors import peaks_near
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 
 NEWTON = 10
 """Most iterations of the corrector."""

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.mode_tables import augmented, augmented_row, step_length
 from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
 from designer.kernels.kernel_algebra import motion_terms

@@ -25,7 +25,8 @@ from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, Trimmer
-from designer.circuit.netlist import Circuit, Fitting, Section, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Fitting, Section
 from designer.circuit.working_modes import at_rest
 from designer.model.board_table import BoardChoice
 

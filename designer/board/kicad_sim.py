@@ -13,7 +13,8 @@ from designer.board.component import Component
 from designer.board.kicad_names import kicad_net
 from designer.board.pins import SUPPLY_UNIT
 from designer.check.deck_runs import FirstRun
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit
 from designer.spice import opamp_model
 from designer.spice.deck import diode_cards, diode_names
 from designer.spice.opamp_model import literal

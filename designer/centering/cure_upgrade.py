@@ -23,10 +23,11 @@ from designer.board.component import components, to_buy
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, Design
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile, parse_model_file

@@ -29,7 +29,8 @@ from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import coexisting, settle, starts as sobol_starts
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
+from designer.dynamics.flow import MAX_EVENTS, Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
 from designer.model.absolute_motion import absolute_extremes

@@ -22,7 +22,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.reason import Reason
 from designer.dynamics.attractors import STROBE_TOLERANCE, peaks_near
-from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateResult
 from designer.spice.simulator import SimulationFailed

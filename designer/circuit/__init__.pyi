@@ -13,6 +13,7 @@ from .board_parts_only import (
     TestPoint as TestPoint,
     Trimmer as Trimmer,
 )
+from .board_values import Board as Board, nominal_board as nominal_board
 from .build import (
     constant_resistor as constant_resistor,
 )
@@ -50,7 +51,6 @@ from .netlist import (
     GROUND as GROUND,
     NEGATIVE as NEGATIVE,
     POSITIVE as POSITIVE,
-    Board as Board,
     Capacitor as Capacitor,
     Circuit as Circuit,
     Diode as Diode,
@@ -61,7 +61,6 @@ from .netlist import (
     Reference as Reference,
     Resistor as Resistor,
     Section as Section,
-    nominal_board as nominal_board,
 )
 from .nodal import (
     Exit as Exit,

@@ -10,7 +10,8 @@ import numpy as np
 
 from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
-from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import Circuit
 
 _RAILS = ("low", "high")
 _OF_A_BOARD = ("values", "offset", "bias", "reference", "drop", "supply", "gain_bandwidth")
@@ -20,7 +21,7 @@ _BY_NAME = (*_OF_A_BOARD, *_RAILS)
 @dataclass(frozen=True)
 class Boards:
     """N boards of a circuit; every mapping is from a name to an array (N,), see
-    ``netlist.Board``."""
+    ``board_values.Board``."""
 
     circuit: Circuit
     """The circuit."""

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.dead_zone_reading import DeadZoneReading
-from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.circuit.scale_fit import minimax
 from designer.model.mechanics import SecondOrderSystem, state_names

@@ -12,8 +12,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.frames import frame, table_html
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import CoefficientErrors
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.circuit.resistors import Composite, composites_of
 from designer.dynamics.orbit import Orbit

@@ -21,7 +21,8 @@ from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics import attractors, working_modes
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
+from designer.dynamics.flow import MAX_EVENTS, Flow
+from designer.dynamics.flow_result import FlowResult
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 from designer.kernels import kernel_boards as kernel

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import GROUND, Circuit, Diode, Section
 from designer.circuit.stop import Stop
 from designer.dynamics.piecewise_linear import ModeKey
 

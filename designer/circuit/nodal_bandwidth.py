@@ -25,7 +25,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import GROUND, Circuit, Diode, Section
 from designer.circuit.nodal import NodalEquations, Solution, Solver, plus
 from designer.dynamics.piecewise_linear import ModeKey
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.circuit.board_values import nominal_board
 from designer.circuit.design import Design
-from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

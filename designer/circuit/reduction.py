@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import Board, Circuit
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import NodalEquations, Solution
 from designer.circuit.nodal_bandwidth import LaggingEquations
 from designer.circuit.stop import Stop

@@ -15,9 +15,10 @@ from designer.base.schema import one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.subject import ShownStop
+from designer.circuit.board_values import Board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
-from designer.circuit.netlist import Board, Excitation
+from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem

@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import GROUND, Circuit, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.dynamics.piecewise_linear import ModeKey
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import GROUND, Board, Circuit, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Solution
 from designer.circuit.reduction import Reduction
 from designer.synthesis.output_loads import REST, Run, Sampled

@@ -34,12 +34,8 @@ from .counts import (
 from .drive_states import (
     with_drive_states as with_drive_states,
 )
-from .flow import (
-    MAX_EVENTS as MAX_EVENTS,
-    Flow as Flow,
-    FlowResult as FlowResult,
-    FlowStatus as FlowStatus,
-)
+from .flow import MAX_EVENTS as MAX_EVENTS, Flow as Flow
+from .flow_result import FlowResult as FlowResult, FlowStatus as FlowStatus
 from .modal_tables import (
     WORST_RESONANCE as WORST_RESONANCE,
     Oscillators as Oscillators,

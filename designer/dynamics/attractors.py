@@ -21,7 +21,8 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult, FlowStatus
+from designer.dynamics.flow import MAX_EVENTS, Flow
+from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.lyapunov_exponent import BLOCK, Bound, LyapunovExponent, lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +21,7 @@ from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.threads import heed
 from designer.dynamics import modal_tables, mode_tables, working_modes
+from designer.dynamics.flow_result import FlowResult, FlowStatus, Impacts
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
 from designer.dynamics.working_modes import MOST_STATES, TabulatedModes
@@ -46,70 +45,6 @@ SLICE = 5_000_000
 """Steps between two looks at it, where a period has many: half a second."""
 FAST_STEP, FAST_PERIOD, FAST_IMPACT = 0.15, 10.0, 10.0
 """What a step, a period and an impact of the fast paths cost, in steps of the general kernel."""
-
-
-class FlowStatus(StrEnum):
-    """How a run of the flow ended."""
-
-    DONE = "done"
-    CHATTER = "too many events"
-    DIVERGED = "diverged"
-    TOO_LONG = "too many steps"
-
-
-@dataclass(frozen=True)
-class Impacts:
-    """Entries into contact in order of time."""
-
-    time: Array
-    """(k,) times of the entries."""
-    clearance: Index
-    """(k,) ints, index of the clearance."""
-    side: Index
-    """(k,) ints, 1 at the upper and -1 at the lower stop."""
-    velocity: Array
-    """(k,) velocities in the clearance at the entries."""
-    state: Array
-    """(k, n) states at the entries."""
-
-
-@dataclass(frozen=True)
-class FlowResult:
-    """What happened over ``periods`` drive periods."""
-
-    status: FlowStatus
-    """How the run ended."""
-    strobes: Array
-    """(periods · points + 1, n) states at the start and after each stretch."""
-    counts: Index
-    """(periods · points, clearances, 2) impacts on the lower and the upper stop."""
-    mode: ModeKey
-    """Key of the mode that was reached."""
-    tangent: Array | None
-    """(n, k) tangent vectors carried along, or None."""
-    impacts: Impacts
-    """Entries into contact, where they were measured."""
-    extremes: Array
-    """(n, 2) least and greatest value of each state, where they were measured."""
-    spans: Array
-    """(clearances, 2) least and greatest displacement in each clearance, where measured."""
-    graze: Array
-    """(clearances, 2) the smallest of all contacts' greatest penetrations, and the nearest approach
-    to a stop without contact; inf where there is none."""
-    tangencies: int
-    """Undecided tangencies to a stop."""
-    clipped_time: float
-    """Time spent in modes where an element that ought to be linear is at its limit."""
-
-    @property
-    def penetration(self) -> float:
-        """The smallest of all contacts' greatest penetrations."""
-        return float(self.graze[:, 0].min(initial=np.inf))
-
-    @property
-    def miss(self) -> float:
-        """The nearest approach to a stop without contact; inf where there is none."""
-        return float(self.graze[:, 1].min(initial=np.inf))
 
 
 class Flow:

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.piecewise_linear import ModeKey
 
 BLOCK = 5

@@ -20,7 +20,8 @@ from designer.base.threads import interrupt
 from designer.dynamics import attractors
 from designer.dynamics.attractors import peaks_near, settle
 from designer.dynamics.counts import MAX_PERIOD, Pairs
-from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
+from designer.dynamics.flow import MAX_EVENTS, Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.lyapunov_exponent import (
     BLOCK,
     Bound,

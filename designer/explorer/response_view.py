@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.attractors import ENGINE_ERROR, settle
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
 from designer.explorer.place import SHOWN, ModelPlace, start_text, words_of

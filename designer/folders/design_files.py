@@ -20,10 +20,10 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import circuit_notes, first_run
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
-from designer.circuit.netlist import nominal_board
 from designer.fabrication.board_cost import cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes

@@ -17,8 +17,8 @@ import numpy as np
 from designer.base import jit
 from designer.catalog.catalog import load_catalog
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import nominal_board
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec

@@ -14,7 +14,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics import step_budget
 from designer.dynamics.drive_states import with_drive_states
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_place import OUTPUT
-from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section, nominal_board
+from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section
 from designer.kernels.kernel_boards import POINTS
 from designer.paper.circuits import Built, SettledResponse
 from designer.spice import deck, numerics_gate

@@ -15,10 +15,11 @@ from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_place import OUTPUT
 from designer.circuit.ensemble import displacement
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.attractors import settle

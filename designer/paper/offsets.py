@@ -16,8 +16,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import nominal_board
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit

@@ -9,7 +9,8 @@ from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

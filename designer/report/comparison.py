@@ -25,8 +25,9 @@ from designer.catalog.entries import Kind, OpAmp
 from designer.catalog.fields import PRICE_CLASSES
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
-from designer.circuit.netlist import Board, Capacitor, Circuit, Resistor, Section, nominal_board
+from designer.circuit.netlist import Capacitor, Circuit, Resistor, Section
 from designer.circuit.packing import QUAD
 from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import FloatingCircuit, Reduction

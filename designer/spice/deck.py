@@ -14,7 +14,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import card
-from designer.circuit.netlist import Board, Circuit, Excitation, Reference
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import Circuit, Excitation, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.spice import opamp_model
 from designer.spice.opamp_model import Rung, literal

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.base.progress import doing
+from designer.circuit.board_values import nominal_board
 from designer.circuit.design import Design
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.noise_gains import conductance
 from designer.circuit.reduction import Reduction
 from designer.circuit.stop import Stop

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.base.reason import Reason
-from designer.circuit.netlist import Board, Circuit, Excitation
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow

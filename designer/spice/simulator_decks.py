@@ -22,13 +22,8 @@ from typing import Literal, get_args
 
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import THERMAL
-from designer.circuit.netlist import (
-    GROUND,
-    Board,
-    Circuit,
-    Excitation,
-    nominal_board,
-)
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import GROUND, Circuit, Excitation
 from designer.spice import deck, opamp_model
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import literal

@@ -10,7 +10,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit
 
 _GROUPS = ("values", "offset", "low", "high", "bias", "reference", "supply")
 """Of ``Boards``: what the exact rung depends on and a spread may draw. The drop of a diode and the

@@ -18,13 +18,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.entries import OpAmp
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import (
-    Board,
-    Capacitor,
-    Circuit,
-    Reference,
-    Resistor,
-)
+from designer.circuit.board_values import Board
+from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.model.distributions import Distribution, Normal, Uniform
 from designer.model.measured_values import MeasuredBoards
 from designer.spread import random_streams

@@ -22,7 +22,8 @@ from designer.base.errors import InputError
 from designer.circuit.design import Design
 from designer.circuit.nominal import circuit_flow, on_circuit
 from designer.circuit.reduction import Reduction
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.model.find_responses import ModelResponse

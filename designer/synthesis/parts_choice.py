@@ -18,10 +18,10 @@ from typing import NoReturn
 from designer.base.errors import Unreachable
 from designer.base.progress import doing, part
 from designer.catalog.catalog import Catalog
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design
-from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec

@@ -19,7 +19,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.convergence_aids import RunQueue, Task

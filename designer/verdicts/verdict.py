@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings

@@ -17,8 +17,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from designer.base.arrays import Array
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands

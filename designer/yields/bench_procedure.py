@@ -14,7 +14,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.counts import Counts
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands

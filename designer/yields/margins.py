@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array, Index
 from designer.base.threads import parallel
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, functions
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit

@@ -18,7 +18,8 @@ from designer.base.threads import parallel
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import FloatingCircuit
 from designer.dynamics.drive_states import with_drive_states
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms

@@ -11,7 +11,8 @@ from designer.base.views import View
 from designer.board.board_parts import fitted
 from designer.board.bom import bill
 from designer.board.component import components, designator, joined
-from designer.circuit.netlist import Circuit, Excitation, Section, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Excitation, Section
 from designer.model.board_table import BoardChoice
 from designer.spice.deck import SolverSettings, write
 from tests.circuit.test_reduction import EXACT

@@ -10,7 +10,7 @@ import pytest
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import Orbit, OrbitStatus

@@ -17,7 +17,7 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.orbit_curve import Curve, Solved
 from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.windows import NOT_LOCATED, all_windows, outside, window, windows
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

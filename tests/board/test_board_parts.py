@@ -26,16 +26,8 @@ from designer.board.component import Component, components, joined
 from designer.catalog.diode_curve import card
 from designer.catalog.entries import mounting_of
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
-from designer.circuit.netlist import (
-    GROUND,
-    Circuit,
-    Diode,
-    Fitting,
-    Generator,
-    Resistor,
-    Section,
-    nominal_board,
-)
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import GROUND, Circuit, Diode, Fitting, Generator, Resistor, Section
 from designer.circuit.reduction import Reduction
 from designer.circuit.stage_title import stage_names
 from designer.model.board_table import BoardChoice, BoardSpec, Trim

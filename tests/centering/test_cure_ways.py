@@ -24,8 +24,9 @@ from designer.centering.cure_ways import (
     foretold,
     settled,
 )
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import Counts

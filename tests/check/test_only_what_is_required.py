@@ -15,7 +15,8 @@ import pytest
 
 from designer.catalog.catalog import load_catalog
 from designer.circuit import build, paper_values, terms as matching
-from designer.circuit.netlist import Circuit, Excitation, Resistor, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Excitation, Resistor
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

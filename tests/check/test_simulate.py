@@ -15,8 +15,8 @@ import pytest
 from designer import parse_model_file
 from designer.check import simulation
 from designer.cli import entry
-from designer.dynamics import flow
 from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowResult
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.plots import simulate_plots
@@ -129,7 +129,7 @@ def test_chattering_ends_with_a_status(
 ) -> None:
     run = Flow.run
 
-    def nervous(self: Flow, *arguments: Any, **more: Any) -> flow.FlowResult:
+    def nervous(self: Flow, *arguments: Any, **more: Any) -> FlowResult:
         return run(self, *arguments, **{**more, "max_events": 2})
 
     monkeypatch.setattr(Flow, "run", nervous)

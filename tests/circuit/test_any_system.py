@@ -12,9 +12,10 @@ from hypothesis import given, settings, strategies as st
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
-from designer.circuit.netlist import Circuit, Section, nominal_board
+from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
 from designer.circuit.working_modes import at_rest
 from designer.dynamics.flow import Flow

@@ -9,7 +9,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import Board, nominal_board
+from designer.circuit.board_values import Board, nominal_board
 from designer.spread.spread import Spread, draw, draw_many
 from tests.circuit.test_rectifier import BOTH
 from tests.circuit.test_reduction import EXACT, circuit_of

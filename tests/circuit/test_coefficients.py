@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import nominal_board
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.oracles import Plain, coefficient_error, dead_zone_gains, minimax

@@ -11,9 +11,10 @@ import pytest
 from designer.base.arrays import Array
 from designer.circuit import ensemble
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.ensemble import Ensemble, SettledBoard
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

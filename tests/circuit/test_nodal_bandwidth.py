@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Capacitor, Circuit, Part, Resistor, Section, nominal_board
+from designer.circuit.netlist import Capacitor, Circuit, Part, Resistor, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

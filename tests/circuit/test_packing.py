@@ -13,8 +13,9 @@ import pytest
 from designer.board.board_parts import fitted
 from designer.board.component import components
 from designer.catalog.entries import OpAmp, SectionPins as PinTable
+from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_parts import idle_limits
-from designer.circuit.netlist import Circuit, Excitation, Section, nominal_board
+from designer.circuit.netlist import Circuit, Excitation, Section
 from designer.circuit.packing import assignment, packed
 from designer.circuit.reduction import Reduction
 from designer.folders.design_source import read_design

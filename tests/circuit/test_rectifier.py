@@ -11,13 +11,15 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from designer.base.errors import InputError
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
-from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.circuit.resistors import composites_of
 from designer.dynamics.attractors import describe, settle, shoot_symmetric, twin
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec

@@ -10,17 +10,9 @@ from scipy.integrate import solve_ivp
 
 from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import (
-    Capacitor,
-    Circuit,
-    Diode,
-    Excitation,
-    Part,
-    Resistor,
-    Section,
-    nominal_board,
-)
+from designer.circuit.netlist import Capacitor, Circuit, Diode, Excitation, Part, Resistor, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

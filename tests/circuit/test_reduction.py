@@ -12,8 +12,8 @@ from hypothesis import given, settings, strategies as st
 from designer.base.errors import InputError
 from designer.catalog.catalog import load_catalog
 from designer.circuit import build
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import (
-    Board,
     Capacitor,
     Circuit,
     Excitation,
@@ -21,7 +21,6 @@ from designer.circuit.netlist import (
     Part,
     Resistor,
     Section,
-    nominal_board,
 )
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.flow import Flow

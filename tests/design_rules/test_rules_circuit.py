@@ -12,8 +12,9 @@ import pytest
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
+from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_parts import Kind
-from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, nominal_board
+from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.force_at_clearance import Statics, leftovers, thermal

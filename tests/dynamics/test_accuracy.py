@@ -15,7 +15,8 @@ from benchmarks.references import Problem, Truth, truth
 from designer.base.arrays import Array
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless

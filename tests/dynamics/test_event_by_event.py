@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
-from designer.dynamics.flow import FlowStatus
+from designer.dynamics.flow_result import FlowStatus
 from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
 from tests.shared.mechanisms import absolute, flow_of
 

@@ -11,7 +11,8 @@ from hypothesis import assume, given, settings, strategies as st
 from scipy.linalg import expm
 
 from designer.base.arrays import Array
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.piecewise_linear import Drive, Guard, Mode, ModeKey, PiecewiseLinearSystem
 from designer.model.mechanics import Clearance, SecondOrderSystem
 from designer.model.model import Dimensionless

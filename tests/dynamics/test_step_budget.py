@@ -14,7 +14,8 @@ from designer.check import coexistence
 from designer.cli import entry
 from designer.dynamics import flow, step_budget
 from designer.dynamics.attractors import coexisting, settle
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.step_budget import Budget

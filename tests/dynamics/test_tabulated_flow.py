@@ -9,7 +9,8 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from designer.base.arrays import Array
-from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Clearance, SecondOrderSystem, Side
 

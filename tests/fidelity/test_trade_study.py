@@ -23,7 +23,8 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.dynamics.orbit import Orbit, OrbitStatus

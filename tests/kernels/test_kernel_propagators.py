@@ -10,11 +10,13 @@ from hypothesis import assume, given, settings, strategies as st
 
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.kernel_nodal import solve_all
-from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics import working_modes
-from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.kernels import kernel_propagators as kernel
 from designer.kernels.kernel_orbit import DONE

@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 from designer.base.errors import InputError
 from designer.catalog.catalog import load_catalog
 from designer.circuit import paper_values
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.fidelity import runge_kutta

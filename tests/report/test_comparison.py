@@ -16,7 +16,8 @@ from designer.base.manifest import MANIFEST
 from designer.catalog.catalog import load_catalog
 from designer.catalog.fields import PRICE_CLASSES
 from designer.circuit import paper_values
-from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import Reduction
 from designer.cli import entry

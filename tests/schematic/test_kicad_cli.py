@@ -14,7 +14,7 @@ from designer.base.sexpr import read
 from designer.check import checked_design
 from designer.check.deck_runs import FirstRun
 from designer.circuit import nominal
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.dynamics.orbit import Orbit
 from designer.schematic.kicad_project import files
 from designer.spice import deck, numerics_gate

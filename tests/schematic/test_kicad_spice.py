@@ -10,8 +10,9 @@ import pytest
 
 from designer.catalog.entries import Mounting
 from designer.check.deck_runs import FirstRun
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import Board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Board
 from designer.dynamics.counts import Counts
 from designer.model.response_table import Response
 from designer.spread.spread import Spread

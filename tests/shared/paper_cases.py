@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.flow import Flow

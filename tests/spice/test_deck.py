@@ -10,7 +10,8 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.netlist_guard import check_netlist
-from designer.circuit.netlist import Board, Circuit, Excitation, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive

@@ -12,7 +12,8 @@ from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
 from designer.catalog.fields import Figure
 from designer.catalog.vendor_model import PINS, VendorModel
-from designer.circuit.netlist import Board, Excitation, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive

@@ -10,7 +10,8 @@ import pytest
 from designer.catalog.catalog import load_catalog
 from designer.catalog.output_stage import output_at
 from designer.circuit import build
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.model.model import Dimensionless
 from designer.spice import deck
 from designer.spice.batch_backend import BatchNgspice

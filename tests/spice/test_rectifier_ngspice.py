@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from designer.base.netlist_guard import check_netlist
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Board, Circuit, Excitation, nominal_board
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

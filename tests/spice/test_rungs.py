@@ -13,9 +13,10 @@ from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.ensemble import displacement
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from designer.catalog.catalog import load_catalog
-from designer.circuit.netlist import Excitation, Reference, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation, Reference
 from designer.spice import deck
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.deck import SHUNT_REFERENCE, SolverSettings, shunt_reference

@@ -15,7 +15,7 @@ import pytest
 
 from designer.check.deck_runs import response_runs
 from designer.check.synthesis_result import Synthesis
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.folders import design_files
 from designer.jobs.export_job import deck_text

@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import kstest, truncnorm
 
 from designer.catalog.catalog import load_catalog
-from designer.circuit.netlist import Board
+from designer.circuit.board_values import Board
 from designer.spread.spread import Spread, draw, draw_many
 from tests.circuit.test_reduction import EXACT, circuit_of
 

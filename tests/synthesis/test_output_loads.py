@@ -10,7 +10,8 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.circuit.netlist import Board, Excitation, nominal_board
+from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

@@ -13,9 +13,10 @@ from designer.base.errors import Unreachable
 from designer.catalog.catalog import load_catalog
 from designer.check.synthesis_result import synthesise as synthesise_file
 from designer.circuit import build
+from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_parts import dead_zone_stage, idle_limits
 from designer.circuit.design import ConditionCheck, Design
-from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.netlist import Circuit
 from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow

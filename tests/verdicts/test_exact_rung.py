@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble, displacement
-from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

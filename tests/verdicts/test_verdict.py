@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import Counts

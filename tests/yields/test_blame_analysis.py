@@ -12,7 +12,7 @@ import pytest
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.continued_orbit import Function, follow, functions

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.errors import InputError
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from designer.base.errors import InputError
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

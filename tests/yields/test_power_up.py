@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.drive_states import with_drive_states

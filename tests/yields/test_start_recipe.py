@@ -11,8 +11,9 @@ import pytest
 
 from designer.base.proportion import wilson
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation, Resistor, nominal_board
+from designer.circuit.netlist import Excitation, Resistor
 from designer.circuit.reduction import Reduction
 from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from designer.circuit.board_arrays import Boards
-from designer.circuit.netlist import nominal_board
+from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle, shoot_symmetric
 from designer.dynamics.continued_orbit import follow, valleys

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from designer.base.errors import InputError
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.counts import Counts
