@@ -75,6 +75,17 @@ def test_no_package_grows_beyond_a_reader(package: str) -> None:
     assert sum(len(path.read_text("utf-8").splitlines()) for path in files) <= 5500
 
 
+def test_no_module_grows_beyond_a_sitting() -> None:
+    """450 lines; 600 for compiled kernels."""
+    longer = {
+        path.relative_to(HOUSE).as_posix(): count
+        for path in HOUSE.rglob("*.py")
+        if (count := len(path.read_text("utf-8").splitlines()))
+        > (600 if path.name.startswith("kernel_") else 450)
+    }
+    assert longer == {}
+
+
 def test_no_import_runs_back(every: tuple[Import, ...]) -> None:
     """Every import goes to the own package or to one that stands before it."""
     place = {package: number for number, package in enumerate(ORDER)}
