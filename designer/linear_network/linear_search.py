@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -182,22 +183,27 @@ def _relaxations(
 ) -> Iterator[tuple[str, LinearQuestion]]:
     """The question without each condition that it has, by the condition's name."""
     bounds, spec = question.bounds, question.spec
-    none = replace(bounds, seconds=(0.0, np.inf), level=np.inf, share=np.inf, stop=0.0)
+    off: dict[str, dict[str, Any]] = {
+        "frequency": {"seconds": (0.0, np.inf)},
+        "signal level": {"level": np.inf, "share": np.inf},
+        "stop stiffness": {"stop": 0.0},
+    }
+    there = {
+        name: without
+        for name, without in off.items()
+        if any(getattr(bounds, key) != value for key, value in without.items())
+    }
+    none = replace(bounds, **{k: v for without in off.values() for k, v in without.items()})
     if spec.most_values is not None:
         yield "distinct values", replace(question, spec=replace(spec, most_values=None))
     if spec.matched:
         yield "matched parts", replace(question, spec=replace(spec, matched=()))
-    for name, relaxed in (
-        ("frequency", replace(bounds, seconds=none.seconds)),
-        ("signal level", replace(bounds, level=np.inf, share=np.inf)),
-        ("stop stiffness", replace(bounds, stop=0.0)),
-    ):
-        if relaxed != bounds:
-            yield name, replace(question, bounds=relaxed)
+    for name, without in there.items():
+        yield name, replace(question, bounds=replace(bounds, **without))
     if len(resistors) > len(question.resistors):
         yield "signal resistors", replace(question, resistors=resistors)
         yield "side conditions", replace(question, resistors=resistors, bounds=none)
-    elif none != bounds:
+    elif there:
         yield "side conditions", replace(question, bounds=none)
 
 
