@@ -52,8 +52,6 @@ HALVINGS, TRIES = 34, (5, 12)
 """Of an interval in which counts change; after so many of them the point itself is tried for."""
 CORNER = 2e-2
 """In scaled units: farthest from a curve's last point to the grazing that stops it."""
-
-
 BESIDE = (1e-7, 1e-9)
 """Of the displacement's peak: distances from a stop that lead on to the touch itself."""
 

@@ -18,8 +18,6 @@ SHOWN: Mapping[StageName, Sequence[str]] = {
     "trade": ("trade.md", "trade.json", "trade.svg", "trade-numerics.svg"),
 }
 """Stages that the report shows, in its order, each with the files that it names."""
-
-
 BENCHED = "bench.json"
 """What ``bench`` answers of a board, in a directory of its own."""
 
@@ -45,10 +43,12 @@ def _bench(folder: Folder) -> Iterator[PageSection]:
             answer = read_json(path)
             if answer.get("design_sha256") == own:
                 answers[path.parent.relative_to(folder.path).as_posix()] = answer
-    if answers:
-        from designer.report.verb_sections import bench_section  # it needs matplotlib
+    if not answers:
+        return
+    from designer.report.verb_sections import bench_section, is_whole  # they need matplotlib
 
-        yield bench_section(answers)
+    if whole := {place: one for place, one in answers.items() if is_whole("bench", one)}:
+        yield bench_section(whole)
 
 
 def _sections(folder: Folder) -> Iterator[PageSection]:

@@ -188,6 +188,10 @@ NEEDED: Mapping[str, Sequence[str]] = {
           ("number", "omega", "b", "boards", "ok", "lost", "gained", "undecided", "difference",
            "low", "high")),
     ),
+    "bench": tuple(
+        f"records.{key}" for key in
+        ("file", "omega", "response", "sure", "others", "wanted", "as_wanted", "advice")
+    ),
 }  # fmt: skip
 """Keys that the section of a verb's answer shows, of each item where there is a list."""
 

@@ -201,6 +201,12 @@ def test_records_of_boards_in_the_folder_are_shown_with_their_pages(path: Path) 
         (boards / name / BENCHED).write_text(dumps(answer), encoding="utf-8")
     (boards / "broken").mkdir()
     (boards / "broken" / BENCHED).write_text("{", encoding="utf-8")
+    for key in NEEDED["bench"]:
+        last = key.removeprefix("records.")
+        (boards / f"without-{last}").mkdir()
+        fewer = [{k: v for k, v in rows[0].items() if k != last}, rows[1]]
+        answer = {"format": 1, "design_sha256": design, "records": fewer}
+        (boards / f"without-{last}" / BENCHED).write_text(dumps(answer), encoding="utf-8")
     renew_report(Folder(path))
     html, text = reports(path)
     assert '<a href="boards/A/bench.html">' in html
@@ -209,6 +215,7 @@ def test_records_of_boards_in_the_folder_are_shown_with_their_pages(path: Path) 
         assert "what is wanted there: 1 of 2." in page
         assert "not sure" in page
         assert "earlier" not in page
+        assert "without-" not in page
     assert Folder(path).changed("study") is None
     shutil.rmtree(boards)
     renew_report(Folder(path))
