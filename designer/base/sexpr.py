@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -166,8 +166,10 @@ def number_text(value: float) -> str:
     return "0" if text in ("-0", "") else text
 
 
+# A board of half a megabyte is read by the router, the rules and each picture of a page.
+@lru_cache(maxsize=4)
 def read(text: str, file: Path | None = None) -> Expression:
-    """The one expression of a file.
+    """The one expression of a file. The last few files are remembered.
 
     Raises
     ------
@@ -184,6 +186,7 @@ def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     """The expressions of a file; InputError as in ``read``."""
     source = SourceText(text, file)
     finished: list[Expression] = []
+    words: dict[tuple[str, bool], Atom] = {}
     stack: list[tuple[int, list[Atom | Expression]]] = []
     for match in _TOKEN.finditer(text):
         kind = match.lastindex
@@ -207,10 +210,14 @@ def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
         elif kind == _CLOSE:
             offset, items = stack.pop()
             (stack[-1][1] if stack else finished).append(Expression(tuple(items), source, offset))
-        elif kind == _QUOTED:
-            stack[-1][1].append(Atom(_unescaped(match[kind]), True))
         else:
-            stack[-1][1].append(Atom(match[kind]))
+            # One object for each word: a board repeats its words many times.
+            quoted = kind == _QUOTED
+            atom = words.get((match[kind], quoted))
+            if atom is None:
+                atom = Atom(_unescaped(match[kind]) if quoted else match[kind], quoted)
+                words[match[kind], quoted] = atom
+            stack[-1][1].append(atom)
     if stack:
         raise source.error(stack[-1][0], 'a "(" that nothing closes', "a whole file")
     return tuple(finished)
@@ -223,7 +230,9 @@ def expression_text(tree: Expression) -> str:
     ------
     ValueError : a bare atom that would not be read as one.
     """
-    return "\n".join(_lines(tree, 0)) + "\n"
+    lines: list[str] = []
+    _add(tree, 0, lines)
+    return "\n".join(lines) + "\n"
 
 
 def write_all(trees: Iterable[Expression]) -> str:
@@ -231,23 +240,18 @@ def write_all(trees: Iterable[Expression]) -> str:
     return "\n".join(expression_text(each) for each in trees)
 
 
-def _lines(tree: Expression, depth: int) -> Iterator[str]:
+def _add(tree: Expression, depth: int, lines: list[str]) -> None:
     """Atoms stay on the line of their list; each list in it has lines of its own."""
     tabs = "\t" * depth
-    line = tabs + "("
-    began = True
-    for item in tree.items:
+    lines.append(tabs + "(")
+    for number, item in enumerate(tree.items):
         if isinstance(item, Atom):
-            line += ("" if began else " ") + _atom(item)
+            lines[-1] += ("" if number == 0 else " ") + _atom(item)
         else:
-            yield line
-            *before, line = _lines(item, depth + 1)
-            yield from before
-        began = False
+            _add(item, depth + 1, lines)
     if tree.children:
-        yield line
-        line = tabs
-    yield line + ")"
+        lines.append(tabs)
+    lines[-1] += ")"
 
 
 def _atom(atom: Atom) -> str:

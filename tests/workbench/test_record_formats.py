@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Callable
 from pathlib import Path
 
@@ -176,6 +175,4 @@ def test_a_long_record_is_no_trouble(tmp_path: Path) -> None:
     path, count = tmp_path / "record.csv", 100_000
     table = np.column_stack([STEP * np.arange(count), np.sin(np.arange(count) * 0.01)])
     path.write_text("Time,Channel A\n(s),(V)\n\n" + "\n".join(f"{a:.8f},{b:.6f}" for a, b in table))
-    began = clock.process_time()
     assert len(read_record(path).time) == count
-    assert clock.process_time() > began
