@@ -112,3 +112,12 @@ def figures_are_blank() -> Iterator[None]:
     ``tests/board`` look at them."""
     with blank_figures():
         yield
+
+
+@pytest.fixture(scope="module")
+def designs_are_made_once() -> Iterator[None]:
+    """For modules that ask nothing of the choice of parts, nor of the way of the tracks."""
+    from tests.shared.made_once import made_once  # imports what most modules of tests do not need
+
+    with made_once():
+        yield

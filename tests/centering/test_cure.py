@@ -55,7 +55,7 @@ from tests.shared import bench_plans, paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 CATALOG = load_catalog()
 WEIGHTS = {"R50": 3.0, "R203": 2.0, "R4": 1.5, "R11": 1.0, "C2": 1.0, "R8": 0.6}
@@ -495,6 +495,7 @@ def with_trimmer(nominal: float, rate: float) -> LinearModel:
     return replace(seen, parts=parts, ways=(rows,))
 
 
+@pytest.mark.slow
 def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
     made, slot = branch().synthesis, trimming()
     assert slot.trim is not None

@@ -28,6 +28,8 @@ from tests.shared.chains import chain_text
 from tests.shared.search_cases import catalog, file
 from tests.shared.system_text import clearance
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 PLACE = 'omega = 0.8\nexpect = "1-2-2"'
 BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
 

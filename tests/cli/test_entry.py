@@ -694,6 +694,7 @@ def test_ctrl_c_is_exit_130(home: Path) -> None:
     assert not list(out.rglob("*.part"))
 
 
+@pytest.mark.slow
 def test_a_response_that_the_model_does_not_show_ends_the_folder_properly(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

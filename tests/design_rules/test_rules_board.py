@@ -36,7 +36,7 @@ from tests.circuit.test_reduction import EXACT
 from tests.shared.rule_cases import base
 from tests.shared.stages import stage
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 BY_KICAD = (
     "clearance",

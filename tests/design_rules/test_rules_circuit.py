@@ -32,7 +32,7 @@ from tests.shared.oracles import linear_matrix
 from tests.shared.rule_cases import PAIRS, TEXT, base, subject_of, with_circuit, with_part
 from tests.shared.stages import bought, model, one_sided, rectifier, stage
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 SECONDS = float(np.sqrt(1e-4 * 36e3 * 100e-9))
 """Of a unit of model time in the E24 network: sqrt(R1 C1 R4 C2)."""

@@ -22,7 +22,7 @@ from tests.design_rules.test_rules_board import (
 )
 from tests.shared.rule_cases import base
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 Change = Callable[[str], str]
 

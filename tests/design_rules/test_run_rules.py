@@ -39,7 +39,7 @@ from tests.shared import rule_cases
 from tests.shared.rule_cases import TEXT, base
 from tests.shared.stages import CATALOG
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "rules.md"
 

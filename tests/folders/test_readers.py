@@ -37,7 +37,7 @@ from tests.folders.test_study_cache import BLAME, kept
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = settings(max_examples=25, suppress_health_check=list(HealthCheck))

@@ -33,7 +33,7 @@ from tests.shared.quick_folders import without_starts
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "paper.toml"
 CASES: dict[str, tuple[Kind, Sides, dict[str, float], tuple[float, ...]]] = {

@@ -21,7 +21,7 @@ from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stopped_work import work_stopped
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 MODEL = "format = 1\n" + PAPER_TABLE + '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 STUDY = ["--samples", "6", "--jobs", "1"]

@@ -27,7 +27,7 @@ from designer.model.model_file import read_model_file
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 ROOT = Path(__file__).resolve().parents[2]
 WANTED: dict[StageName, tuple[dict[str, Any], list[str]]] = {

@@ -19,7 +19,7 @@ from designer.jobs import stage_runner, study_job
 from designer.jobs.study_stage import Place, read_study
 from tests.shared.stopped_work import work_stopped
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 STORED = sorted((Path(__file__).parent / "folders").glob("*/*.zip"))
 STUDY = "--rung exact --map grade"

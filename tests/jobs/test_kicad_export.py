@@ -24,7 +24,7 @@ from designer.schematic.kicad_project import Project
 from tests.catalog.test_catalog import own_opamp
 from tests.shared.paper_cases import PAPER
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 MODEL = """
 format = 1
@@ -254,6 +254,7 @@ def track_length(item: Expression) -> float:
     return math.dist(start, end)
 
 
+@pytest.mark.slow
 def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path: Path) -> None:
     folder = tmp_path / "design"
     shutil.copytree(made, folder)

@@ -19,7 +19,7 @@ from designer.report.measured_table import boards_csv, response_labels
 from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import quick_folder
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 GOOD = ("B01", "=B02")
 """The second name would start a formula in a spreadsheet."""

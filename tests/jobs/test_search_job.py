@@ -30,7 +30,7 @@ from designer.model.model_file import ModelFile, parse_model_file, read_model_fi
 from designer.verdicts.verdict import Verdict
 from tests.shared.search_cases import asked, made
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 OPEN = 'omega = "best"\nexpect = "1-2-2"\nb = [0.25, 0.27]'
 MORE = "[spread]\noffset = 0\n"

@@ -21,7 +21,7 @@ from designer.spread.spread import BOARD, Spread, draw_many
 from tests.jobs.test_kicad_export import MODEL as LINEAR
 from tests.spread.test_spread_model import CATALOG, CIRCUIT, PAPER, RECTIFIER
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 ROOT = Path(__file__).resolve().parents[2]
 NOMINAL = CIRCUIT.values

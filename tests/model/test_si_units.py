@@ -34,7 +34,7 @@ from designer.plots import bifurcation_plots, simulate_plots
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 Captured = pytest.CaptureFixture[str]
 DRILL = (Path(__file__).resolve().parents[2] / "examples" / "drill.toml").read_text("utf-8")

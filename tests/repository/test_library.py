@@ -31,7 +31,7 @@ from tests.shared.house import ORDER
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 HOSTILE = "<script>alert(1)</script> & co"
 TWO = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n[[response]]\nomega = 1.55\nexpect = "1-1-1"\n'

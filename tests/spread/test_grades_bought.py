@@ -41,7 +41,7 @@ from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import bought as nearest_sold, rectifier, stage
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 CATALOG = load_catalog()
 E24 = nearest_sold(EXACT)

@@ -44,7 +44,7 @@ from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan
 from tests.yields.test_blame_analysis import _Memory
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 ROOT = Path(__file__).resolve().parents[2]
 
