@@ -7,6 +7,7 @@ from .arrays import (
     Array as Array,
     Index as Index,
     Mask as Mask,
+    distinct_indices as distinct_indices,
 )
 from .atomic_write import (
     appearing as appearing,

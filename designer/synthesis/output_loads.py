@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.base.arrays import Array, Index
+from designer.base.arrays import Array, Index, distinct_indices
 from designer.base.errors import InputError
 from designer.circuit.design import Design
 from designer.circuit.nominal import circuit_flow, on_circuit
@@ -167,7 +167,7 @@ class Sampled:
             points = needed
             self._strobe(points)
             # Modes that hold at a strobe: not those that are only crossed in an instant.
-            modes = [self.system.mode(self.keys[int(i)]) for i in np.unique(self.at)]
+            modes = [self.system.mode(self.keys[int(i)]) for i in distinct_indices(self.at)]
             rates = [float(np.abs(np.linalg.eigvals(mode.A)).max()) for mode in modes]
             fastest = max(run.drive.omega, *rates)
             needed = min(int(np.ceil(run.drive.period * fastest / RESOLUTION)), MOST_POINTS)
@@ -275,7 +275,7 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
 
     for _ in range(WALK):
         moved = []
-        for i in np.unique(at[unsettled]):
+        for i in distinct_indices(at[unsettled]):
             here = unsettled[at[unsettled] == i]
             mode = system.mode(keys[int(i)])
             if not mode.guards:
@@ -283,7 +283,7 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
             value = _guards(mode, x[here], u[here])
             worst = value.argmax(axis=1)
             leaving = value[np.arange(len(here)), worst] > 0.0
-            for g in np.unique(worst[leaving]):
+            for g in distinct_indices(worst[leaving]):
                 go = here[leaving & (worst == g)]
                 at[go] = number(mode.guards[int(g)].target)
                 moved.append(go)

@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.base.arrays import Array, Index
+from designer.base.arrays import Array, Index, distinct_indices
 from designer.synthesis.dead_zone_target import DeadZoneTarget, outside
 from designer.synthesis.equal_parts import EqualParts
 from designer.synthesis.value_tables import (
@@ -345,5 +345,5 @@ def _fewest_of_each(
     for rank in ranks:
         order = np.argsort(rank, kind="stable")
         first.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
-    both = np.unique(np.concatenate(first))
+    both = distinct_indices(np.concatenate(first))
     return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])
