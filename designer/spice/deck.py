@@ -71,6 +71,7 @@ def write(
     rung: Rung = "ideal",
     kept_from: float = 0.0,
     stage: bool = True,
+    bounded: bool = False,
     notes: Sequence[str] = (),
 ) -> str:
     """The deck as text, ending in a newline.
@@ -78,8 +79,8 @@ def write(
     initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
     model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
     time [s] before which ngspice keeps no point; what it computes is the same. stage : whether it
-    keeps the nonlinear stage's output, beside the states and the generator. notes : lines of a
-    comment at the top.
+    keeps the nonlinear stage's output, beside the states and the generator. bounded : whether the
+    steps of Newton's method are (``newton_bounds``). notes : lines of a comment at the top.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def write(
     lines += diodes(circuit, charge=rung != "ideal")
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
     lines += [
-        f"{options(settings)} noopiter",
+        f"{options(settings)} noopiter{newton_bounds(circuit, board, rung) if bounded else ''}",
         f".save {voltages(circuit, stage=stage)}",
         f".tran {literal(settings.max_step)} {literal(stop_time)} "
         f"{literal(kept_from) if kept_from else 0} {literal(settings.max_step)} uic",
@@ -249,6 +250,22 @@ def options(settings: SolverSettings) -> str:
         f".options method={settings.method} reltol={literal(settings.reltol)} "
         f"abstol={literal(settings.abstol)} vntol={literal(settings.vntol)}"
     )
+
+
+def newton_bounds(circuit: Circuit, board: Board, rung: Rung) -> str:
+    """Options that keep Newton's method from stepping from one limit of an op-amp to the other.
+
+    An op-amp without memory is linear for a few microvolts of its input. An iteration that takes it
+    out of a limit overshoots these by far, to the other limit and back, until ngspice gives the
+    time step up after a hundred iterations. So no input of an XSPICE block may change by more than
+    its own size in an iteration, which takes one that leaves a limit to 0, or by the width of the
+    linear range where that is more. What is solved is the same, and so is the tolerance. Nothing
+    on the rungs above, whose op-amps have memory.
+    """
+    if rung != "ideal" or not circuit.sections:
+        return ""
+    limit = min(abs(rail) for s in circuit.sections for rail in board.rails[s.name])
+    return f" convlimit convstep=1 convabsstep={literal(limit / open_loop_gain(board))}"
 
 
 def voltages(circuit: Circuit, *, stage: bool = True) -> str:

@@ -216,6 +216,7 @@ def job(
         # A period before the first strobe, for the points around it: a long way takes no memory.
         kept_from=0.0 if whole else max(subject.discard - 1, 0) * subject.period,
         stage=False,
+        bounded=True,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
     return SpiceJob(text, signals, stop, partial(read, reading=reading), patience=patience)

@@ -348,13 +348,14 @@ def _after(run: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
         and fine * numerics_gate.length(more) <= MOST_AGAIN
     ):
         return replace(run, subject=more)
+    # At the finer step as long as was asked at first: what had not settled may be the step's doing.
     if (
         run.round < query.refinements
-        and FINER * fine * numerics_gate.length(run.subject) <= MOST_AGAIN
+        and FINER * fine * numerics_gate.length(query.subject) <= MOST_AGAIN
     ):
         finer = replace(run.settings, max_step=run.settings.max_step / FINER)
         before = run.before if none else answer.response
-        return replace(run, settings=finer, round=run.round + 1, before=before)
+        return _Run(query, query.subject, finer, run.round + 1, before)
     return answer if none or same else _undecided(run.before, answer)
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 from designer.base.threads import parallel
 from designer.spice.pool import SpicePool
 from designer.verdicts import exact_rung, ngspice_runs
-from designer.verdicts.cross_check import Ask, CrossCheck
+from designer.verdicts.cross_check import Ask, CrossCheck, Why
 from designer.verdicts.verdict import BLOCK, Answer, BoardRow, StudyPlan
 from designer.yields.power_up import PowerUp
 from designer.yields.row_store import BlockStore, Row
@@ -144,11 +144,12 @@ def fill_cross_checks(
         keys = {ask.key for ask in wanted[number]} if last else mine.keys()
         _put(store, _chunk(number), [mine[key] for key in sorted(mine) if key in keys])
 
-    todo = [ask for some in missing.values() for ask in some]
+    blocks = _nearest_first(missing.values())
+    todo = [ask for block in blocks for ask in block]
     left = {number: len(some) for number, some in missing.items()}
     for number in [n for n, count in left.items() if not count]:
         finish(number)
-    for k, row in ngspice_runs.checks_run(plan, missing.values(), pool, jobs, rung=plan.rung):
+    for k, row in ngspice_runs.checks_run(plan, blocks, pool, jobs, rung=plan.rung):
         number = todo[k].sample // CHUNK
         if row is not None:
             answers[number][row.key] = row
@@ -161,6 +162,19 @@ def fill_cross_checks(
     return [
         answers[n][ask.key] for n, block in wanted.items() for ask in block if ask.key in answers[n]
     ]
+
+
+def _nearest_first(blocks: Iterable[Sequence[Ask]]) -> list[list[Ask]]:
+    """The same asks, those about boards next to a boundary in a block before all others.
+
+    It is their runs that are made again at finer steps, one after the other: begun last, they
+    would keep one worker busy long after the others have nothing left to do.
+    """
+    asked = [list(block) for block in blocks]
+    near = {(a.sample, a.question) for block in asked for a in block if a.why is Why.BOUNDARY}
+    first = [a for block in asked for a in block if (a.sample, a.question) in near]
+    rest = [[a for a in block if (a.sample, a.question) not in near] for block in asked]
+    return [block for block in (first, *rest) if block]
 
 
 def count_answered(

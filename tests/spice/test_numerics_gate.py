@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import numerics_gate
+from designer.spice.batch_backend import BatchNgspice
 from designer.spice.convergence_aids import AidedRun
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import BOUND, LEVELS, STEPS_PER_CONTACT, GateResult, GateSubject
@@ -205,7 +207,11 @@ def test_gear_at_default_tolerance_makes_a_periodic_orbit_look_aperiodic(
 ) -> None:
     who = long_run(subject(3))
     naive = SolverSettings("gear", who.period / 200.0, reltol=1e-3, vntol=1e-6)
-    assert heard(pool, who, naive).status is OrbitStatus.APERIODIC
+    job = numerics_gate.job(who, naive)
+    # Of ngspice's defaults too: Newton's steps without bounds.
+    ((_, found),) = pool.map([replace(job, netlist=re.sub(" convlimit.*", "", job.netlist))])
+    assert isinstance(found, Read)
+    assert found.orbit.status is OrbitStatus.APERIODIC
     assert heard(pool, who, passed[3].settings).response == "1-3-3"
 
 
@@ -218,6 +224,27 @@ def test_two_hundred_steps_a_period_miscount_eight_impacts(
     assert miscounted.status is not OrbitStatus.PERIODIC or (miscounted.p, miscounted.q) != (8, 8)
     assert heard(pool, who, passed[8].settings).response == "1-8-8"
     assert passed[8].settings.max_step < who.period / 800.0
+
+
+def test_newton_s_method_does_not_step_from_limit_to_limit() -> None:
+    """ngspice's own account of its work: every such cycle costs a hundred iterations; without them
+    there is one iteration to solve, one to see it, and a few at each limit."""
+    who = subject(3)
+    job = numerics_gate.job(who, SolverSettings("trap", who.period / 568.0, 1e-5))
+    text = job.netlist.replace("noopiter", "acct noopiter")
+    bounds = text[text.index(" convlimit") : text.index("\n.save")]
+    account = []
+    for netlist in (text, text.replace(bounds, "")):
+        log = BatchNgspice().run(netlist, job.signals, job.stop).log
+        account.append(
+            [
+                int(re.findall(rf"{what} *= *(\d+)", log)[0])
+                for what in ("Transient iterations", "Transient timepoints")
+            ]
+        )
+    (iterations, points), (more_iterations, _) = account
+    assert iterations < 3 * points
+    assert more_iterations > 1.8 * iterations
 
 
 # ---------------------------------------------------------------------------------------------

@@ -204,7 +204,7 @@ class Saying:
         ((0, 2, 2), 1, "1-2-2", ""),
         ((2, 0, 2), 1, "1-2-2", ""),
         ((0, 2, 1), 1, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
-        ((0, 0, 0), 1, "not settled", ""),
+        ((0, 0, 0, 0), 1, "not settled", ""),
     ],
 )
 def test_only_two_answers_that_are_the_same_count(
@@ -242,7 +242,8 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
         (3900, (0, 1), 2, "1-1-1"),
         (8000, (0,), 1, "not settled"),
         (1000, (0, 2, 2), 3, "1-2-2"),
-        (2000, (0, 2), 2, UNDECIDED),
+        (2000, (0, 2, 2), 3, "1-2-2"),  # the way is doubled once, not at each step
+        (4000, (0, 2), 2, UNDECIDED),
     ],
 )
 def test_a_long_way_is_not_gone_again_at_any_price(
