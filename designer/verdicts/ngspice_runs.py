@@ -288,8 +288,9 @@ def run_queries(
     where that is not the expected response, the second of them is that of round `SURE_ROUND` or
     later, if that many are allowed. Where they never do, the answer is `UNDECIDED`. A failed run is
     no answer: it is neither the same as another nor different. Nor is one that has not settled: it
-    is made again, longer (`longer`). Neither is done where it would take more than `MOST_AGAIN`
-    periods' steps. ``progress`` is called once a query.
+    is made again at the next step, and longer (`longer`) where it has not settled there either or
+    there is no next one. Neither is done where it would take more than `MOST_AGAIN` periods' steps.
+    ``progress`` is called once a query.
     """
     # The longest first: the workers then end together.
     order = sorted(range(len(queries)), key=lambda k: -queries[k].steps)
@@ -339,20 +340,22 @@ def _after(run: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
     same = not none and answer.response == (run.before or query.expected)
     if same and (expected or run.round >= SURE_ROUND):
         return answer
-    more = longer(run.subject)
+    # At the finer step as long as was asked at first: what had not settled may be the step's doing.
+    may_refine = (
+        run.round < query.refinements
+        and FINER * fine * numerics_gate.length(query.subject) <= MOST_AGAIN
+    )
+    unsettled = answer.response == OrbitStatus.NOT_SETTLED and not (run.round == 0 and may_refine)
     # A few strobes of a motion without a period may look like one.
-    brief = run.subject.brief and query.expected == OrbitStatus.APERIODIC
+    brief = run.subject.brief and query.expected == OrbitStatus.APERIODIC and not none
+    more = longer(run.subject)
     if (
-        (answer.response == OrbitStatus.NOT_SETTLED or (brief and not none))
+        (unsettled or brief)
         and run.subject.judged < LONG
         and fine * numerics_gate.length(more) <= MOST_AGAIN
     ):
         return replace(run, subject=more)
-    # At the finer step as long as was asked at first: what had not settled may be the step's doing.
-    if (
-        run.round < query.refinements
-        and FINER * fine * numerics_gate.length(query.subject) <= MOST_AGAIN
-    ):
+    if may_refine:
         finer = replace(run.settings, max_step=run.settings.max_step / FINER)
         before = run.before if none else answer.response
         return _Run(query, query.subject, finer, run.round + 1, before)

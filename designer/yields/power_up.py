@@ -80,7 +80,8 @@ def until_strobe(driven: PiecewiseLinearSystem, drive: Drive, phase: float) -> A
     start[-2:] = np.sin(phase), np.cos(phase)
     # The generator's swing is in the states: what is left of the drive is its offset.
     rest = Drive(drive.omega / left, 0.0, drive.offset)
-    run = Flow(driven, rest).run(start, 1, measure=True)
+    # One period: the tables of the fast path cost as much, and are compiled for two more states.
+    run = Flow(driven, rest, fast=False).run(start, 1, measure=True)
     if run.status is not FlowStatus.DONE:
         return None
     return Arrival(run.strobes[-1][:-2], 1, run.clipped_time > 0.0)

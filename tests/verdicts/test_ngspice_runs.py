@@ -199,12 +199,14 @@ class Saying:
         ((2, "died", 2), 2, "1-2-2", ""),
         ((2, "died", 1), 2, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
         ((2, "died"), 1, "failed", "died"),
-        # Nor is a run that has not settled: a longer one at the same step takes its place.
+        # Nor is a run that has not settled: a finer one takes its place, and then a longer one.
         ((0, 1), 1, "1-1-1", ""),
-        ((0, 2, 2), 1, "1-2-2", ""),
+        ((0, 0, 1), 1, "1-1-1", ""),
+        ((0, 2), 1, UNDECIDED, "only one run had an answer: 1-2-2"),
+        ((0, 2, 2), 2, "1-2-2", ""),
         ((2, 0, 2), 1, "1-2-2", ""),
-        ((0, 2, 1), 1, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
-        ((0, 0, 0, 0), 1, "not settled", ""),
+        ((0, 2, 1), 2, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
+        ((0, 0, 0), 1, "not settled", ""),
     ],
 )
 def test_only_two_answers_that_are_the_same_count(
@@ -241,8 +243,8 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
         (4000, (2,), 1, UNDECIDED),  # a quarter of the step would be more than 16000 periods
         (3900, (0, 1), 2, "1-1-1"),
         (8000, (0,), 1, "not settled"),
-        (1000, (0, 2, 2), 3, "1-2-2"),
-        (2000, (0, 2, 2), 3, "1-2-2"),  # the way is doubled once, not at each step
+        (1000, (0, 0, 1), 3, "1-1-1"),
+        (2000, (0, 2), 2, UNDECIDED),
         (4000, (0, 2), 2, UNDECIDED),
     ],
 )
