@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from designer.base import jit
+from designer.base.progress import doing
 from designer.catalog.catalog import load_catalog
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
@@ -29,11 +30,15 @@ CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circui
 
 
 @contextmanager
-def compiling_ahead(jobs: int) -> Iterator[None]:
+def compiling_ahead(jobs: int) -> Iterator[Callable[[], None]]:
     """The other process works, where nothing is compiled yet and there is a core for it; it ends
-    with the block at the latest."""
+    with the block at the latest.
+
+    Yields what waits for its end: to be called before a circuit moves. Whoever does not wait
+    compiles the same once more, beside a process that is ahead with it.
+    """
     if jobs < 2 or not jit.nothing_compiled():
-        yield
+        yield lambda: None
         return
     process = subprocess.Popen(
         # -P: no file of the user's working directory is taken for a module.
@@ -43,8 +48,13 @@ def compiling_ahead(jobs: int) -> Iterator[None]:
         stderr=subprocess.DEVNULL,  # what goes wrong here goes wrong again where it is needed
         start_new_session=True,  # Ctrl-C is for the run, which ends this one
     )
+
+    def wait() -> None:
+        doing("compiling the exact engine's part for circuits")
+        process.wait()
+
     try:
-        yield
+        yield wait
     finally:
         process.kill()
         process.wait()

@@ -80,8 +80,9 @@ class StageRunner:
         stages = {stage: self.stages[stage] for stage in self.todo}
         if "design" in stages:
             self.progress.stage("responses of the model, parts")
-            with compiling_ahead(self.options.jobs or cores()):
+            with compiling_ahead(self.options.jobs or cores()) as compiled:
                 synthesis = synthesis_result.synthesise(self.modelfile, self.catalog)
+                compiled()
                 write_design(self.folder, synthesis, stages, self.options, self.progress)
         else:
             synthesis = design_files.load(self.folder, self.modelfile, self.catalog)

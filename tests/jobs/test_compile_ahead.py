@@ -30,7 +30,11 @@ class Process:
 
 @pytest.mark.parametrize(
     ("jobs", "files", "expected"),
-    [(2, [], ["start", "work", "kill", "wait"]), (2, ["old"], ["work"]), (1, [], ["work"])],
+    [
+        (2, [], ["start", "work", "wait", "circuit", "kill", "wait"]),
+        (2, ["old"], ["work", "circuit"]),
+        (1, [], ["work", "circuit"]),
+    ],
 )
 def test_a_process_works_beside_a_first_run(
     jobs: int,
@@ -51,8 +55,10 @@ def test_a_process_works_beside_a_first_run(
         (folder / name).touch()
     monkeypatch.setattr(jit, "CACHE", tmp_path)
     monkeypatch.setattr(subprocess, "Popen", start)
-    with compiling_ahead(jobs):
+    with compiling_ahead(jobs) as compiled:
         said.append("work")
+        compiled()
+        said.append("circuit")
     assert said == expected
 
 
