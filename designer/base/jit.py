@@ -7,6 +7,7 @@ all kernels: whatever changes in one of them, none is taken from before.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -16,7 +17,7 @@ from typing import Any, TypeVar
 
 import numba
 import platformdirs
-from numba.core.event import Listener, install_listener
+from numba.core.event import Listener, install_listener, register
 from numba.core.types.misc import unliteral
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -98,6 +99,25 @@ def compilation_watched(tell: Callable[[str | None], None]) -> Iterator[None]:
     with install_listener("numba:compile", _CompileWatch(tell)):
         yield
 
+
+RARE = (100_000, 20, 100)
+"""``gc`` thresholds while numba compiles: little of what it makes can go before a kernel is done,
+and looking for it takes a good part of the time."""
+
+
+def _collect_rarely() -> Callable[[str | None], None]:
+    usual = gc.get_threshold()
+
+    def tell(module: str | None) -> None:
+        nonlocal usual
+        if module is not None:
+            usual = gc.get_threshold()
+        gc.set_threshold(*(usual if module is None else RARE))
+
+    return tell
+
+
+register("numba:compile", _CompileWatch(_collect_rarely()))
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,
