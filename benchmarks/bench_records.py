@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
-from benchmarks.record_boards import POINTS, RECORDED, BoardRun, runs
+from benchmarks.record_boards import POINTS, RECORDED, Asked, BoardRun, RecordBoards
 from designer.base.defaults import cores
 from designer.base.errors import InputError
 from designer.base.figure_style import new_figure, styled, to_png
@@ -71,15 +71,16 @@ def named_record(run: BoardRun, prediction: BoardPrediction) -> NamedRecord:
     none."""
     name = _named(run, prediction)
     truth, nearest = run.response, _nearest(run, prediction)
+    question, sample = run.asked.question, run.asked.sample
     if name is None:
-        return NamedRecord(run.question, run.sample, truth, "", REFUSED, False, nearest)
+        return NamedRecord(question, sample, truth, "", REFUSED, False, nearest)
     outcome = OPEN
     if "-" not in truth and truth != "aperiodic":
         outcome = NO_TRUTH
     elif name.sure:
         outcome = RIGHT if name.response == truth else WRONG
     words = ", ".join((name.response, *name.others))
-    return NamedRecord(run.question, run.sample, truth, words, outcome, name.by_board, nearest)
+    return NamedRecord(question, sample, truth, words, outcome, name.by_board, nearest)
 
 
 def _nearest(run: BoardRun, prediction: BoardPrediction) -> float:
@@ -94,7 +95,7 @@ def _nearest(run: BoardRun, prediction: BoardPrediction) -> float:
 
 def _named(run: BoardRun, prediction: BoardPrediction) -> NamedMotion | None:
     """The name of one record of a run; None where the record is refused."""
-    rng = np.random.default_rng([SEED, run.question, run.sample])
+    rng = np.random.default_rng([SEED, run.asked.question, run.asked.sample])
     scope = SimulatedScope(
         points=int(2000 * 50 ** rng.uniform()),
         periods=float(rng.uniform(3.0, RECORDED - 0.1)),
@@ -114,10 +115,10 @@ def main() -> str:
     synthesis = synthesise(read_model_file(MODEL))
     prediction = BoardPrediction(synthesis)
     wanted = [f"{r.expected} at ω = {r.omega:g}" for r in synthesis.model_responses]
+    drawn = RecordBoards(synthesis, boards, SEED, KEPT, cores())
+    asked = [Asked(k, sample) for sample in range(boards) for k in range(len(wanted))]
     began = time.process_time()
-    records = [
-        named_record(run, prediction) for run in runs(synthesis, range(boards), SEED, cores(), KEPT)
-    ]
+    records = [named_record(run, prediction) for run in drawn.runs(asked)]
     seconds = (time.process_time() - began) / max(len(records), 1)
     counts = [Counter(r.outcome for r in records if r.question == k) for k in range(len(wanted))]
     REPORT.mkdir(parents=True, exist_ok=True)

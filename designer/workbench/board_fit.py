@@ -4,7 +4,8 @@ Maximum a posteriori by Gauss and Newton (Nocedal and Wright, Numerical Optimiza
 10; Tarantola, Inverse Problem Theory, 2005, chapter 3). The unknowns are the coordinates of the
 board (``board_prior.Prior``), and for each record the gain and offset of each channel, its shift
 in time and, where nobody knows it better, the generator's amplitude. What is held against the
-record is the board's exact orbit, with its linear variation (``orbit_slopes``).
+record is the board's exact orbit, with its linear variation (``orbit_slopes``); against a record of
+the generator switched off, the board's resonances (``free_decay``).
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import OrbitStatus
 from designer.workbench.board_orbits import POINTS, NetOrbit, follow
 from designer.workbench.board_prior import Prior
+from designer.workbench.free_decay import FreeDecay
 from designer.workbench.observation import Observation
 from designer.workbench.orbit_slopes import OrbitSlopes, orbit_slopes
 
-DRAWS = 16
-"""Boards of the spread whose orbits are held against a record first, the nominal one among them."""
+DRAWS, MORE = 16, 96
+"""Boards of the spread whose orbits are held against a record first, the nominal one among them;
+and where none of them has orbits like all records."""
 LOOK = 1024
 """Samples of a record that this first look takes."""
 ROUNDS = 16
@@ -99,7 +102,7 @@ class BoardFit:
     """RMS difference of each record and the orbit over the orbit's peak, the worst net's."""
     misfits: tuple[float, ...]
     """The same over what noise and model are stated to leave: about 1 where the board is one of
-    the spread and the scope keeps what is stated of it."""
+    the spread and the scope keeps what is stated of it. Then those of the free decays."""
     rounds: int
     """Steps that the search took."""
 
@@ -123,21 +126,32 @@ class BoardFit:
 
 
 def fit_board(
-    prior: Prior, observations: Sequence[Observation], starts: Sequence[Sequence[Array]]
+    prior: Prior,
+    observations: Sequence[Observation],
+    starts: Sequence[Sequence[Array]],
+    decays: Sequence[FreeDecay] = (),
 ) -> BoardFit:
-    """The board that these records are of.
+    """The board that these records are of, one or more.
 
     starts : for each record the states (states,) from which a board may have come to its motion:
-    those of the nominal board's orbits there.
+    those of the nominal board's orbits there. decays : records of its free motion.
 
     Raises
     ------
     NoSuchBoard : no board of the spread settles from these starts on an orbit of the records'
         periods, so there is nothing to begin with.
     """
-    problem = _Problem(prior, tuple(observations))
+    problem = _Problem(prior, tuple(observations), tuple(decays))
+    candidates = problem.candidates(starts, prior.draws(DRAWS))
+    if not candidates:
+        candidates = problem.candidates(starts, _more_draws(problem, starts))
+    if not candidates:
+        raise NoSuchBoard(
+            f"none of {MORE} boards of the spread settles on motions of these periods at all of "
+            "these settings"
+        )
     best: tuple[BoardFit, float] | None = None
-    for candidate in problem.candidates(starts)[:STARTS]:
+    for candidate in candidates[:STARTS]:
         fit = problem.climbed(candidate)
         if best is None or fit[1] < best[1]:
             best = fit
@@ -145,6 +159,17 @@ def fit_board(
             break
     assert best is not None
     return best[0]
+
+
+def _more_draws(problem: _Problem, starts: Sequence[Sequence[Array]]) -> Array:
+    """(MORE, K) boards to begin with where ``DRAWS`` do not do: as probable as those records leave
+    them that any board settled on. A motion of several periods, say, few boards have."""
+    usual = [i for i, looks in enumerate(problem.looks) if looks]
+    if not usual or len(usual) == len(problem.observations):
+        return problem.prior.draws(MORE)
+    observations = [problem.observations[i] for i in usual]
+    fit = fit_board(problem.prior, observations, [starts[i] for i in usual], problem.decays)
+    return fit.samples(MORE)
 
 
 @dataclass(frozen=True)
@@ -158,26 +183,28 @@ class _Linearised:
 
 
 class _Problem:
-    def __init__(self, prior: Prior, observations: tuple[Observation, ...]) -> None:
-        self.prior, self.observations = prior, observations
+    def __init__(
+        self, prior: Prior, observations: tuple[Observation, ...], decays: tuple[FreeDecay, ...]
+    ) -> None:
+        self.prior, self.observations, self.decays = prior, observations, decays
+        self.looks: list[dict[int, _Look]] = []
         self.centres: list[_Reading] = []
         self.sigmas: list[Array] = []
 
-    def candidates(self, starts: Sequence[Sequence[Array]]) -> list[tuple[Array, list[_Look]]]:
-        """Some boards of the spread with their orbits, those most like all records first."""
-        draws = self.prior.draws(DRAWS)
-        looks = [
+    def candidates(
+        self, starts: Sequence[Sequence[Array]], draws: Array
+    ) -> list[tuple[Array, list[_Look]]]:
+        """Those of the boards (N, K) that settle on motions like all records, with their orbits,
+        the nearest first."""
+        self.looks = [
             _looks(self.prior, draws, obs, states)
             for obs, states in zip(self.observations, starts, strict=True)
         ]
-        common = set.intersection(*(set(look) for look in looks))
-        if not common:
-            raise NoSuchBoard(
-                f"none of {DRAWS} boards of the spread settles on motions of these periods at "
-                "all of these settings"
-            )
-        order = sorted(common, key=lambda i: sum(look[i].cost for look in looks))
-        return [(draws[i], [look[i] for look in looks]) for i in order]
+        common = set.intersection(*(set(look) for look in self.looks))
+        order = sorted(
+            common, key=lambda i: sum(look[i].cost for look in self.looks) + self._decayed(draws[i])
+        )
+        return [(draws[i], [look[i] for look in self.looks]) for i in order]
 
     def climbed(self, candidate: tuple[Array, list[_Look]]) -> tuple[BoardFit, float]:
         """The most probable board that is found from a candidate, with its objective."""
@@ -200,12 +227,17 @@ class _Problem:
 
     def objective(self, place: _Place) -> float:
         """Minus twice the logarithm of the probability, but for a constant."""
-        total = float(place.z @ place.z)
+        total = float(place.z @ place.z) + self._decayed(place.z)
         for i, obs in enumerate(self.observations):
             total += float((self._residual(i, place) ** 2).sum())
             off = place.readings[i].vector - self.centres[i].vector
             total += float((off**2 * _precision(obs)).sum())
         return total
+
+    def _decayed(self, z: Array) -> float:
+        """What the free decays add to the objective."""
+        rest = (decay.of_board(self.prior, z) for decay in self.decays)
+        return float(sum(r @ r for r in rest))
 
     def _residual(self, i: int, place: _Place) -> Array:
         """(k, nets) what is left of a record, over what is allowed for."""
@@ -219,6 +251,10 @@ class _Problem:
         normal = np.zeros((K + sum(readings),) * 2)
         gradient = np.zeros(len(normal))
         normal[:K, :K], gradient[:K] = np.eye(K), place.z
+        for decay in self.decays:
+            slope = decay.slopes(self.prior, place.z)
+            normal[:K, :K] += slope.T @ slope
+            gradient[:K] += slope.T @ decay.of_board(self.prior, place.z)
         moved, first = [], K
         for i, (obs, size) in enumerate(zip(self.observations, readings, strict=True)):
             slopes = self._slopes(i, place)
@@ -301,6 +337,8 @@ class _Problem:
             peak = np.maximum(np.abs(orbit.volts).max(axis=0), 1e-12)
             residuals.append(float((rest * self.sigmas[i] / peak).max()))
             misfits.append(float(rest.max()))
+        decayed = [decay.of_board(self.prior, place.z) for decay in self.decays]
+        misfits += [float(np.sqrt((rest**2).mean())) for rest in decayed]
         return BoardFit(
             prior=self.prior,
             observations=self.observations,

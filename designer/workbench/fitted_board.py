@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from designer.base.errors import DesignerError
-from designer.circuit.netlist import Excitation
-from designer.verdicts.verdict import Question
 from designer.workbench.advice import Advice, advise
 from designer.workbench.board_fit import BoardFit, fit_board
 from designer.workbench.fitted_quantities import BoardFigure, told_figures
+from designer.workbench.free_decay import FreeDecay
 from designer.workbench.naming import NamedMotion
 from designer.workbench.observation import Observation, observe
 from designer.workbench.prediction import BoardPrediction, PredictedResponse
@@ -33,7 +32,7 @@ class FittedBoard:
     figures: tuple[BoardFigure, ...] = ()
     """What the records tell of it."""
     advice: tuple[Advice, ...] = ()
-    """For every wanted response that the nominal board shows."""
+    """For each response that it was asked for."""
     reason: str = ""
     """Why there is no fit; "" where there is one."""
 
@@ -61,12 +60,16 @@ def board_behind(
     name: str,
     records: Sequence[tuple[str, NamedMotion]],
     prediction: BoardPrediction,
+    wanted: Sequence[PredictedResponse] | None = None,
+    decays: Sequence[tuple[str, FreeDecay]] = (),
 ) -> FittedBoard:
     """The board behind these records, each with the name of its file.
 
     A record without a period says nothing that an orbit could be held against; it is left out.
+    wanted : the responses that advice is asked for; None for all that the nominal board shows.
+    decays : records with the generator off.
     """
-    files = tuple(file for file, _ in records)
+    files = (*(file for file, _ in records), *(file for file, _ in decays))
     periodic = [named for _, named in records if named.counts is not None]
     if not periodic:
         reason = "no record repeats: record the board at the frequency of another response"
@@ -74,10 +77,10 @@ def board_behind(
     starts = [prediction.starts(each.motion.frequency) for each in periodic]
     try:
         seen = [_observation(each, prediction) for each in periodic]
-        fit = fit_board(prediction.prior, seen, starts)
+        fit = fit_board(prediction.prior, seen, starts, [decay for _, decay in decays])
     except DesignerError as error:  # a setting that nobody knows, or no such board
         return FittedBoard(name, files, reason=str(error))
-    questions = [_question(response) for response in prediction.responses]
+    questions = [r.question for r in (prediction.responses if wanted is None else wanted)]
     advice = advise(fit, questions, prediction.synthesis.modelfile.tuning)
     return FittedBoard(name, files, fit, told_figures(fit), advice)
 
@@ -85,8 +88,3 @@ def board_behind(
 def _observation(named: NamedMotion, prediction: BoardPrediction) -> Observation:
     n = None if named.counts is None else named.counts.n
     return observe(named.motion, (named.moving,), prediction.setting_of(named.motion), n=n)
-
-
-def _question(response: PredictedResponse) -> Question:
-    drive = Excitation(response.setting.frequency_hz, response.setting.amplitude_v_peak)
-    return Question(response.spec, drive, response.orbit, None)

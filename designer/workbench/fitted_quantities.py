@@ -20,6 +20,7 @@ from designer.circuit.working_modes import BoardModes
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.workbench.board_fit import BoardFit
 from designer.workbench.board_prior import PROBE
+from designer.workbench.free_decay import resonances
 
 TOLD = 0.5
 """Of the standard deviation over the spread."""
@@ -106,9 +107,9 @@ def board_figures(circuit: Circuit, boards: Boards) -> Mapping[str, tuple[str, A
             out[f"{SIDES[side]} gap{of}"] = ("", way / half)
         out[f"constant force{of}"] = ("V", gaps.constant_force(c))
     for words, key in _motions(circuit).items():
-        frequency, damping = _resonances(modes.modes.A[:, modes.targets.numbers[key]])
+        frequency, damping = resonances(modes.modes.A[:, modes.targets.numbers[key]])
         for j in range(frequency.shape[1]):
-            out[f"resonance {j + 1}, {words}"] = ("Hz", frequency[:, j])
+            out[f"resonance {j + 1}, {words}"] = ("Hz", frequency[:, j] / (2.0 * np.pi))
             out[f"damping ratio {j + 1}, {words}"] = ("", damping[:, j])
     return out
 
@@ -168,14 +169,3 @@ def _motions(circuit: Circuit) -> dict[str, ModeKey]:
             else:
                 motions.setdefault(f"in contact{of}", circuit.carrying(contact))
     return motions
-
-
-def _resonances(A: Array) -> tuple[Array, Array]:
-    """(N, pairs) undamped frequencies [Hz] and damping ratios of x' = A x, (N, n, n), by
-    frequency. Two real roots count as one pair, of a ratio above 1."""
-    roots = np.linalg.eigvals(A).astype(complex)
-    order = np.lexsort((roots.imag, np.abs(roots)), axis=1)
-    roots = np.take_along_axis(roots, order, axis=1)
-    first, second = roots[:, 0::2], roots[:, 1::2]
-    frequency = np.sqrt(np.abs(first * second))
-    return frequency / (2.0 * np.pi), -(first + second).real / (2.0 * frequency)

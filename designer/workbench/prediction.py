@@ -20,6 +20,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
+from designer.verdicts.verdict import Question
 from designer.workbench.board_prior import Prior
 from designer.workbench.record import RecordedMotion
 
@@ -79,6 +80,12 @@ class PredictedResponse:
     starts: tuple[Array, ...]
     """(states,) from where a board may come to it: its own start, and that of its mirror twin where
     every clearance has stops on both sides."""
+
+    @property
+    def question(self) -> Question:
+        """What a board is asked of it."""
+        drive = Excitation(self.setting.frequency_hz, self.setting.amplitude_v_peak)
+        return Question(self.spec, drive, self.orbit, None)
 
 
 class BoardPrediction:

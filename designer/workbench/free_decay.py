@@ -1,0 +1,169 @@
+"""The free motion that is left when the generator is switched off, and what it tells of a board.
+
+Once the last contact is over the motion is linear: each displacement is a constant and, for each
+resonance, a damped oscillation. Frequencies and damping ratios are the board's; the constant and
+the sizes are free, so neither the scope's gain nor its zero enters, nor how the motion began. They
+are solved for at every board that is asked (variable projection: Golub and Pereyra, SIAM Journal on
+Numerical Analysis 10, 1973).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.circuit.nodal_bandwidth import swinging_sections
+from designer.circuit.working_modes import mode_rows
+from designer.workbench.board_prior import PROBE, Prior
+from designer.workbench.observation import CELLS, ScopeErrors
+from designer.workbench.prediction import BoardPrediction
+from designer.workbench.record import Record
+
+MOST_SAMPLES = 2048
+"""Samples that are kept of a channel: of a longer record so many means of neighbours."""
+CONTACT = 0.05
+"""Of the range of a dead zone's output: how far from where it ends it is in contact."""
+ON = 0.05
+"""Of the range of the generator's channel: how far from where it ends it is still on."""
+END = 0.1
+"""Of a record: its end, where everything rests."""
+FEWEST = 1.5
+"""Periods of the nominal board's slowest resonance that a decay lasts at least."""
+LOUDEST = 5.0
+"""Times the noise that its range is at least."""
+STEP = 1e-4
+"""Of a resonance: the step of a difference quotient."""
+
+
+@dataclass(frozen=True)
+class FreeDecay:
+    """Displacements of a board in free motion inside its clearances."""
+
+    time: Array
+    """(k,) seconds since the motion is free."""
+    volts: Array
+    """(k, nets) voltages [V]."""
+    sigma: Array
+    """(nets,) standard deviation [V] that a sample counts with."""
+
+    def residual(self, resonances: Array) -> Array:
+        """(k · nets,) what is left of it by resonances (pairs, 2) [rad/s, damping ratio], over what
+        is allowed for."""
+        basis, _ = np.linalg.qr(_basis(self.time, resonances))
+        volts = self.volts / self.sigma
+        return np.asarray(volts - basis @ (basis.T @ volts)).ravel()
+
+    def of_board(self, prior: Prior, z: Array) -> Array:
+        """(k · nets,) the same by the resonances of the board at z (K,)."""
+        return self.residual(_resonances_of(prior, z[None])[0])
+
+    def slopes(self, prior: Prior, z: Array) -> Array:
+        """(k · nets, K) change of that with each coordinate of the board."""
+        here, *beside = _resonances_of(prior, np.vstack([z, z + PROBE * np.eye(len(z))]))
+        moved = (np.array(beside) - here).reshape(len(z), -1) / PROBE
+        base, columns = self.residual(here), []
+        for index in np.ndindex(here.shape):
+            near = here.copy()
+            near[index] *= 1.0 + STEP
+            columns.append((self.residual(near) - base) / (near[index] - here[index]))
+        return np.asarray(np.column_stack(columns) @ moved.T)
+
+
+def resonances(A: Array) -> tuple[Array, Array]:
+    """(N, pairs) undamped frequencies [rad/s] and damping ratios of x' = A x, (N, n, n), by
+    frequency. Two real roots count as one pair, of a ratio above 1."""
+    roots = np.linalg.eigvals(A).astype(complex)
+    order = np.lexsort((roots.imag, np.abs(roots)), axis=1)
+    roots = np.take_along_axis(roots, order, axis=1)
+    first, second = roots[:, 0::2], roots[:, 1::2]
+    frequency = np.sqrt(np.abs(first * second))
+    return frequency, -(first + second).real / (2.0 * frequency)
+
+
+def free_decay(
+    record: Record,
+    channels: Mapping[str, str],
+    prediction: BoardPrediction,
+    scope: ScopeErrors | None = None,
+) -> FreeDecay:
+    """The free part of a record that begins while the generator is on, or just after.
+
+    channels : channel by net. It begins with the last contact that the dead zones' outputs show,
+    and later by the longest period there is of drive and resonances: a contact too slight to be
+    seen, or the drive, may come after it. Where the generator was recorded, not before it is off.
+
+    Raises
+    ------
+    InputError : no displacement or not every dead zone's output is among the channels; or what is
+        left after the last contact is too short or too faint.
+    """
+    scope = ScopeErrors() if scope is None else scope
+    named = {net: record.signals.get(channel) for net, channel in channels.items()}
+    signals = {net: signal for net, signal in named.items() if signal is not None}
+    outputs = [stop.output for stop in prediction.stops]
+    nets = [net for net in prediction.circuit.state_nets[::2] if net in signals]
+    if not nets or not all(net in signals for net in outputs):
+        found = ", ".join(signals) or "none of them"
+        expected = f"a displacement and {' and '.join(outputs)}, as in the other records"
+        raise InputError(record.source, "its channels", found, expected)
+    slowest = 2.0 * np.pi / float(_resonances_of(prediction.prior, _middle(prediction))[0, 0, 0])
+    wait = max(slowest, *(1.0 / setting.frequency_hz for setting in prediction.settings))
+    time = record.time - record.time[0]
+    over = [_last(time, signals[output], CONTACT) for output in outputs]
+    begin = max(over) + wait if max(over) > 0.0 else 0.0
+    if prediction.generator in signals:
+        begin = max(begin, _last(time, signals[prediction.generator], ON))
+    free = time >= begin
+    volts = np.column_stack([signals[net][free] for net in nets])
+    noise = np.array([record.noise[channels[net]] for net in nets])
+    lasts = float(time[-1] - begin)
+    if lasts < FEWEST * slowest or (np.ptp(volts, axis=0) < LOUDEST * noise).all():
+        found = f"{1e3 * max(lasts, 0.0):.3g} ms of free motion after the last contact"
+        expected = f"{1e3 * FEWEST * slowest:.3g} ms or more, clearly above the noise"
+        raise InputError(record.source, "its length", found, expected)
+    width = -(-len(volts) // MOST_SAMPLES)
+    count = len(volts) // width
+    kept = volts[: count * width].reshape(count, width, -1).mean(axis=1)
+    peak = np.ptp(kept, axis=0) / 2.0
+    cells = CELLS * max(lasts / slowest, 1.0)
+    sigma = np.sqrt(noise**2 / width + (scope.model * peak) ** 2 * count / cells)
+    times = time[free][: count * width].reshape(count, width).mean(axis=1) - begin
+    return FreeDecay(times, kept, sigma)
+
+
+def _middle(prediction: BoardPrediction) -> Array:
+    return np.zeros((1, prediction.prior.size))
+
+
+def _last(time: Array, signal: Array, share: float) -> float:
+    """When a signal is last away from where it ends by a share of its range [s]; 0 where it only
+    makes noise."""
+    end = float(np.median(signal[-max(1, round(END * len(signal))) :]))
+    away = np.abs(signal - end) > share * float(np.ptp(signal))
+    return float(time[np.nonzero(away)[0][-1]])
+
+
+def _resonances_of(prior: Prior, z: Array) -> Array:
+    """(N, pairs, 2) frequencies [rad/s] and damping ratios of the boards at z (N, K) with every
+    clearance open."""
+    circuit, boards = prior.circuit, prior.boards(z)
+    if swinging_sections(circuit):
+        boards = replace(boards, bandwidth=False)
+    n = len(circuit.states)
+    rows = mode_rows(boards, circuit.open, circuit.state_nets[:1])
+    return np.stack(resonances(rows.rates[:, :, :n]), axis=-1)
+
+
+def _basis(time: Array, resonances: Array) -> Array:
+    """(k, 1 + 2 pairs) a constant and the free motions of each pair (pairs, 2), each of size 1."""
+    columns = [np.ones_like(time)]
+    for frequency, damping in resonances:
+        turn = np.sqrt(complex(1.0 - damping**2)) * frequency
+        decay = np.exp(-damping * frequency * time)
+        columns.append(decay * np.cos(turn * time).real)
+        columns.append(decay * (np.sin(turn * time) / (turn or 1.0)).real * frequency)
+    return np.column_stack(columns)
