@@ -329,6 +329,11 @@ class Circuit:
         return (*self.state_nets, *self.stage_outputs)
 
     @property
+    def displacements(self) -> tuple[str, ...]:
+        """Nets that carry the displacements of the masses."""
+        return self.state_nets[::2]
+
+    @property
     def switches(self) -> tuple[str, ...]:
         """What changes the circuit's mode: op-amp sections in order, then diodes."""
         return (*(s.name for s in self.sections), *(d.name for d in self.diodes))

@@ -168,6 +168,10 @@ def bench(
         bool,
         option("--boards", None, "Records of several boards, each in a folder with its name."),
     ] = False,
+    decay: Annotated[
+        list[Path] | None,
+        option("--decay", "FILE", "A record that goes on when the generator is off; for --fit."),
+    ] = None,
     out: Annotated[
         Path | None, option("--out", "DIR", "Write the answer, its page and pictures there.")
     ] = None,
@@ -190,6 +194,7 @@ def bench(
         channels=roles,
         fit=fit,
         boards=boards,
+        decay=decay or (),
         ngspice=ngspice,
         out=out,
         progress=session.progress,

@@ -26,6 +26,7 @@ from designer.spice.simulator import SimulationFailed
 from designer.workbench.advice import Advice
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
+from designer.workbench.free_decay import FreeDecay, free_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.overlay import Overlay, overlaid
 from designer.workbench.prediction import BoardPrediction
@@ -120,6 +121,7 @@ def bench(
     channels: Mapping[str, str] | None = None,
     fit: bool = False,
     boards: bool = False,
+    decay: Sequence[Path | str] = (),
     ngspice: bool = True,
     out: Path | str | None = None,
     overwrite: bool = False,
@@ -131,7 +133,9 @@ def bench(
     omega : the drive frequency of all of them in the model's units; found where None. channels :
     channel by net, for all of them; found where None. fit : also look for the board behind the
     records, and for what to turn on it. boards : the records are of several boards, each with a
-    folder of its own that has its name; fits them, and says how far they differ. ngspice : also lay
+    folder of its own that has its name; fits them, and says how far they differ. decay : records of
+    the same boards that go on when the generator is switched off, with the same channels; for the
+    fit. ngspice : also lay
     ngspice's motion of the board over each record, once the rest is written; needs ``out``, and
     does without where ngspice is missing. jobs : the most ngspice runs at a time. out : a directory
     for ``bench.json``, ``bench.html``, a picture of each record and, of several boards,
@@ -145,7 +149,7 @@ def bench(
     """
     began, path = time.perf_counter(), Path(folder)
     progress = Progress() if progress is None else progress
-    files = [Path(name) for name in record]
+    files, decays = [Path(name) for name in record], [Path(name) for name in decay]
     place = None if out is None else Path(out)
     names = _names(files)
     lists = [LIST] if boards else []
@@ -166,14 +170,14 @@ def bench(
         setting = _setting(motion.frequency, prediction)
         benched.append(BenchedRecord(file, name, overlaid(name, prediction), setting))
     fitted: dict[str, FittedBoard] = {}
-    if fit or boards:
-        fitted = _fitted(benched, prediction, several=boards, progress=progress)
+    if fit or boards or decays:
+        fitted = _fitted(benched, decays, prediction, several=boards, progress=progress)
         benched = [replace(b, board=fitted[_board(b.path, boards)]) for b in benched]
     fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
     settings = {
         "omega": omega,
         "channels": dict(channels or {}),
-        "fit": fit or boards,
+        "fit": bool(fit or boards or decays),
         "boards": boards,
     }
     common = {
@@ -246,12 +250,21 @@ def _fits(record: BenchedRecord) -> bool:
 
 def _fitted(
     benched: Sequence[BenchedRecord],
+    decays: Sequence[Path],
     prediction: BoardPrediction,
     *,
     several: bool,
     progress: Progress,
 ) -> dict[str, FittedBoard]:
     """The boards behind the records by name, each fitted to all of its own."""
+    free: dict[str, list[tuple[str, FreeDecay]]] = {}
+    for path in decays:
+        name = _board(path, several)
+        same = next((each for each in benched if _board(each.path, several) == name), None)
+        if same is None:
+            raise InputError(path, "--decay", f"board {name} alone", "another --record of it")
+        decay = free_decay(read_record(path), same.named.motion.channels, prediction)
+        free.setdefault(name, []).append((path.name, decay))
     own: dict[str, list[tuple[str, NamedMotion]]] = {}
     for each in benched:
         name = _board(each.path, several)
@@ -260,7 +273,7 @@ def _fitted(
     for name, records in own.items():
         shows = ", ".join(named.response for _, named in records)
         progress.stage(f"board {name} behind {shows}" if name else f"board behind {shows}")
-        out[name] = board_behind(name, records, prediction)
+        out[name] = board_behind(name, records, prediction, decays=free.get(name, ()))
     return out
 
 

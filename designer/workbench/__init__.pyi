@@ -26,6 +26,10 @@ from .fitted_quantities import (
 from .folding import (
     samples_of as samples_of,
 )
+from .free_decay import (
+    FreeDecay as FreeDecay,
+    free_decay as free_decay,
+)
 from .naming import (
     NamedMotion as NamedMotion,
     named as named,

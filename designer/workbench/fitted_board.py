@@ -87,4 +87,6 @@ def board_behind(
 
 def _observation(named: NamedMotion, prediction: BoardPrediction) -> Observation:
     n = None if named.counts is None else named.counts.n
-    return observe(named.motion, (named.moving,), prediction.setting_of(named.motion), n=n)
+    shown = [net for net in prediction.circuit.displacements if named.motion.has(net)]
+    setting = prediction.setting_of(named.motion)
+    return observe(named.motion, shown or (named.moving,), setting, n=n)

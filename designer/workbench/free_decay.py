@@ -20,21 +20,22 @@ from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.working_modes import mode_rows
 from designer.workbench.board_prior import PROBE, Prior
 from designer.workbench.observation import CELLS, ScopeErrors
-from designer.workbench.prediction import BoardPrediction
+from designer.workbench.prediction import BoardPrediction, PredictedStop
 from designer.workbench.record import Record
 
 MOST_SAMPLES = 2048
 """Samples that are kept of a channel: of a longer record so many means of neighbours."""
 CONTACT = 0.05
-"""Of the range of a dead zone's output: how far from where it ends it is in contact."""
+"""Of a dead zone's output at a contact as deep as the clearance: how far from where it ends it is
+in contact. Inside the clearance it may follow the displacement by a hundredth of that."""
 ON = 0.05
 """Of the range of the generator's channel: how far from where it ends it is still on."""
 END = 0.1
 """Of a record: its end, where everything rests."""
 FEWEST = 1.5
 """Periods of the nominal board's slowest resonance that a decay lasts at least."""
-LOUDEST = 5.0
-"""Times the noise that its range is at least."""
+LOUDEST, CLEAR = 2.0, 6.0
+"""Times the noise that it is at least in its first period (RMS); and that a contact stands out."""
 STEP = 1e-4
 """Of a resonance: the step of a difference quotient."""
 
@@ -92,9 +93,9 @@ def free_decay(
 ) -> FreeDecay:
     """The free part of a record that begins while the generator is on, or just after.
 
-    channels : channel by net. It begins with the last contact that the dead zones' outputs show,
-    and later by the longest period there is of drive and resonances: a contact too slight to be
-    seen, or the drive, may come after it. Where the generator was recorded, not before it is off.
+    channels : channel by net. It begins after the last contact that the dead zones' outputs show,
+    by the longest period there is of drive and resonances: the drive, or a contact too slight to be
+    seen, may come after it. Where the generator was recorded, not before it is off.
 
     Raises
     ------
@@ -105,7 +106,7 @@ def free_decay(
     named = {net: record.signals.get(channel) for net, channel in channels.items()}
     signals = {net: signal for net, signal in named.items() if signal is not None}
     outputs = [stop.output for stop in prediction.stops]
-    nets = [net for net in prediction.circuit.state_nets[::2] if net in signals]
+    nets = [net for net in prediction.circuit.displacements if net in signals]
     if not nets or not all(net in signals for net in outputs):
         found = ", ".join(signals) or "none of them"
         expected = f"a displacement and {' and '.join(outputs)}, as in the other records"
@@ -113,15 +114,19 @@ def free_decay(
     slowest = 2.0 * np.pi / float(_resonances_of(prediction.prior, _middle(prediction))[0, 0, 0])
     wait = max(slowest, *(1.0 / setting.frequency_hz for setting in prediction.settings))
     time = record.time - record.time[0]
-    over = [_last(time, signals[output], CONTACT) for output in outputs]
-    begin = max(over) + wait if max(over) > 0.0 else 0.0
+    over = [
+        _last(record, channels[stop.output], CONTACT * _deep(stop)) for stop in prediction.stops
+    ]
+    begin = max(over) + wait
     if prediction.generator in signals:
-        begin = max(begin, _last(time, signals[prediction.generator], ON))
+        channel = channels[prediction.generator]
+        begin = max(begin, _last(record, channel, ON * record.span[channel]))
     free = time >= begin
     volts = np.column_stack([signals[net][free] for net in nets])
     noise = np.array([record.noise[channels[net]] for net in nets])
     lasts = float(time[-1] - begin)
-    if lasts < FEWEST * slowest or (np.ptp(volts, axis=0) < LOUDEST * noise).all():
+    swing = volts[time[free] < begin + slowest]
+    if lasts < FEWEST * slowest or (swing.std(axis=0) < LOUDEST * noise).all():
         found = f"{1e3 * max(lasts, 0.0):.3g} ms of free motion after the last contact"
         expected = f"{1e3 * FEWEST * slowest:.3g} ms or more, clearly above the noise"
         raise InputError(record.source, "its length", found, expected)
@@ -139,12 +144,18 @@ def _middle(prediction: BoardPrediction) -> Array:
     return np.zeros((1, prediction.prior.size))
 
 
-def _last(time: Array, signal: Array, share: float) -> float:
-    """When a signal is last away from where it ends by a share of its range [s]; 0 where it only
-    makes noise."""
+def _deep(stop: PredictedStop) -> float:
+    """Output [V] of a contact as deep as the clearance, on the nominal board."""
+    return max(abs(gain * stop.ends[side]) for side, gain in stop.gains.items())
+
+
+def _last(record: Record, channel: str, least: float) -> float:
+    """When a channel is last so far away from where it ends [V], [s since the first sample]; 0
+    where it never is, or never leaves the noise."""
+    signal = record.signals[channel]
     end = float(np.median(signal[-max(1, round(END * len(signal))) :]))
-    away = np.abs(signal - end) > share * float(np.ptp(signal))
-    return float(time[np.nonzero(away)[0][-1]])
+    away = np.nonzero(np.abs(signal - end) > max(least, CLEAR * record.noise[channel]))[0]
+    return float(record.time[away[-1]] - record.time[0]) if len(away) else 0.0
 
 
 def _resonances_of(prior: Prior, z: Array) -> Array:

@@ -199,7 +199,7 @@ def _without_period(
     reason = remedy = ""
     if settles:
         reason = "each period is nearer to the last one than the one before it"
-        remedy = "a record that begins later"
+        remedy = "a record that begins later; one with the generator off is for --decay"
     elif not enough:
         reason = f"no period up to {tried}; longer ones do not fit into the record"
         remedy = f"a record of {3 * MAX_PERIOD} drive periods or more"

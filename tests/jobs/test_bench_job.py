@@ -142,6 +142,42 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
     assert "What to turn" in page
 
 
+def csv_of_decay(path: Path, frequency: float, damping: float) -> Path:
+    """v1 as a damped oscillation about 0.3 V [Hz], no contact, at the channels of ``csv_of``."""
+    time = np.linspace(0.0, 0.1, 4000)
+    rate = 2.0 * np.pi * frequency * damping
+    v1 = 0.3 + 3.0 * np.exp(-rate * time) * np.cos(np.sqrt(1.0 / damping**2 - 1.0) * rate * time)
+    noise = np.random.default_rng(2).normal(0.0, 0.02, (4000, 2))
+    table = np.column_stack([time, v1 + noise[:, 0], noise[:, 1]])
+    np.savetxt(path, table, delimiter=",", header="Time(s),CH1(V),CH2(V)", comments="")
+    return path
+
+
+@pytest.mark.slow
+def test_the_generator_off_tells_the_resonance(folder: Path, tmp_path: Path) -> None:
+    """A decay at a resonance of the spread, which the record alone knows to several per cent."""
+    files, off = [csv_of(2, tmp_path / "on.csv")], tmp_path / "off.csv"
+    (alone,) = bench(folder, files, fit=True).answer["boards"]
+    known = {figure["name"]: figure for figure in alone["figures"]}
+    wanted = known["resonance 1, open"]["value"]
+    ratio = known["damping ratio 1, open"]["value"]
+    decay = [csv_of_decay(off, 1.01 * wanted, ratio)]
+    (board,) = bench(folder, files, decay=decay).answer["boards"]
+    assert board["files"] == ["on.csv", "off.csv"]
+    (figure,) = (f for f in board["figures"] if f["name"] == "resonance 1, open")
+    assert figure["value"] == pytest.approx(1.01 * wanted, rel=2e-3)
+    assert figure["high"] - figure["low"] < 0.01 * wanted
+
+
+def test_a_decay_needs_a_record_of_its_board(folder: Path, tmp_path: Path) -> None:
+    for name in "AB":
+        (tmp_path / name).mkdir()
+    files = [csv_of(2, tmp_path / "A" / "on.csv")]
+    off = csv_of_decay(tmp_path / "B" / "off.csv", 100.0, 0.06)
+    with pytest.raises(InputError, match="another --record of it"):
+        bench(folder, files, boards=True, decay=[off])
+
+
 def test_a_record_that_does_not_repeat_has_no_board(folder: Path, tmp_path: Path) -> None:
     record = stored(2).record
     time = record.time

@@ -1,0 +1,119 @@
+"""Records with the generator off, against the matrix exponential and against ngspice."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import least_squares
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.circuit.reduction import Reduction
+from designer.workbench.free_decay import FreeDecay, free_decay, resonances
+from designer.workbench.prediction import BoardPrediction
+from designer.workbench.record import Record
+from tests.shared.paper_cases import synthesised
+
+CHANNELS = {"v1": "CH1", "fv": "CH2"}
+LENGTH, POINTS = 0.11, 8000
+"""Of a record [s], and its samples."""
+
+
+@cache
+def prediction() -> BoardPrediction:
+    return BoardPrediction(synthesised())
+
+
+def open_mode(z: Array) -> Array:
+    """(n, n) of the free motion of the board at z (K,), from its reduction."""
+    prior = prediction().prior
+    reduction = Reduction(prior.circuit, prior.boards(z[None]).board(0), bandwidth=True)
+    return np.asarray(reduction.system().mode(prior.circuit.open).A)
+
+
+def decaying(z: Array, noise: float = 0.01, contact: float = 0.01) -> Record:
+    """v1 of the board at z (K,) from 3 V and 1 V, by the matrix exponential, with a pulse of fv
+    until ``contact`` [s] over which v1 is anything."""
+    time = np.linspace(0.0, LENGTH, POINTS)
+    step = expm(open_mode(z) * time[1])
+    states = [np.array([3.0, 0.0, 1.0, 0.0])]
+    for _ in time[1:]:
+        states.append(step @ states[-1])
+    rng = np.random.default_rng(4)
+    v1 = 0.98 * np.array(states)[:, 0] + 0.2
+    v1[time < contact] += 2.0
+    fv = np.where(time < contact, 20.0, 0.0) + 0.05
+    screens = {"CH1": v1, "CH2": fv}
+    return Record(
+        time, {name: v + noise * 3.0 * rng.normal(size=POINTS) for name, v in screens.items()}, "x"
+    )
+
+
+def board(seed: int) -> Array:
+    return np.asarray(0.7 * prediction().prior.draws(2, seed=seed)[1])
+
+
+def test_resonances_are_those_of_the_motion() -> None:
+    """The residual is noise at the board's resonances, and least there: the sizes, the constant
+    and what was before the last contact do not enter."""
+    z = board(1)
+    decay = free_decay(decaying(z), CHANNELS, prediction())
+    true = np.stack(resonances(open_mode(z)[None]), axis=-1)[0]
+    assert np.sqrt((decay.residual(true) ** 2).mean()) == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(decay.of_board(prediction().prior, z), decay.residual(true))
+
+    def rest(values: Array) -> Array:
+        return decay.residual(values.reshape(-1, 2))
+
+    at = least_squares(rest, 1.02 * true.ravel()).x
+    assert at[:2] == pytest.approx(true[0], rel=0.01)
+
+
+def test_slopes_are_those_between_boards() -> None:
+    decay = free_decay(decaying(board(1)), CHANNELS, prediction())
+    prior, z, h = prediction().prior, board(2), 1e-3
+    slopes = decay.slopes(prior, z)
+    assert slopes.shape == (decay.volts.size, prior.size)
+    largest = np.argsort(-np.linalg.norm(slopes, axis=0))[:3]
+    for k in largest:
+        step = h * np.eye(prior.size)[k]
+        between = (decay.of_board(prior, z + step) - decay.of_board(prior, z - step)) / (2.0 * h)
+        assert np.linalg.norm(slopes[:, k] - between) < 0.05 * np.linalg.norm(between)
+
+
+def test_a_generator_that_is_still_on_is_waited_for() -> None:
+    record = decaying(board(1), contact=0.0)
+    time = record.time
+    late = np.where(time < 0.03, np.sin(2000.0 * time), 0.0)
+    channels = {**CHANNELS, "vg": "CH3"}
+    whole = Record(time, {**record.signals, "CH3": late}, "x")
+    lasts = [
+        float(free_decay(whole, roles, prediction()).time[-1]) for roles in (CHANNELS, channels)
+    ]
+    assert lasts[0] > lasts[1]
+    assert lasts[1] == pytest.approx(LENGTH - 0.03, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("channels", "contact", "noise", "expected"),
+    [
+        ({"v1": "CH1"}, 0.0, 0.01, "a displacement and fv"),
+        ({"fv": "CH2"}, 0.0, 0.01, "a displacement and fv"),
+        (CHANNELS, 0.1, 0.01, "ms or more"),
+        (CHANNELS, 0.01, 3.0, "clearly above the noise"),
+    ],
+)
+def test_what_tells_nothing_is_refused(
+    channels: dict[str, str], contact: float, noise: float, expected: str
+) -> None:
+    with pytest.raises(InputError, match=expected):
+        free_decay(decaying(board(1), noise, contact), channels, prediction())
+
+
+def test_a_rest_without_motion_is_a_constant() -> None:
+    """Nothing is left of a constant, whatever the resonances."""
+    decay = FreeDecay(np.linspace(0.0, 1.0, 50), np.full((50, 1), 3.0), np.ones(1))
+    np.testing.assert_allclose(decay.residual(np.array([[10.0, 0.1], [20.0, 1.5]])), 0.0, atol=1e-9)
