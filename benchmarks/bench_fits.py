@@ -4,7 +4,7 @@ response back.
 The boards are of ``bench-1``, in ngspice with full op-amps (``record_boards``). The scope is that
 of ``bench_records`` with v1 and fv on its channels. Truth of a figure is what the drawn parts make
 of it; truth of a response is what ngspice shows. ``DESIGNER_FITS`` is the number of boards that are
-fitted (40), ``DESIGNER_LOST`` the number of lost ones of each response that are advised (10).
+fitted (40), ``DESIGNER_LOST`` the number of lost ones of each response that are advised (8).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from designer.yields.adjustment import Adjustment
 from designer.yields.setting_search import BoardCase, seek
 from tests.shared.simulated_scope import SimulatedScope
 
-BOARDS, LOST = 40, 10
+BOARDS, LOST = 40, 8
 DRAWN = 80
 """Boards among which lost ones are sought."""
 
