@@ -66,6 +66,7 @@ class _Bench:
         self.wanted = [str(r.expected) for r in synthesis.model_responses]
         truth = board_figures(synthesis.design.circuit, self.boards.drawn)
         self.truth = {name: values for name, (_, values) in truth.items()}
+        self._names: dict[Asked, tuple[str, NamedMotion] | None] = {}
 
     def pair(self, sample: int) -> tuple[int, int]:
         """Numbers of the responses of which a board is recorded."""
@@ -73,7 +74,12 @@ class _Bench:
         return int(drawn[0]), int(drawn[1])
 
     def named(self, run: BoardRun) -> tuple[str, NamedMotion] | None:
-        """A record of a run, named; None where it is refused."""
+        """A record of a run, named once; None where it is refused."""
+        if run.asked not in self._names:
+            self._names[run.asked] = self._named(run)
+        return self._names[run.asked]
+
+    def _named(self, run: BoardRun) -> tuple[str, NamedMotion] | None:
         rng = np.random.default_rng([SEED, run.asked.question, run.asked.sample, 1])
         scope = SimulatedScope(
             points=int(2000 * 50 ** rng.uniform()),

@@ -179,5 +179,7 @@ def _report(
             "",
             f"{seconds:.2g} CPU s a record.",
             "",
+            "The boards behind such records, and what is advised for them: [fits.md](fits.md).",
+            "",
         ]
     )

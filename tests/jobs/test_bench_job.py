@@ -143,7 +143,7 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
 
 
 def csv_of_decay(path: Path, frequency: float, damping: float) -> Path:
-    """v1 as a damped oscillation about 0.3 V [Hz], no contact, at the channels of ``csv_of``."""
+    """v1 as a damped oscillation [Hz] about 0.3 V, no contact, at the channels of record 3."""
     time = np.linspace(0.0, 0.1, 4000)
     rate = 2.0 * np.pi * frequency * damping
     v1 = 0.3 + 3.0 * np.exp(-rate * time) * np.cos(np.sqrt(1.0 / damping**2 - 1.0) * rate * time)
@@ -156,7 +156,7 @@ def csv_of_decay(path: Path, frequency: float, damping: float) -> Path:
 @pytest.mark.slow
 def test_the_generator_off_tells_the_resonance(folder: Path, tmp_path: Path) -> None:
     """A decay at a resonance of the spread, which the record alone knows to several per cent."""
-    files, off = [csv_of(2, tmp_path / "on.csv")], tmp_path / "off.csv"
+    files, off = [csv_of(3, tmp_path / "on.csv")], tmp_path / "off.csv"
     (alone,) = bench(folder, files, fit=True).answer["boards"]
     known = {figure["name"]: figure for figure in alone["figures"]}
     wanted = known["resonance 1, open"]["value"]
@@ -172,7 +172,7 @@ def test_the_generator_off_tells_the_resonance(folder: Path, tmp_path: Path) -> 
 def test_a_decay_needs_a_record_of_its_board(folder: Path, tmp_path: Path) -> None:
     for name in "AB":
         (tmp_path / name).mkdir()
-    files = [csv_of(2, tmp_path / "A" / "on.csv")]
+    files = [csv_of(3, tmp_path / "A" / "on.csv")]
     off = csv_of_decay(tmp_path / "B" / "off.csv", 100.0, 0.06)
     with pytest.raises(InputError, match="another --record of it"):
         bench(folder, files, boards=True, decay=[off])
