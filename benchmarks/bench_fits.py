@@ -44,7 +44,7 @@ from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
 from designer.workbench.fitted_quantities import BoardFigure, board_figures, figures
-from designer.workbench.free_decay import FreeDecay, free_decay
+from designer.workbench.free_decay import FreeDecay, recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.prediction import BoardPrediction
 from designer.yields.adjustment import Adjustment
@@ -115,7 +115,7 @@ class _Bench:
         scope = SimulatedScope(int(2000 * 50 ** rng.uniform()), 0.98, ("v1", "fv"))
         record = scope.record(at, signals, DECAY, rng)
         try:
-            return free_decay(record, {"v1": "CH1", "fv": "CH2"}, self.prediction)
+            return recorded_decay(record, {"v1": "CH1", "fv": "CH2"}, self.prediction)
         except InputError:
             return None
 

@@ -26,7 +26,7 @@ from designer.spice.simulator import SimulationFailed
 from designer.workbench.advice import Advice
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
-from designer.workbench.free_decay import FreeDecay, free_decay
+from designer.workbench.free_decay import FreeDecay, recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.overlay import Overlay, overlaid
 from designer.workbench.prediction import BoardPrediction
@@ -263,7 +263,7 @@ def _fitted(
         same = next((each for each in benched if _board(each.path, several) == name), None)
         if same is None:
             raise InputError(path, "--decay", f"board {name} alone", "another --record of it")
-        decay = free_decay(read_record(path), same.named.motion.channels, prediction)
+        decay = recorded_decay(read_record(path), same.named.motion.channels, prediction)
         free.setdefault(name, []).append((path.name, decay))
     own: dict[str, list[tuple[str, NamedMotion]]] = {}
     for each in benched:

@@ -28,7 +28,7 @@ from .folding import (
 )
 from .free_decay import (
     FreeDecay as FreeDecay,
-    free_decay as free_decay,
+    recorded_decay as recorded_decay,
 )
 from .naming import (
     NamedMotion as NamedMotion,

@@ -19,26 +19,22 @@ from scipy.interpolate import CubicSpline
 from designer.base.arrays import Array
 from designer.base.errors import DesignerError
 from designer.circuit.netlist import Excitation
-from designer.dynamics.orbit import OrbitStatus
 from designer.workbench.board_orbits import POINTS, NetOrbit, follow
 from designer.workbench.board_prior import Prior
 from designer.workbench.free_decay import FreeDecay
 from designer.workbench.observation import Observation
+from designer.workbench.orbit_match import OrbitMatch, interpolated, matches
 from designer.workbench.orbit_slopes import OrbitSlopes, orbit_slopes
 
 DRAWS, MORE = 16, 96
 """Boards of the spread whose orbits are held against a record first, the nominal one among them;
 and where none of them has orbits like all records."""
-LOOK = 1024
-"""Samples of a record that this first look takes."""
 ROUNDS = 16
 """Steps of Gauss and Newton at most."""
 DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 """Of a step, over the diagonal of its matrix: the next where one leads to no better board."""
 STARTS, GOOD = 4, 1.5
 """Boards from which the search begins, one after the other, until the misfit is good."""
-SAME = 1e-6
-"""Relative difference of two starts of one orbit."""
 LONGEST = 2.0
 """Standard deviations that a step moves a coordinate at most."""
 ENOUGH = 0.02
@@ -187,17 +183,17 @@ class _Problem:
         self, prior: Prior, observations: tuple[Observation, ...], decays: tuple[FreeDecay, ...]
     ) -> None:
         self.prior, self.observations, self.decays = prior, observations, decays
-        self.looks: list[dict[int, _Look]] = []
+        self.looks: list[dict[int, OrbitMatch]] = []
         self.centres: list[_Reading] = []
         self.sigmas: list[Array] = []
 
     def candidates(
         self, starts: Sequence[Sequence[Array]], draws: Array
-    ) -> list[tuple[Array, list[_Look]]]:
+    ) -> list[tuple[Array, list[OrbitMatch]]]:
         """Those of the boards (N, K) that settle on motions like all records, with their orbits,
         the nearest first."""
         self.looks = [
-            _looks(self.prior, draws, obs, states)
+            matches(self.prior, draws, obs, states)
             for obs, states in zip(self.observations, starts, strict=True)
         ]
         common = set.intersection(*(set(look) for look in self.looks))
@@ -206,7 +202,7 @@ class _Problem:
         )
         return [(draws[i], [look[i] for look in self.looks]) for i in order]
 
-    def climbed(self, candidate: tuple[Array, list[_Look]]) -> tuple[BoardFit, float]:
+    def climbed(self, candidate: tuple[Array, list[OrbitMatch]]) -> tuple[BoardFit, float]:
         """The most probable board that is found from a candidate, with its objective."""
         z, looks = candidate
         self.centres, self.sigmas = [], []
@@ -282,7 +278,7 @@ class _Problem:
         obs, reading, sigma = self.observations[i], place.readings[i], self.sigmas[i]
         nets, volts = len(obs.nets), place.orbits[i].volts
         phase = obs.phase + reading.shift
-        by_board = _interpolated(slopes.volts, phase) * (reading.gain / sigma)[:, None]
+        by_board = interpolated(slopes.volts, phase) * (reading.gain / sigma)[:, None]
         shown, rate = _shown(volts, phase), _shown(volts, phase, 1)
         own = np.zeros((len(phase), nets, 2 * nets + 2))
         for c in range(nets):
@@ -370,63 +366,3 @@ def _shown(volts: Array, phase: Array, derivative: int = 0) -> Array:
     closed = np.concatenate([volts, volts[:1]])
     spline = CubicSpline(np.arange(len(closed)) / POINTS, closed, bc_type="periodic")
     return np.asarray(spline(np.mod(phase, periods), derivative))
-
-
-def _interpolated(values: Array, phase: Array) -> Array:
-    """(k, ...) periodic values (m, ...) of whole drive periods at phases (k,), straight between the
-    points of the grid."""
-    place = phase * POINTS
-    cell = np.floor(place).astype(np.int64)
-    share = (place - cell).reshape(-1, *(1,) * (values.ndim - 1))
-    size = len(values)
-    return np.asarray((1.0 - share) * values[cell % size] + share * values[(cell + 1) % size])
-
-
-@dataclass(frozen=True)
-class _Look:
-    """How far a record is from an orbit, in units of the objective, at the shift [drive periods] at
-    which it is nearest."""
-
-    cost: float
-    orbit: NetOrbit
-    shift: float
-
-
-def _looks(
-    prior: Prior, draws: Array, obs: Observation, starts: Sequence[Array]
-) -> dict[int, _Look]:
-    """For each of the draws (N, K) that settles the orbit that is nearest to the record."""
-    boards = prior.ensemble(draws)
-    which = [i for i in range(len(draws)) for _ in starts]
-    asked = np.array([state for _ in draws for state in starts])
-    asked = asked.reshape(len(which), len(prior.circuit.states))
-    settled = boards.settle(which, [obs.excitation.drive] * len(which), asked)
-    best: dict[int, _Look] = {}
-    seen: dict[int, list[Array]] = {}
-    for i, motion in zip(which, settled, strict=True):
-        if motion.status is not OrbitStatus.PERIODIC or obs.n not in (None, motion.n):
-            continue
-        known = seen.setdefault(i, [])
-        if any(np.allclose(motion.start, start, rtol=SAME, atol=0.0) for start in known):
-            continue
-        known.append(motion.start)
-        orbit = follow(boards.reduction(i), obs.excitation, obs.nets, motion.start, motion.n)
-        look = None if orbit is None else _nearest(obs, orbit)
-        if look is not None and (i not in best or look.cost < best[i].cost):
-            best[i] = look
-    return best
-
-
-def _nearest(obs: Observation, orbit: NetOrbit) -> _Look:
-    """At the best of the shifts that the record allows."""
-    width = max(1, len(obs.phase) // LOOK)
-    phase, volts = obs.phase[::width], obs.volts[::width]
-    sigma = obs.spread_of(np.abs(orbit.volts).max(axis=0)) / np.sqrt(width)
-    fine = 1 if obs.aligned else 64
-    costs = []
-    for k in range(orbit.n * fine):
-        shown = _interpolated(orbit.volts, phase + k / fine)
-        rest = (volts - shown - (volts - shown).mean(axis=0)) / sigma
-        costs.append((float((rest**2).sum()), k / fine))
-    cost, shift = min(costs)
-    return _Look(cost, orbit, shift)

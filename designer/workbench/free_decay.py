@@ -85,7 +85,7 @@ def resonances(A: Array) -> tuple[Array, Array]:
     return frequency, -(first + second).real / (2.0 * frequency)
 
 
-def free_decay(
+def recorded_decay(
     record: Record,
     channels: Mapping[str, str],
     prediction: BoardPrediction,

@@ -15,7 +15,7 @@ from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
 from designer.workbench.fitted_quantities import NORMAL, board_figures
-from designer.workbench.free_decay import free_decay
+from designer.workbench.free_decay import recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.prediction import BoardPrediction
 from tests.shared.paper_cases import synthesised
@@ -89,7 +89,7 @@ def test_a_record_with_the_generator_off_sharpens_the_fit(tmp_path: Path) -> Non
     scope = SimulatedScope(8000, 0.98, ("v1", "fv"))
     at = np.linspace(0.0, DECAY, len(signals["v1"]))
     off = scope.record(at, signals, DECAY, np.random.default_rng(SEED))
-    free = free_decay(off, record.motion.channels, prediction)
+    free = recorded_decay(off, record.motion.channels, prediction)
     truth = board_figures(synthesis.design.circuit, boards.drawn)
     figures = {name: values for name, (_, values) in truth.items()}
     widths = []

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.reduction import Reduction
-from designer.workbench.free_decay import FreeDecay, free_decay, resonances
+from designer.workbench.free_decay import FreeDecay, recorded_decay, resonances
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
 from tests.shared.paper_cases import synthesised
@@ -60,7 +60,7 @@ def test_resonances_are_those_of_the_motion() -> None:
     """The residual is noise at the board's resonances, and least there: the sizes, the constant
     and what was before the last contact do not enter."""
     z = board(1)
-    decay = free_decay(decaying(z), CHANNELS, prediction())
+    decay = recorded_decay(decaying(z), CHANNELS, prediction())
     true = np.stack(resonances(open_mode(z)[None]), axis=-1)[0]
     assert np.sqrt((decay.residual(true) ** 2).mean()) == pytest.approx(1.0, abs=0.1)
     np.testing.assert_allclose(decay.of_board(prediction().prior, z), decay.residual(true))
@@ -73,7 +73,7 @@ def test_resonances_are_those_of_the_motion() -> None:
 
 
 def test_slopes_are_those_between_boards() -> None:
-    decay = free_decay(decaying(board(1)), CHANNELS, prediction())
+    decay = recorded_decay(decaying(board(1)), CHANNELS, prediction())
     prior, z, h = prediction().prior, board(2), 1e-3
     slopes = decay.slopes(prior, z)
     assert slopes.shape == (decay.volts.size, prior.size)
@@ -91,7 +91,7 @@ def test_a_generator_that_is_still_on_is_waited_for() -> None:
     channels = {**CHANNELS, "vg": "CH3"}
     whole = Record(time, {**record.signals, "CH3": late}, "x")
     lasts = [
-        float(free_decay(whole, roles, prediction()).time[-1]) for roles in (CHANNELS, channels)
+        float(recorded_decay(whole, roles, prediction()).time[-1]) for roles in (CHANNELS, channels)
     ]
     assert lasts[0] > lasts[1]
     assert lasts[1] == pytest.approx(LENGTH - 0.03, abs=0.002)
@@ -110,7 +110,7 @@ def test_what_tells_nothing_is_refused(
     channels: dict[str, str], contact: float, noise: float, expected: str
 ) -> None:
     with pytest.raises(InputError, match=expected):
-        free_decay(decaying(board(1), noise, contact), channels, prediction())
+        recorded_decay(decaying(board(1), noise, contact), channels, prediction())
 
 
 def test_a_rest_without_motion_is_a_constant() -> None:
