@@ -138,7 +138,10 @@ def fit_board(
         periods, so there is nothing to begin with.
     """
     problem = _Problem(prior, tuple(observations), tuple(decays))
-    candidates = problem.candidates(starts, prior.draws(DRAWS))
+    draws = prior.draws(DRAWS)
+    if decays:  # they know resonances so well that only boards near the right ones lead there
+        draws = fit_board(prior, observations, starts).samples(DRAWS)
+    candidates = problem.candidates(starts, draws)
     if not candidates:
         candidates = problem.candidates(starts, _more_draws(problem, starts))
     if not candidates:
@@ -164,8 +167,7 @@ def _more_draws(problem: _Problem, starts: Sequence[Sequence[Array]]) -> Array:
     if not usual or len(usual) == len(problem.observations):
         return problem.prior.draws(MORE)
     observations = [problem.observations[i] for i in usual]
-    fit = fit_board(problem.prior, observations, [starts[i] for i in usual], problem.decays)
-    return fit.samples(MORE)
+    return fit_board(problem.prior, observations, [starts[i] for i in usual]).samples(MORE)
 
 
 @dataclass(frozen=True)
