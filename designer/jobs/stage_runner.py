@@ -102,5 +102,6 @@ def write_design(
     project = kicad_files.beside(folder, synthesis, inputs, options.overwrite, progress)
     folder.begin(stages, design_files.design_provenance(synthesis))
     design_files.write(folder, synthesis, files)
-    folder.finish("design")
+    # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
+    folder.finish("design")

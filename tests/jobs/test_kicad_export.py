@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.sexpr import Expression, expression_text, read
 from designer.catalog.catalog import load_catalog
@@ -104,6 +105,32 @@ def test_the_same_model_makes_the_same_project_elsewhere(made: Path, tmp_path: P
     assert done.returncode == 0, done.stderr
     one, other = ({p.name: p.read_bytes() for p in (d / "kicad").glob("*.*") if p.is_file()}
                   for d in (made, tmp_path / "again"))  # fmt: skip
+    assert one == other
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_design_interrupted_at_its_project_gets_one(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begun: bool
+) -> None:
+    """Before the project's first file, and amid its files."""
+    model, folder = made.parent / "pair.toml", tmp_path / "design"
+
+    def interrupted(self: Folder, name: str, content: str | bytes) -> None:
+        if name.startswith("kicad/"):
+            if begun:
+                write(self, name, content)
+            raise KeyboardInterrupt
+        write(self, name, content)
+
+    write = Folder.write
+    with monkeypatch.context() as patched:
+        patched.setattr(Folder, "write", interrupted)
+        assert designer("synthesise", model, "--out", folder, "-q").returncode == 130
+    assert designer("synthesise", model, "--out", folder, "--resume", "-q").returncode == 0
+    one, other = (
+        {p.name: p.read_bytes() for p in (d / "kicad").glob("*.*") if p.is_file()}
+        for d in (made, folder)
+    )
     assert one == other
 
 

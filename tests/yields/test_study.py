@@ -668,7 +668,8 @@ def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) 
             process.wait()
     assert kills >= 2
     assert _process(home, out, *more, "--resume").wait() == 0
-    assert _files(out) == _files(whole)
+    one, other = _files(out), _files(whole)  # by name: the difference of two reports takes minutes
+    assert not [n for n in {**one, **other} if one.get(n) != other.get(n)]
     assert not list(out.rglob("*.part"))
 
 
