@@ -144,7 +144,8 @@ def fill_cross_checks(
         keys = {ask.key for ask in wanted[number]} if last else mine.keys()
         _put(store, _chunk(number), [mine[key] for key in sorted(mine) if key in keys])
 
-    blocks = _nearest_first(missing.values())
+    first, rest = _nearest_first(missing.values())
+    blocks = [block for block in (first, *rest) if block]
     todo = [ask for block in blocks for ask in block]
     left = {number: len(some) for number, some in missing.items()}
     for number in [n for n, count in left.items() if not count]:
@@ -155,7 +156,7 @@ def fill_cross_checks(
             answers[number][row.key] = row
             step()
         left[number] -= 1
-        if not left[number]:
+        if k < len(first) or not left[number]:  # the dearest answers are stored as they come
             finish(number)
     if store is not None:
         store.say_ignored()
@@ -164,8 +165,8 @@ def fill_cross_checks(
     ]
 
 
-def _nearest_first(blocks: Iterable[Sequence[Ask]]) -> list[list[Ask]]:
-    """The same asks, those about boards next to a boundary in a block before all others.
+def _nearest_first(blocks: Iterable[Sequence[Ask]]) -> tuple[list[Ask], list[list[Ask]]]:
+    """The asks about boards next to a boundary, to come before all others, and the others' blocks.
 
     It is their runs that are made again at finer steps, one after the other: begun last, they
     would keep one worker busy long after the others have nothing left to do.
@@ -174,7 +175,7 @@ def _nearest_first(blocks: Iterable[Sequence[Ask]]) -> list[list[Ask]]:
     near = {(a.sample, a.question) for block in asked for a in block if a.why is Why.BOUNDARY}
     first = [a for block in asked for a in block if (a.sample, a.question) in near]
     rest = [[a for a in block if (a.sample, a.question) not in near] for block in asked]
-    return [block for block in (first, *rest) if block]
+    return first, rest
 
 
 def count_answered(
