@@ -255,11 +255,11 @@ def options(settings: SolverSettings) -> str:
 def newton_bounds(circuit: Circuit, board: Board, rung: Rung) -> str:
     """Options that keep Newton's method from stepping from one limit of an op-amp to the other.
 
-    An op-amp without memory is linear for a few microvolts of its input. An iteration that takes it
-    out of a limit overshoots these by far, to the other limit and back, until ngspice gives the
-    time step up after a hundred iterations. So no input of an XSPICE block may change by more than
-    its own size in an iteration, which takes one that leaves a limit to 0, or by the width of the
-    linear range where that is more. What is solved is the same, and so is the tolerance. Nothing
+    An op-amp without memory is linear while its input is below limit/gain, some 65 uV. An iteration
+    that takes it out of a limit overshoots this by far, to the other limit and back, until ngspice
+    gives the time step up after a hundred iterations. So no input of an XSPICE block may change by
+    more than its own size in an iteration, which takes one that leaves a limit to 0, or by
+    limit/gain where that is more. What is solved is the same, and so is the tolerance. Nothing
     on the rungs above, whose op-amps have memory.
     """
     if rung != "ideal" or not circuit.sections:
