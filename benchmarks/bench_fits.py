@@ -122,6 +122,9 @@ class _Bench:
     def error(self, runs: Sequence[BoardRun], kind: str) -> BoardError:
         """How far the fit to records of these runs is from the drawn board."""
         began, sample = time.process_time(), runs[0].asked.sample
+        if kind == THREE and self.decay(sample) is None:
+            shown = tuple(run.response for run in runs)
+            return BoardError(sample, kind, shown, (), float("nan"), "no free decay to read", 0.0)
         board = self.behind(runs, decay=kind == THREE)
         seconds = time.process_time() - began
         every = [] if board.fit is None else figures(board.fit)

@@ -12,10 +12,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.atomic_write import appearing
+from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
@@ -27,7 +30,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
-from designer.workbench.ngspice_motion import RELTOL, NgspiceMotion, full_subject, motion_job
+from designer.workbench.ngspice_motion import FINER, RELTOL, NgspiceMotion, full_subject, motion_job
 from designer.yields.adjustment import AS_BUILT, Adjustment
 
 RECORDED = 20
@@ -97,8 +100,16 @@ class RecordBoards:
         self.starts = [on_circuit(system, design, r).start for r in responses]
         self._drives = [circuit_flow(system, design, r).drive for r in responses]
         self._ensemble = Ensemble(self.drawn)
-        self._folder, self._jobs = folder, jobs
-        folder.mkdir(parents=True, exist_ok=True)
+        # A folder for what the runs depend on: none of other steps, parts or boards is taken over.
+        circuit = design.circuit
+        parts = {
+            **{r.name: r.value for r in circuit.resistors},
+            **{c.name: c.value for c in circuit.capacitors},
+        }
+        settings = (seed, parts, dumps(spread.as_dict()), FINER, RELTOL, RECORDED, POINTS)
+        self._folder = folder / sha256(repr(settings).encode()).hexdigest()[:12]
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._jobs = jobs
 
     def runs(self, asked: Iterable[Asked]) -> Iterator[BoardRun]:
         """The run of each; those that ngspice does not make are left out."""
@@ -129,7 +140,7 @@ class RecordBoards:
             with SpicePool(1, timeout=300.0) as pool:
                 for _, result in pool.map([_decay_job(subject)]):
                     if not isinstance(result, SimulationFailed):
-                        np.savez(path, nets=list(result), waves=np.array([*result.values()]))
+                        _save(path, nets=list(result), waves=np.array([*result.values()]))
         if not path.exists():
             return None
         with np.load(path) as stored:
@@ -173,16 +184,20 @@ def _keep(path: Path, subject: GateSubject, motion: NgspiceMotion) -> None:
     drive = subject.excitation
     orbit, signals = motion.orbit, motion.signals
     peak = float(np.abs(signals[subject.circuit.state_nets[subject.system.moving]]).max())
-    partial_file = path.with_suffix(".partial.npz")
-    np.savez(
-        partial_file,
+    _save(
+        path,
         words=[subject.orbit.response, orbit.response],
         drive=[drive.frequency, drive.amplitude, drive.offset],
         graze=min(orbit.penetration, orbit.miss) / peak,
         nets=list(signals),
         waves=np.array(list(signals.values()), dtype=np.float32),
     )
-    partial_file.rename(path)
+
+
+def _save(path: Path, **arrays: Any) -> None:
+    """Whole or not at all, whoever else writes the same."""
+    with appearing(path) as partial_file, partial_file.open("wb") as file:
+        np.savez(file, **arrays)
 
 
 def _kept(path: Path, asked: Asked) -> BoardRun:

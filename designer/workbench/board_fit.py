@@ -146,8 +146,8 @@ def fit_board(
         candidates = problem.candidates(starts, _more_draws(problem, starts))
     if not candidates:
         raise NoSuchBoard(
-            f"none of {MORE} boards of the spread settles on motions of these periods at all of "
-            "these settings"
+            f"none of {MORE} boards, of the spread or as the other records leave them, settles on "
+            "motions of these periods at all of these settings"
         )
     best: tuple[BoardFit, float] | None = None
     for candidate in candidates[:STARTS]:

@@ -10,13 +10,12 @@ Numerical Analysis 10, 1973).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.working_modes import mode_rows
 from designer.workbench.board_prior import PROBE, Prior
 from designer.workbench.observation import CELLS, ScopeErrors
@@ -36,8 +35,10 @@ FEWEST = 1.5
 """Periods of the nominal board's slowest resonance that a decay lasts at least."""
 LOUDEST, CLEAR = 2.0, 6.0
 """Times the noise that it is at least in its first period (RMS); and that a contact stands out."""
-STEP = 1e-4
-"""Of a resonance: the step of a difference quotient."""
+STEP, LEAST = 1e-4, 1e-2
+"""Of a resonance: the step of a difference quotient; and the least damping ratio for it."""
+REAL = 1e-9
+"""Of a root: an imaginary part that is rounding."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class FreeDecay:
         base, columns = self.residual(here), []
         for index in np.ndindex(here.shape):
             near = here.copy()
-            near[index] *= 1.0 + STEP
+            near[index] += STEP * max(abs(near[index]), LEAST)
             columns.append((self.residual(near) - base) / (near[index] - here[index]))
         return np.asarray(np.column_stack(columns) @ moved.T)
 
@@ -78,11 +79,15 @@ def resonances(A: Array) -> tuple[Array, Array]:
     """(N, pairs) undamped frequencies [rad/s] and damping ratios of x' = A x, (N, n, n), by
     frequency. Two real roots count as one pair, of a ratio above 1."""
     roots = np.linalg.eigvals(A).astype(complex)
-    order = np.lexsort((roots.imag, np.abs(roots)), axis=1)
+    real = np.abs(roots.imag) <= REAL * np.abs(roots)
+    # Those of an oscillation stand side by side; a real one may lie between two of them in size.
+    order = np.lexsort((roots.imag, np.abs(roots), real), axis=1)
     roots = np.take_along_axis(roots, order, axis=1)
     first, second = roots[:, 0::2], roots[:, 1::2]
     frequency = np.sqrt(np.abs(first * second))
-    return frequency, -(first + second).real / (2.0 * frequency)
+    damping = -(first + second).real / (2.0 * frequency)
+    order = np.argsort(frequency, axis=1)
+    return np.take_along_axis(frequency, order, axis=1), np.take_along_axis(damping, order, axis=1)
 
 
 def recorded_decay(
@@ -99,8 +104,8 @@ def recorded_decay(
 
     Raises
     ------
-    InputError : no displacement or not every dead zone's output is among the channels; or what is
-        left after the last contact is too short or too faint.
+    InputError : no displacement or not every dead zone's output is among the channels; what is left
+        after the last contact is too short or too faint; or the board comes to rest on a stop.
     """
     scope = ScopeErrors() if scope is None else scope
     named = {net: record.signals.get(channel) for net, channel in channels.items()}
@@ -112,7 +117,7 @@ def recorded_decay(
         expected = f"a displacement and {' and '.join(outputs)}, as in the other records"
         raise InputError(record.source, "its channels", found, expected)
     slowest = 2.0 * np.pi / float(_resonances_of(prediction.prior, _middle(prediction))[0, 0, 0])
-    wait = max(slowest, *(1.0 / setting.frequency_hz for setting in prediction.settings))
+    wait = max([slowest, *(1.0 / setting.frequency_hz for setting in prediction.settings)])
     time = record.time - record.time[0]
     over = [
         _last(record, channels[stop.output], CONTACT * _deep(stop)) for stop in prediction.stops
@@ -122,22 +127,44 @@ def recorded_decay(
         channel = channels[prediction.generator]
         begin = max(begin, _last(record, channel, ON * record.span[channel]))
     free = time >= begin
-    volts = np.column_stack([signals[net][free] for net in nets])
-    noise = np.array([record.noise[channels[net]] for net in nets])
     lasts = float(time[-1] - begin)
-    swing = volts[time[free] < begin + slowest]
-    if lasts < FEWEST * slowest or (swing.std(axis=0) < LOUDEST * noise).all():
+    early = free & (time < begin + slowest)
+    noise = {net: record.noise[channels[net]] for net in nets}
+    nets = [n for n in nets if early.any() and np.std(signals[n][early]) > LOUDEST * noise[n]]
+    if lasts < FEWEST * slowest or not nets:
         found = f"{1e3 * max(lasts, 0.0):.3g} ms of free motion after the last contact"
         expected = f"{1e3 * FEWEST * slowest:.3g} ms or more, clearly above the noise"
         raise InputError(record.source, "its length", found, expected)
+    for stop in prediction.stops:
+        _check_rest(stop, signals, record)
+    volts = np.column_stack([signals[net][free] for net in nets])
     width = -(-len(volts) // MOST_SAMPLES)
     count = len(volts) // width
     kept = volts[: count * width].reshape(count, width, -1).mean(axis=1)
     peak = np.ptp(kept, axis=0) / 2.0
     cells = CELLS * max(lasts / slowest, 1.0)
-    sigma = np.sqrt(noise**2 / width + (scope.model * peak) ** 2 * count / cells)
+    sigma = np.sqrt(
+        np.array([noise[net] for net in nets]) ** 2 / width
+        + (scope.model * peak) ** 2 * count / cells
+    )
     times = time[free][: count * width].reshape(count, width).mean(axis=1) - begin
     return FreeDecay(times, kept, sigma)
+
+
+def _check_rest(stop: PredictedStop, signals: Mapping[str, Array], record: Record) -> None:
+    """InputError where a board comes to rest on a stop: its free motion is that in contact."""
+    if not all(net in signals for net in stop.displacement):
+        return
+    rest = sum(factor * _rest(signals[net]) for net, factor in stop.displacement.items())
+    for side, end in stop.ends.items():
+        if side * (rest - end) > 0.0:
+            expected = f"one inside clearance {stop.clearance}, which ends at {end:.3g} V"
+            raise InputError(record.source, "its end", f"a rest at {rest:.3g} V", expected)
+
+
+def _rest(signal: Array) -> float:
+    """Where a channel ends [V]."""
+    return float(np.median(signal[-max(1, round(END * len(signal))) :]))
 
 
 def _middle(prediction: BoardPrediction) -> Array:
@@ -153,28 +180,34 @@ def _last(record: Record, channel: str, least: float) -> float:
     """When a channel is last so far away from where it ends [V], [s since the first sample]; 0
     where it never is, or never leaves the noise."""
     signal = record.signals[channel]
-    end = float(np.median(signal[-max(1, round(END * len(signal))) :]))
-    away = np.nonzero(np.abs(signal - end) > max(least, CLEAR * record.noise[channel]))[0]
+    away = np.nonzero(np.abs(signal - _rest(signal)) > max(least, CLEAR * record.noise[channel]))[0]
     return float(record.time[away[-1]] - record.time[0]) if len(away) else 0.0
 
 
 def _resonances_of(prior: Prior, z: Array) -> Array:
     """(N, pairs, 2) frequencies [rad/s] and damping ratios of the boards at z (N, K) with every
     clearance open."""
-    circuit, boards = prior.circuit, prior.boards(z)
-    if swinging_sections(circuit):
-        boards = replace(boards, bandwidth=False)
-    n = len(circuit.states)
-    rows = mode_rows(boards, circuit.open, circuit.state_nets[:1])
-    return np.stack(resonances(rows.rates[:, :, :n]), axis=-1)
+    circuit, n = prior.circuit, len(prior.circuit.states)
+    rows = mode_rows(prior.boards(z), circuit.open, circuit.state_nets[:1])
+    # Op-amps that drive diodes have states of their own, which do not act on the others here.
+    return np.stack(resonances(rows.rates[:, :n, :n]), axis=-1)
 
 
 def _basis(time: Array, resonances: Array) -> Array:
     """(k, 1 + 2 pairs) a constant and the free motions of each pair (pairs, 2), each of size 1."""
     columns = [np.ones_like(time)]
     for frequency, damping in resonances:
-        turn = np.sqrt(complex(1.0 - damping**2)) * frequency
-        decay = np.exp(-damping * frequency * time)
-        columns.append(decay * np.cos(turn * time).real)
-        columns.append(decay * (np.sin(turn * time) / (turn or 1.0)).real * frequency)
+        if damping < 1.0:
+            turn = np.sqrt(1.0 - damping**2) * frequency
+            decay = np.exp(-damping * frequency * time)
+            columns += [decay * np.cos(turn * time), decay * np.sinc(turn * time / np.pi) * time]
+        else:  # the slower of two exponentials outside, so that neither overflows
+            apart = np.sqrt(damping**2 - 1.0) * frequency
+            decay = np.exp((apart - damping * frequency) * time)
+            gone = -np.expm1(-2.0 * apart * time)
+            columns += [
+                decay * (1.0 - gone / 2.0),
+                decay * (gone / (2.0 * apart) if apart else time),
+            ]
+        columns[-1] *= frequency
     return np.column_stack(columns)

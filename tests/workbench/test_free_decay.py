@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -95,6 +96,55 @@ def test_a_generator_that_is_still_on_is_waited_for() -> None:
     ]
     assert lasts[0] > lasts[1]
     assert lasts[1] == pytest.approx(LENGTH - 0.03, abs=0.002)
+
+
+def test_a_real_pair_may_straddle_an_oscillation() -> None:
+    """Companion blocks of s² + 4 s + 1 and of s² + 0.1 s + 1.4425."""
+    A = np.zeros((1, 4, 4))
+    A[0, :2, :2] = [[0.0, 1.0], [-1.0, -4.0]]
+    A[0, 2:, 2:] = [[0.0, 1.0], [-1.4425, -0.1]]
+    frequency, damping = resonances(A)
+    slow = np.sqrt(1.4425)
+    np.testing.assert_allclose(frequency[0], [1.0, slow])
+    np.testing.assert_allclose(damping[0], [2.0, 0.05 / slow])
+
+
+@pytest.mark.parametrize("damping", [0.3, 1.0, 1.5])
+def test_nothing_is_left_of_a_long_free_motion(damping: float) -> None:
+    """By the matrix exponential, over two seconds at 100 Hz."""
+    omega, time = 200.0 * np.pi, np.linspace(0.0, 2.0, 400)
+    A = np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]])
+    volts = np.array([(expm(A * t) @ [1.0, 30.0])[:1] for t in time])
+    decay = FreeDecay(time, volts, np.full(1, 1e-3))
+    left = decay.residual(np.array([[omega, damping]]))
+    np.testing.assert_allclose(left, 0.0, atol=1e-6)
+
+
+def test_a_dead_channel_is_left_out() -> None:
+    record = decaying(board(1))
+    dead = Record(record.time, {**record.signals, "CH3": np.zeros(POINTS)}, "x")
+    decay = recorded_decay(dead, {**CHANNELS, "v3": "CH3"}, prediction())
+    assert decay.volts.shape[1] == 1
+    assert (decay.sigma > 0.0).all()
+    alone = Record(record.time, {**record.signals, "CH1": np.ones(POINTS)}, "x")
+    with pytest.raises(InputError, match="clearly above the noise"):
+        recorded_decay(alone, CHANNELS, prediction())
+
+
+def test_a_rest_on_a_stop_is_refused() -> None:
+    record, end = decaying(board(1)), prediction().stops[0].ends[1]
+    beyond = {**record.signals, "CH1": record.signals["CH1"] + 1.5 * end}
+    with pytest.raises(InputError, match="inside clearance"):
+        recorded_decay(Record(record.time, beyond, "x"), CHANNELS, prediction())
+
+
+def test_without_a_wanted_response_a_decay_is_read_all_the_same() -> None:
+    made = synthesised()
+    none = BoardPrediction(
+        replace(made, modelfile=replace(made.modelfile, responses=()), model_responses=())
+    )
+    whole, bare = (recorded_decay(decaying(board(1)), CHANNELS, p) for p in (prediction(), none))
+    assert bare.time[-1] >= whole.time[-1]
 
 
 @pytest.mark.parametrize(
