@@ -412,6 +412,33 @@ class Broken:
             yield i, SimulationFailed("worker died (exit -11) twice")
 
 
+class Interrupted(Broken):
+    """The same, until somebody presses Ctrl-C after so many decks."""
+
+    def __init__(self, decks: int) -> None:
+        self.left = decks
+
+    def map(self, jobs: Iterable[SpiceJob[Any] | None]) -> Iterator[tuple[int, Any]]:
+        for result in super().map(jobs):
+            if not self.left:
+                raise KeyboardInterrupt
+            self.left -= 1
+            yield result
+
+
+def test_boards_next_to_a_boundary_are_asked_first_and_stored_as_they_come(tmp_path: Path) -> None:
+    """Their answers outlive an interruption, though the rest of their block has none."""
+    p, whole = asking(), Interrupted(10**6)
+    near = [replace(a, why=Why.BOUNDARY) if a.sample == 1 else a for a in both(range(3))]
+    boundary = [a for a in near if a.why is Why.BOUNDARY]
+    cross_checks(p, boundary, whole, 1)  # type: ignore[arg-type]
+    decks = 10**6 - whole.left
+    with pytest.raises(KeyboardInterrupt):
+        fill_cross_checks(p, near, _store(tmp_path, p), Interrupted(decks), 1, nothing)  # type: ignore[arg-type]
+    stored = _store(tmp_path, p).read(range(10))
+    assert [c.key for c in stored] == [a.key for a in boundary]
+
+
 def test_a_library_that_crashes_is_said() -> None:
     heard = cross_checks(asking(), both(range(2)), Broken(), 1)  # type: ignore[arg-type]
     assert len(heard) == 8
