@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +13,15 @@ from scipy.optimize import least_squares
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.check.synthesis_result import synthesise
 from designer.circuit.reduction import Reduction
+from designer.model.model_file import read_model_file
 from designer.workbench.free_decay import FreeDecay, recorded_decay, resonances
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
 from tests.shared.paper_cases import synthesised
 
+ROOT = Path(__file__).resolve().parents[2]
 CHANNELS = {"v1": "CH1", "fv": "CH2"}
 LENGTH, POINTS = 0.11, 8000
 """Of a record [s], and its samples."""
@@ -71,6 +75,21 @@ def test_resonances_are_those_of_the_motion() -> None:
 
     at = least_squares(rest, 1.02 * true.ravel()).x
     assert at[:2] == pytest.approx(true[0], rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_op_amps_of_a_rectifier_lag_in_its_resonances_too() -> None:
+    """They move these by some 3e-4, as much as a decay's interval is wide."""
+    prior = BoardPrediction(synthesise(read_model_file(ROOT / "examples" / "rectifier.toml"))).prior
+    z, time = 0.7 * prior.draws(2, seed=1)[1], np.linspace(0.0, LENGTH, 200)
+    drawn = prior.boards(z[None]).board(0)
+    left = []
+    for lag in (True, False):
+        mode = Reduction(prior.circuit, drawn, bandwidth=lag).system().mode(prior.circuit.open)
+        start = np.eye(len(mode.A))[0]
+        volts = np.array([(expm(mode.A * t) @ start)[:1] for t in time])
+        left.append(np.abs(FreeDecay(time, volts, np.full(1, 1e-6)).of_board(prior, z)).max())
+    assert left[0] < 1.0 < 10.0 < left[1]
 
 
 def test_slopes_are_those_between_boards() -> None:
