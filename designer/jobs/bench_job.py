@@ -135,12 +135,11 @@ def bench(
     records, and for what to turn on it. boards : the records are of several boards, each with a
     folder of its own that has its name; fits them, and says how far they differ. decay : records of
     the same boards that go on when the generator is switched off, with the same channels; for the
-    fit. ngspice : also lay
-    ngspice's motion of the board over each record, once the rest is written; needs ``out``, and
-    does without where ngspice is missing. jobs : the most ngspice runs at a time. out : a directory
-    for ``bench.json``, ``bench.html``, a picture of each record and, of several boards,
-    ``boards.csv``; ``overwrite`` replaces files of these names. Where it lies in the design folder
-    the folder's report shows these records too.
+    fit. ngspice : also lay ngspice's motion of the board over each record, once the rest is
+    written; needs ``out``, and does without where ngspice is missing. jobs : the most ngspice runs
+    at a time. out : a directory for ``bench.json``, ``bench.html``, a picture of each record and,
+    of several boards, ``boards.csv``; ``overwrite`` replaces files of these names. Where it lies in
+    the design folder the folder's report shows these records too.
 
     Raises
     ------

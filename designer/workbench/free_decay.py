@@ -116,13 +116,14 @@ def recorded_decay(
         found = ", ".join(signals) or "none of them"
         expected = f"a displacement and {' and '.join(outputs)}, as in the other records"
         raise InputError(record.source, "its channels", found, expected)
-    slowest = 2.0 * np.pi / float(_resonances_of(prediction.prior, _middle(prediction))[0, 0, 0])
+    middle = np.zeros((1, prediction.prior.size))
+    slowest = 2.0 * np.pi / float(_resonances_of(prediction.prior, middle)[0, 0, 0])
     wait = max([slowest, *(1.0 / setting.frequency_hz for setting in prediction.settings)])
     time = record.time - record.time[0]
     over = [
         _last(record, channels[stop.output], CONTACT * _deep(stop)) for stop in prediction.stops
     ]
-    begin = max(over) + wait
+    begin = max(over, default=0.0) + wait
     if prediction.generator in signals:
         channel = channels[prediction.generator]
         begin = max(begin, _last(record, channel, ON * record.span[channel]))
@@ -165,10 +166,6 @@ def _check_rest(stop: PredictedStop, signals: Mapping[str, Array], record: Recor
 def _rest(signal: Array) -> float:
     """Where a channel ends [V]."""
     return float(np.median(signal[-max(1, round(END * len(signal))) :]))
-
-
-def _middle(prediction: BoardPrediction) -> Array:
-    return np.zeros((1, prediction.prior.size))
 
 
 def _deep(stop: PredictedStop) -> float:

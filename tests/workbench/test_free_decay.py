@@ -15,14 +15,16 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.check.synthesis_result import synthesise
 from designer.circuit.reduction import Reduction
-from designer.model.model_file import read_model_file
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.workbench.free_decay import FreeDecay, recorded_decay, resonances
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
+from tests.shared.model_text import PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 
 ROOT = Path(__file__).resolve().parents[2]
 CHANNELS = {"v1": "CH1", "fv": "CH2"}
+STOPLESS = f'format = 1\ntitle = "x"\n{PAPER_TABLE.replace("k0 = 0.95", "k0 = 0.0")}'
 LENGTH, POINTS = 0.11, 8000
 """Of a record [s], and its samples."""
 
@@ -164,6 +166,18 @@ def test_without_a_wanted_response_a_decay_is_read_all_the_same() -> None:
     )
     whole, bare = (recorded_decay(decaying(board(1)), CHANNELS, p) for p in (prediction(), none))
     assert bare.time[-1] >= whole.time[-1]
+
+
+def test_without_stops_all_of_it_is_free() -> None:
+    prediction = BoardPrediction(synthesise(parse_model_file(STOPLESS)))
+    prior = prediction.prior
+    z, time = np.zeros(prior.size), np.linspace(0.0, LENGTH, 400)
+    reduction = Reduction(prior.circuit, prior.boards(z[None]).board(0), bandwidth=True)
+    mode = reduction.system().mode(prior.circuit.open).A
+    v1 = np.array([(expm(mode * t) @ np.eye(len(mode))[0])[0] for t in time])
+    noise = 1e-3 * np.random.default_rng(5).normal(size=len(time))
+    decay = recorded_decay(Record(time, {"CH1": v1 + noise}, "x"), {"v1": "CH1"}, prediction)
+    assert np.sqrt((decay.of_board(prior, z) ** 2).mean()) < 1.5
 
 
 @pytest.mark.parametrize(
