@@ -1,11 +1,13 @@
 """Run each ``benchmarks/bench_*.py`` that has a ``main()`` and print how long it took.
 
-With names as arguments (``python -m benchmarks ngspice``), only those.
+With names as arguments (``python -m benchmarks ngspice``), only those; what follows one name and
+begins with ``-`` are that benchmark's own options (``python -m benchmarks strangers --count 30``).
 """
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 import sys
 import time
@@ -19,8 +21,13 @@ import benchmarks
 PREFIX = "benchmarks.bench_"
 
 
-def main(wanted: Sequence[str] = ()) -> int:
+def main(words: Sequence[str] = ()) -> int:
     """Exit status: 0, 1 if a benchmark raised, or 2 if there is none of a wanted name."""
+    end = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
+    wanted, options = words[:end], words[end:]
+    if options and len(wanted) != 1:
+        print("options are those of one benchmark, which stands before them", file=sys.stderr)
+        return 2
     console = Console()
     table = Table("benchmark", "seconds", "result")
     failed = False
@@ -37,9 +44,12 @@ def main(wanted: Sequence[str] = ()) -> int:
         run = getattr(importlib.import_module(name), "main", None)
         if run is None:
             continue
+        if options and "words" not in inspect.signature(run).parameters:
+            print(f"{wanted[0]} has no options", file=sys.stderr)
+            return 2
         start = time.perf_counter()
         try:
-            result = run()
+            result = run(options) if options else run()
         except Exception as error:  # the others shall still run
             console.print_exception()
             failed, result = True, f"failed: {error!r}"

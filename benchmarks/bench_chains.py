@@ -10,13 +10,13 @@ import json
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.bench_flow import commit, machine, table
 from designer.base.arrays import Array
+from designer.base.environment import spawn_context
 from designer.base.eseries import series_values
 from designer.linear_network.linear_search import best
 from designer.linear_network.linear_terms import Bounds, LinearBlock, Targets
@@ -103,7 +103,7 @@ def report(rows: list[Chain]) -> str:
 
 def main() -> str:
     """Measure, print, write chains.md and chains.json; returns a line of results."""
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(WORKERS, mp_context=spawn_context()) as pool:
         rows = list(pool.map(solve, CHAINS[::-1]))[::-1]
     text = report(rows)
     print(text)

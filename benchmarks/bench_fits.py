@@ -14,7 +14,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from benchmarks.fit_report import (
 )
 from benchmarks.record_boards import DECAY, POINTS, RECORDED, Asked, BoardRun, RecordBoards
 from designer.base.defaults import cores
+from designer.base.environment import spawn_context
 from designer.base.errors import InputError
 from designer.base.figure_style import to_png
 from designer.base.plain_json import dumps
@@ -242,7 +242,7 @@ def main() -> str:
     wanted = bench.wanted
     lost = [asked for k in LOST_OF for asked in bench.lost(k, most)]
     del bench
-    with ProcessPoolExecutor(cores(), get_context("spawn"), _begin) as workers:
+    with ProcessPoolExecutor(cores(), spawn_context(), _begin) as workers:
         fits = workers.map(_errors, range(boards))
         advised = list(workers.map(_advised, lost))
         errors = [error for board in fits for error in board]

@@ -3,28 +3,37 @@
 The boards are of ``bench-1``, in ngspice with full op-amps (``record_boards``). The scope has 8
 bits, 1 % noise, jitter, errors of gain and offset; it takes 2000 to 100 000 points over 3 to 19.9
 drive periods, with two to four of the nets on its channels. Names are as ``designer bench`` gives
-them. ``DESIGNER_RECORDS`` is the number of boards (56: about 500 records of nine responses).
+them. ``--boards`` is the number of boards (56: about 500 records of nine responses; 0: none, and
+the page stays as it is).
+
+A second page, ``exact.md``, has records at settings that are in no file (``exact_records``).
+``--exact`` is how many of the paper's model are drawn with each of the ``--seeds`` (0: none), of
+each other model a quarter.
 """
 
 from __future__ import annotations
 
-import os
+import argparse
+import math
 import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import exact_records
 from benchmarks.bench_flow import commit, machine, table
+from benchmarks.exact_records import ExactRecord, drawn_records
 from benchmarks.record_boards import POINTS, RECORDED, Asked, BoardRun, RecordBoards
 from designer.base.defaults import cores
 from designer.base.errors import InputError
 from designer.base.figure_style import new_figure, styled, to_png
 from designer.base.plain_json import dumps
-from designer.check.synthesis_result import synthesise
+from designer.check.synthesis_result import Synthesis, synthesise
 from designer.dynamics.counts import Counts
 from designer.model.model_file import read_model_file
 from designer.spice.read_orbit import ENGINE_ERROR
@@ -42,7 +51,13 @@ MODEL = ROOT / "examples" / "paper.toml"
 BOARDS, SEED = 56, 31
 CHANNELS = (("v1", "fv"), ("v1", "fv", "vg"), ("v1", "v3", "fv", "vg"), ("fv", "v1"))
 RIGHT, OPEN, WRONG, NO_TRUTH, REFUSED = "right", "left open", "wrong", "no truth", "refused"
+FEWEST_ALIKE = 5
+"""Records with the same channels that have a row."""
 OUTCOMES = (RIGHT, OPEN, WRONG, NO_TRUTH, REFUSED)
+EXACT, EXACT_SEEDS = 200, (1931,)
+MODELS = ("paper", "rectifier", "rig", "backlash", "preloaded", "three-masses")
+SAME = 2e-3
+"""Of a drive frequency: a sure one is as near as that."""
 COLOURS = ("#2b6a4d", "#e0b040", "#b03030", "#c8c8c8", "#808080")
 
 
@@ -109,9 +124,158 @@ def _named(run: BoardRun, prediction: BoardPrediction) -> NamedMotion | None:
         return None
 
 
-def main() -> str:
+@dataclass(frozen=True)
+class NamedExact:
+    """What became of a record of an exact orbit."""
+
+    model: str
+    """Name of the model file."""
+    seed: int
+    """Of the draws."""
+    number: int
+    """Of the draw."""
+    channels: str
+    """The nets on the channels, in alphabetical order."""
+    clipped: bool
+    """Whether a channel is cut off."""
+    clean: bool
+    """Whether the scope has no noise and no errors."""
+    helped: bool
+    """Whether the drive frequency or the channels are said."""
+    truth: str
+    """What the exact circuit shows."""
+    name: str
+    """What the record was called, the likeliest first where it was left open; or why it was
+    refused."""
+    outcome: str
+    """One of ``OUTCOMES``."""
+    off: float
+    """How far off the drive frequency is, as a fraction; nan of a refused one."""
+    said: bool
+    """Whether a channel that is cut off is said to be."""
+
+
+def named_exact(
+    model: str, seed: int, drawn: ExactRecord, synthesis: Synthesis, prediction: BoardPrediction
+) -> NamedExact:
+    """What becomes of one. Wrong is what is sure of another response, of another drive frequency or
+    of another net on a channel."""
+    about = None if drawn.omega is None else synthesis.design.errors.scales.frequency(drawn.omega)
+    channels = ", ".join(sorted(drawn.nets))
+    helped = drawn.omega is not None or drawn.told is not None
+    known = bool(drawn.clipped), drawn.clean, helped
+    outcome = partial(NamedExact, model, seed, drawn.number, channels, *known, drawn.response)
+    try:
+        motion = recorded_motion(drawn.record, prediction, frequency=about, told=drawn.told)
+        name = named(motion, prediction)
+    except InputError as error:
+        return outcome(str(error), REFUSED, math.nan, said=False)
+    off = name.motion.frequency / drawn.frequency - 1.0
+    nets = {net: f"CH{k + 1}" for k, net in enumerate(drawn.nets)}
+    true = name.response == drawn.response and abs(off) < SAME and name.motion.channels == nets
+    result = OPEN if not name.sure else RIGHT if true else WRONG
+    words = ", ".join((name.response, *name.others))
+    return outcome(words, result, off, said=drawn.clipped in name.clipped)
+
+
+def exact_page(count: int, seeds: Sequence[int]) -> str:
+    """Name the records of exact orbits and write ``exact.md``; the result in a line."""
+    began, records = time.process_time(), []
+    for k, model in enumerate(MODELS):
+        synthesis = synthesise(read_model_file(MODEL.with_name(f"{model}.toml")))
+        prediction = BoardPrediction(synthesis)
+        numbers = range(count if k == 0 else -(-count // 4))
+        for seed in seeds:
+            drawn = drawn_records(synthesis, numbers, seed)
+            records += [named_exact(model, seed, each, synthesis, prediction) for each in drawn]
+    seconds = (time.process_time() - began) / max(len(records), 1)
+    REPORT.mkdir(parents=True, exist_ok=True)
+    command = f"python -m benchmarks records --exact {count} --seeds {' '.join(map(str, seeds))}"
+    (REPORT / "exact.md").write_text(exact_report(records, seconds, command), encoding="utf-8")
+    answer = {"commit": commit(), "command": command, "seconds": seconds}
+    answer |= {"records": [asdict(r) for r in records]}
+    (REPORT / "exact.json").write_text(dumps(answer), encoding="utf-8")
+    total = Counter(r.outcome for r in records)
+    return ", ".join(f"{total[name]} {name}" for name in OUTCOMES if name != NO_TRUTH)
+
+
+def exact_report(records: Sequence[NamedExact], seconds: float, command: str) -> str:
+    """The page: by model file, by kind of record, by channels, and every wrong one."""
+    outcomes = [name for name in OUTCOMES if name != NO_TRUTH]
+
+    def row(title: str, of: Sequence[NamedExact]) -> list[str]:
+        counts = Counter(r.outcome for r in of)
+        return [title, *(str(counts[name]) for name in outcomes)]
+
+    models = [row(m, [r for r in records if r.model == m]) for m in MODELS]
+    periodic = [r for r in records if r.truth != "aperiodic"]
+    kinds = [
+        row("periodic", periodic),
+        row("aperiodic", [r for r in records if r.truth == "aperiodic"]),
+        row("a channel is cut off", [r for r in records if r.clipped]),
+        row("no noise", [r for r in records if r.clean]),
+        row("one channel", [r for r in records if ", " not in r.channels]),
+        row("drive or channels are said", [r for r in records if r.helped]),
+    ]
+    channels = Counter(r.channels for r in records if r.model == MODELS[0])
+    ways = [
+        row(each, [r for r in records if r.model == MODELS[0] and r.channels == each])
+        for each, number in channels.most_common()
+        if number >= FEWEST_ALIKE
+    ]
+    cut = [r for r in records if r.clipped and r.outcome != REFUSED]
+    open_ = [r for r in records if r.outcome == OPEN]
+    among = sum(r.truth in r.name.split(", ") for r in open_)
+    named_so = [r for r in records if r.outcome == WRONG]
+    return "\n".join(
+        [
+            "# Records of exact orbits at settings that are in no file",
+            "",
+            f"Made by `{command}` at commit {commit()} on {machine()}.",
+            "",
+            (exact_records.__doc__ or "").strip(),
+            "",
+            *table(["model file", *outcomes], [*models, row("all", records)]),
+            "",
+            f"Wrong is a record that is sure of another response, of a drive frequency that is off "
+            f"by more than {SAME:g}, or of another net on a channel. Of {len(open_)} left open "
+            f"{among} have the true name among those that are left. Only a record of many drive "
+            "periods tells that a motion is aperiodic.",
+            "",
+            *table(["records", *outcomes], kinds),
+            "",
+            f"{len(cut)} of those that were read have a channel that is cut off; of "
+            f"{sum(r.said for r in cut)} it is said.",
+            "",
+            f"By what is on the channels, of `{MODELS[0]}.toml`:",
+            "",
+            *table(["channels", *outcomes], ways),
+            "",
+            *(
+                f"- wrong: {r.model} {r.seed} {r.number}: {r.truth} named {r.name}"
+                for r in named_so
+            ),
+            *([""] if named_so else []),
+            f"{seconds:.2g} CPU s a record, the drawing of it included.",
+            "",
+        ]
+    )
+
+
+def main(words: Sequence[str] = ()) -> str:
     """Name the records and write ``reports/bench``; the result in a line."""
-    boards = int(os.environ.get("DESIGNER_RECORDS", BOARDS))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks records", description=__doc__)
+    parser.add_argument("--boards", type=int, default=BOARDS, help="boards in ngspice")
+    parser.add_argument("--exact", type=int, default=EXACT, help="records of exact orbits")
+    parser.add_argument("--seeds", type=int, nargs="+", default=EXACT_SEEDS, help="of the latter")
+    chosen = parser.parse_args(words)
+    done = [exact_page(chosen.exact, chosen.seeds)] if chosen.exact else []
+    done += [board_page(chosen.boards)] if chosen.boards else []
+    return "; ".join(done)
+
+
+def board_page(boards: int) -> str:
+    """Name the records of boards in ngspice and write their page; the result in a line."""
     synthesis = synthesise(read_model_file(MODEL))
     prediction = BoardPrediction(synthesis)
     wanted = [f"{r.expected} at ω = {r.omega:g}" for r in synthesis.model_responses]

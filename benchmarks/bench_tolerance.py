@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import matplotlib as mpl
@@ -23,6 +22,7 @@ from matplotlib.figure import Figure
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.spicelib_runs import seconds_a_board
 from designer.base.defaults import cores
+from designer.base.environment import spawn_context
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
@@ -130,7 +130,7 @@ def brute(plan: StudyPlan, question: Question, boards: int) -> float:
 
 def memory(plan: StudyPlan, samples: int) -> float:
     """[MB] a new process's peak over a study of so many boards, all answers kept."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(1, spawn_context()) as pool:
         return pool.submit(_memory, plan, samples).result()
 
 

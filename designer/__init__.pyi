@@ -2,6 +2,7 @@ from .base.errors import (
     DesignerError as DesignerError,
     EnvironmentMissing as EnvironmentMissing,
     InputError as InputError,
+    ResponseNotFound as ResponseNotFound,
     Unreachable as Unreachable,
 )
 from .base.version import (

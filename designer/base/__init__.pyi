@@ -10,6 +10,7 @@ from .arrays import (
     distinct_indices as distinct_indices,
 )
 from .atomic_write import (
+    NotWritten as NotWritten,
     appearing as appearing,
     write as write,
 )
@@ -27,6 +28,7 @@ from .defaults import (
     cores as cores,
 )
 from .design_folder import (
+    ASKED as ASKED,
     COMPARISON as COMPARISON,
     COMPARISON_PICTURES as COMPARISON_PICTURES,
     DESIGN as DESIGN,
@@ -40,7 +42,9 @@ from .design_folder import (
 from .environment import (
     changed_environment as changed_environment,
     clean_environment as clean_environment,
+    python_command as python_command,
     set_environment as set_environment,
+    spawn_context as spawn_context,
 )
 from .errors import (
     MISSING as MISSING,
@@ -48,6 +52,7 @@ from .errors import (
     EnvironmentMissing as EnvironmentMissing,
     InputError as InputError,
     InputErrors as InputErrors,
+    ResponseNotFound as ResponseNotFound,
     Unreachable as Unreachable,
     problems_in as problems_in,
 )
@@ -90,7 +95,6 @@ from .guarded_reading import (
     decode as decode,
     inside as inside,
     parse_json as parse_json,
-    parse_toml as parse_toml,
     read_bytes as read_bytes,
     read_text as read_text,
     reading as reading,
@@ -133,6 +137,7 @@ from .manifest import (
     StageName as StageName,
     Stages as Stages,
     file_hash as file_hash,
+    object_hash as object_hash,
     read_json as read_json,
 )
 from .natural_sort import (
@@ -163,6 +168,8 @@ from .page import (
     table_of as table_of,
 )
 from .parquet_entry import (
+    MOST_BYTES as MOST_BYTES,
+    MOST_ROWS as MOST_ROWS,
     ParquetForm as ParquetForm,
     Rows as Rows,
 )
@@ -171,12 +178,19 @@ from .plain_json import (
     dumps as dumps,
     plain as plain,
 )
+from .printed import (
+    printable as printable,
+    tell as tell,
+)
 from .progress import (
     Laps as Laps,
     Progress as Progress,
+    best_so_far as best_so_far,
     doing as doing,
+    note as note,
     part as part,
     progress_for as progress_for,
+    seeking as seeking,
 )
 from .proportion import (
     mid_p as mid_p,
@@ -184,6 +198,9 @@ from .proportion import (
 )
 from .reason import (
     Reason as Reason,
+)
+from .record_check import (
+    checked_record as checked_record,
 )
 from .report_pieces import (
     CaseStore as CaseStore,
@@ -194,16 +211,19 @@ from .schema import (
     Accepts as Accepts,
     FieldProblems as FieldProblems,
     FileTable as FileTable,
+    accepts_value as accepts_value,
     check_values as check_values,
     checked as checked,
     choice as choice,
     did_you_mean as did_you_mean,
+    expected_of as expected_of,
     flag as flag,
     fraction as fraction,
     keys_of as keys_of,
     line as line,
     lines as lines,
     literal as literal,
+    nested_table as nested_table,
     number as number,
     one_of as one_of,
     physical as physical,
@@ -237,7 +257,10 @@ from .sexpr import (
 from .si_unit import (
     DIGITS as DIGITS,
     Unit as Unit,
+    drive_text as drive_text,
+    is_angular as is_angular,
     prefixed as prefixed,
+    quantity_text as quantity_text,
     suffix as suffix,
     value_text as value_text,
 )
@@ -246,16 +269,23 @@ from .threads import (
     interrupt as interrupt,
     parallel as parallel,
 )
+from .toml_reader import (
+    parse_toml as parse_toml,
+)
 from .toml_writer import (
     toml_text as toml_text,
 )
 from .units import (
+    ACCELERATIONS as ACCELERATIONS,
     VALUE_CODES as VALUE_CODES,
     decode_value as decode_value,
     distinct_texts as distinct_texts,
     encode_value as encode_value,
     format_quantity as format_quantity,
+    has_unit as has_unit,
     parse_quantity as parse_quantity,
+    restated as restated,
+    shortest as shortest,
     spaced_quantity as spaced_quantity,
 )
 from .version import (

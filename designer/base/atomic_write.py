@@ -10,6 +10,12 @@ from pathlib import Path
 from designer.base.errors import InputError
 
 PART = ".part"
+
+
+class NotWritten(InputError):
+    """A place that cannot be written."""
+
+
 WRITABLE = "a place that can be written"
 
 
@@ -24,13 +30,13 @@ def writing(path: Path, field: str = "--out", expected: str = WRITABLE) -> Itera
 
     Raises
     ------
-    InputError : an OSError in the block; field, expected : what it then says.
+    NotWritten : an OSError in the block; field, expected : what it then says.
     """
     try:
         yield
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        raise InputError(path, field, reason, expected) from None
+        raise NotWritten(path, field, reason, expected) from None
 
 
 @contextlib.contextmanager
@@ -52,7 +58,7 @@ def write(path: Path, content: str | bytes) -> None:
 
     Raises
     ------
-    InputError : it cannot be written.
+    NotWritten : it cannot.
     """
     with appearing(path) as partial:
         partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

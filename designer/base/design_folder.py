@@ -19,6 +19,8 @@ from typing import Any
 
 from designer.base.atomic_write import appearing, partial_of, writing
 from designer.base.errors import InputError
+from designer.base.guarded_reading import decode
+from designer.base.input_differences import differences
 from designer.base.manifest import (
     MANIFEST as MANIFEST,
     OF_DESIGN,
@@ -33,9 +35,11 @@ from designer.base.manifest import (
     read_json as read_json,
     read_manifest,
 )
-from designer.base.plain_json import dumps
+from designer.base.plain_json import dumps, plain
+from designer.base.seal import sha256
+from designer.base.toml_reader import parse_toml
 
-MODEL = "model.toml"
+MODEL, ASKED = "model.toml", "asked.toml"
 DESIGN = "design.json"
 TOLERANCE = "tolerance.json"
 REPORTS = ("report.html", "report.md")
@@ -84,8 +88,12 @@ class Folder:
         *,
         overwrite: bool,
         resume: bool,
+        asked: Mapping[str, Any] | None = None,
     ) -> list[StageName]:
         """Which of the wanted stages are to be done.
+
+        asked : what hashes among the inputs are of, by their names, so that a refusal can say what
+        differs: the text of the ``model``, the settings of the ``work``.
 
         Raises
         ------
@@ -96,7 +104,7 @@ class Folder:
         for stage, (inputs, _) in wanted.items():
             state = self.state(stage, inputs)
             if state == "other" and not overwrite:
-                self._refuse(stage, inputs)
+                self._refuse(stage, inputs, asked or {})
             if state == "unfinished" and not (overwrite or resume):
                 raise InputError(
                     self / MANIFEST,
@@ -176,12 +184,13 @@ class Folder:
             }
             manifest.stages[stage] = ManifestStage(inputs, resume_data=dict(resume_data or {}))
             manifest.files |= dict.fromkeys(names, (stage, None))
-        for name in manifest.files:  # remains of a killed process
-            if name.endswith("/"):
-                for left in (self / name).glob(f".{BLOCKS}.part"):
-                    left.unlink(missing_ok=True)
-            else:
-                partial_of(self / name).unlink(missing_ok=True)
+        with writing(self.path):
+            for name in manifest.files:  # remains of a killed process
+                if name.endswith("/"):
+                    for left in (self / name).glob(f".{BLOCKS}.part"):
+                        left.unlink(missing_ok=True)
+                else:
+                    partial_of(self / name).unlink(missing_ok=True)
         if provenance is not None:
             manifest.provenance = dict(provenance)
         self.manifest = manifest
@@ -253,7 +262,8 @@ class Folder:
             obsolete += [n for n in self._there(name) if n not in manifest.files]
         for name in obsolete:
             if not name.endswith("/"):
-                (self / name).unlink(missing_ok=True)
+                with writing(self / name):
+                    (self / name).unlink(missing_ok=True)
             manifest.files.pop(name, None)
             with contextlib.suppress(OSError):  # a folder that is empty now
                 if "/" in name:
@@ -342,18 +352,46 @@ class Folder:
             stream.flush()
             os.fsync(stream.fileno())
 
-    def _refuse(self, stage: StageName, inputs: Mapping[str, Any]) -> None:
+    def _refuse(
+        self, stage: StageName, inputs: Mapping[str, Any], asked: Mapping[str, Any]
+    ) -> None:
         assert self.manifest is not None
         stored = self.manifest.stages[stage].inputs
-        differ = sorted(k for k in {*stored, *inputs} if stored.get(k) != inputs.get(k))
-        stored_text = ", ".join(f"{k} {_short(stored.get(k))}" for k in differ)
-        wanted = ", ".join(f"{k} {_short(inputs.get(k))}" for k in differ)
+        differ = {key for key in {*stored, *inputs} if stored.get(key) != inputs.get(key)}
+        behind: dict[str, tuple[Any, Any]] = {}
+        with contextlib.suppress(InputError, OSError):  # damaged: less is said
+            if "model" in asked and "model" in differ:
+                behind |= self._models(str(stored.get("model")), asked["model"])
+            if "work" in asked and "work" in differ:
+                behind |= self._works(stage, asked["work"])
+        told = differences(stored, inputs, behind)
         way = (
-            ": --overwrite makes it anew with what is here now"
+            "the same: --overwrite makes it anew with what is here now"
             if MADE_WITH.issuperset(differ)
-            else "; or another folder, or --overwrite to replace what manifest.json lists"
+            else "the same; or another folder, or --overwrite to replace what manifest.json lists"
         )
-        raise InputError(self / MANIFEST, f"stages.{stage}.inputs", stored_text, wanted + way)
+        raise InputError(self / MANIFEST, f"stages.{stage}.inputs", f"a {stage} {told}", way)
+
+    def _models(self, made: str, asked: str) -> dict[str, tuple[Any, Any]]:
+        """The model file that a stage was made with, and another text of one. made : its hash."""
+        for path in (self / MODEL, self / ASKED):
+            content = path.read_bytes() if path.is_file() else b""
+            if sha256(content) == made:
+                file = str(path)
+                return {"model": (parse_toml(decode(content, file), file), parse_toml(asked, None))}
+        return {}
+
+    def _works(self, stage: StageName, asked: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+        """What decided a sweep, and what is to decide another: the provenance has it."""
+        assert self.manifest is not None
+        file = self / f"{stage}.json"
+        origin = self.json(file.name).get("provenance") if file.is_file() else None
+        for each in (origin, self.manifest.provenance):
+            settings = each.get("settings") if isinstance(each, dict) else None
+            made = settings.get("bifurcation") if isinstance(settings, dict) else None
+            if isinstance(made, dict):
+                return {"work": (made, plain(asked))}
+        return {}
 
 
 def is_design_folder(path: Path) -> bool:
@@ -394,8 +432,3 @@ def _exists(path: Path) -> bool:
         return path.exists() or path.is_symlink()
     except OSError:
         return False
-
-
-def _short(value: object) -> str:
-    text = str(value)
-    return text[:12] + "…" if len(text) > 40 else text

@@ -1,4 +1,4 @@
-"""Environment variables of a process: what ngspice may see of the world.
+"""What a process that is started here may see of the world: environment variables, modules.
 
 This module is imported by every worker process: it imports the standard library only.
 """
@@ -7,7 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator, Mapping
+from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnContext, SpawnProcess
+
+SAFE_PATH: dict[str, str | None] = {"PYTHONSAFEPATH": "1"}
+"""Environment of a Python that takes no module from its working directory."""
 
 
 def clean_environment(home: str) -> dict[str, str | None]:
@@ -36,3 +42,37 @@ def set_environment(values: Mapping[str, str | None]) -> None:
             os.environ.pop(name, None)
         else:
             os.environ[name] = value
+
+
+def python_command(*words: str) -> list[str]:
+    """The command of this Python with these words, such as "-m", "designer".
+
+    It takes no module from its working directory.
+    """
+    return [sys.executable, "-P", *words]
+
+
+class _SafeProcess(SpawnProcess):
+    """A fresh process that takes no module from the working directory.
+
+    It is started with ``-c``, which puts that folder first on the path until multiprocessing has
+    begun and puts the parent's path in its place.
+    """
+
+    def start(self) -> None:
+        with changed_environment(SAFE_PATH):
+            super().start()
+
+
+class _SafeContext(SpawnContext):
+    Process = _SafeProcess
+
+
+def spawn_context() -> SpawnContext:
+    """The way in which every worker process is started.
+
+    A script's own folder stays on the path of its workers, since they take over the parent's.
+    """
+    with changed_environment(SAFE_PATH):
+        resource_tracker.ensure_running()  # a process too, started by the first that needs it
+    return _SafeContext()

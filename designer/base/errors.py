@@ -7,10 +7,12 @@ environment. Anything else that escapes is a defect of the tool.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+from designer.base.printed import one_line, printable
 
 
 class Absent(Enum):
@@ -51,10 +53,10 @@ class InputError(DesignerError):
         self.field = field
         self.found = found
         self.expected = expected
-        prefix = f"{self.file}: " if self.file else ""
+        prefix = f"{one_line(self.file)}: " if self.file else ""
         text = found if isinstance(found, str) else repr(found)
         stands = " is missing" if found is MISSING else f": found {_clip(text)}"
-        super().__init__(f"{prefix}{field}{stands}, expected {expected}")
+        super().__init__(f"{prefix}{one_line(field)}{stands}, expected {printable(expected)}")
 
 
 class InputErrors(InputError):
@@ -82,6 +84,17 @@ def problems_in(error: InputError) -> tuple[InputError, ...]:
 
 class Unreachable(InputError):
     """The target cannot be met with this catalogue: names the condition that binds."""
+
+
+class ResponseNotFound(DesignerError):
+    """A wanted response that the model does not show: the answer is no.
+
+    answer : the JSON object, with what was found instead.
+    """
+
+    def __init__(self, message: str, answer: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.answer = dict(answer or {})
 
 
 class EnvironmentMissing(DesignerError):

@@ -14,10 +14,8 @@ import csv
 import io
 import json
 import math
-import re
 import stat
 import struct
-import tomllib
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -190,21 +188,3 @@ def _integer(text: str) -> int:
     if len(text) > MOST_DIGITS:
         raise ValueError("a number of too many digits")
     return int(text)
-
-
-def parse_toml(text: str, file: str | None) -> dict[str, Any]:
-    """The tables of a TOML text; a syntax error becomes an ``InputError`` that names the line."""
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(file, "the file", "tables or lists nested too deeply", "TOML") from None
-    except ValueError as error:  # includes tomllib.TOMLDecodeError
-        message = str(error)
-        place = re.search(r" \(at line (\d+), column \d+\)$", message)
-        content = text.splitlines()
-        row = int(place[1]) if place else max(len(content), 1)
-        row_text = content[row - 1].strip() if row <= len(content) else ""
-        reason = message[: place.start()] if place else message
-        raise InputError(
-            file, f"line {row}", row_text or "the end of the file", f"valid TOML ({reason})"
-        ) from None

@@ -61,6 +61,10 @@ def _digest() -> str:
     return digest.hexdigest()[:16]
 
 
+# numba would take its settings from a file in the working directory, a stranger's folder maybe: the
+# place of compiled code among them, which it unpickles.
+numba.core.config._config_fname = os.devnull
+numba.core.config.reload_config()
 CACHE = cache_folder()
 if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)

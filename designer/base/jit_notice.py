@@ -21,6 +21,7 @@ CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
     "kernel_completions": "the choice of parts",
     "kernel_linear": "the choice of parts",
+    "kernel_rounding": "the choice of parts",
     "kernel_terms": "the choice of parts",
     "kernel_nodal": "equations of boards",
     "kernel_boards": "circuits",

@@ -4,6 +4,9 @@ The key says which request an entry answers: equal keys, equal entries. An entry
 (``KeyedStore``) or a line of one (``Lines``). It appears whole or not at all, and its seal
 (``base.seal``) shows every changed bit. What is damaged, or was written without a seal and is
 vouched for by nobody, is missing: it is said and computed again, and nothing else is lost.
+
+A seal is no signature: anyone can write an entry with one that is right. So its size is bounded,
+and who reads it has it made into records that check their values (``base.record_check``).
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes, re
 from designer.base.seal import BLANK, intact, sealed
 
 Entry = TypeVar("Entry")
+Made = TypeVar("Made")
 Note = Callable[[str], None]
 """Told what a user ought to know, a line at a time."""
 Vouch = Callable[[str, bytes], bool]
@@ -27,6 +31,8 @@ Vouch = Callable[[str, bytes], bool]
 SEAL = "seal"
 """Name of the seal in an entry."""
 DAMAGED = "damaged, computed again"
+LARGEST = 200_000_000
+"""Bytes of a file of entries."""
 UNSEALED = "written without a checksum, computed again"
 """By versions of the tool that had none."""
 
@@ -82,9 +88,19 @@ class KeyedStore(Generic[Entry]):
 
     def read(self, name: str, key: Mapping[str, Any]) -> Entry | None:
         """The entry that answers this request; None where there is none, or a damaged one."""
+        return self.read_as(name, key, lambda entry: entry)
+
+    def read_as(
+        self, name: str, key: Mapping[str, Any], make: Callable[[Entry], Made]
+    ) -> Made | None:
+        """What is made of the entry that answers this request; None as of ``read``.
+
+        make : raises any of ``guarded_reading.UNREADABLE`` on an entry that nobody wrote so: it
+        then counts as damaged.
+        """
         path = self.root / name
         try:
-            content = read_bytes(path, "a stored result")
+            content = read_bytes(path, "a stored result", most=LARGEST)
         except InputError:
             if path.exists():
                 self._damaged(name, DAMAGED)
@@ -95,16 +111,16 @@ class KeyedStore(Generic[Entry]):
             return None
         try:
             head, value = self.form.decode(content)
-            other = {k: head.get(k) for k in key} != dict(key)
+            if {k: head.get(k) for k in key} != dict(key):
+                self.foreign.add(name)
+                return None
+            made = make(value)
         except (*UNREADABLE, InputError):
             self._damaged(name, DAMAGED)
             return None
-        if other:
-            self.foreign.add(name)
-            return None
         if not state:
             self.unsealed.add(name)
-        return value
+        return made
 
     def write(
         self,
@@ -177,7 +193,7 @@ class Lines:
         """The entries in the file; none where there is none. Lines that are damaged are left out,
         which ``note`` is told. vouch : asked about a file that has no seal in it."""
         try:
-            content = read_bytes(path, "stored results")
+            content = read_bytes(path, "stored results", most=LARGEST)
         except InputError:
             if path.exists():
                 note(f"{path}: {DAMAGED}")

@@ -7,7 +7,9 @@ stage on: the longest steps often come first, and the first of all may wait for 
 No stage is silent: whoever is watched (``with progress:``) says every `SILENCE` seconds how long
 the stage has lasted, how far it is, and what it works on just now, if nothing else was said. What
 is worked on comes from `doing` and `part`, which any function may call: they reach who is watched,
-or nobody. The same lines stand in the log.
+or nobody, and so do `note` and `best_so_far`. What is sought (``with seeking:``) is told a minute
+after the search began, as good as it is known then, and each minute from there on. The same lines
+stand in the log.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar, Token
 from typing import TYPE_CHECKING, Self
 
+from designer.base.printed import printable, tell
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID
 
@@ -31,6 +35,8 @@ SILENCE = 10.0
 """s that nothing is said at most."""
 REDRAWN = 0.2
 """s between two changes of what a terminal's bar says is worked on."""
+MINUTE = 60.0
+"""s between two lines about the best answer so far."""
 BEAT = 1.0
 """s between two looks at whether it was silent too long."""
 
@@ -86,11 +92,35 @@ class ProgressStage:
         self._say(f"  {far}" + (f": {self.detail}" if self.detail else ""))
 
 
+class Sought:
+    """What is sought: the best that is known of it, and when that was last told.
+
+    what : in words. found : by how many parts of the work it was found within, and a half for a
+    step on the way: the smallest counts, which is what the outermost search knows.
+    """
+
+    def __init__(self, what: str, clock: Callable[[], float]) -> None:
+        self.what = what
+        self.found: dict[float, str] = {}
+        self._clock = clock
+        self._began = self._last = clock()
+
+    def overdue(self) -> str:
+        """A line about the best so far, if none was told for `MINUTE`; else an empty text."""
+        now = self._clock()
+        if now - self._last < MINUTE:
+            return ""
+        self._last = now
+        best = self.found[min(self.found)] if self.found else "none yet"
+        return f"  {self.what}, best so far after {duration(now - self._began)}: {best}"
+
+
 class Progress:
     """Says nothing; what functions use that nobody watches."""
 
     _clock: Callable[[], float] = staticmethod(time.monotonic)
     _stage: ProgressStage | None = None
+    _sought: Sought | None = None
     _parts: tuple[str, ...] = ()
     _ended: threading.Event | None = None
     _token: Token[Progress | None] | None = None
@@ -106,6 +136,22 @@ class Progress:
         if self._stage is not None:
             self._stage.detail = ", ".join(filter(None, (*self._parts, text)))
 
+    def best_so_far(self, text: str, *, step: bool = False) -> None:
+        """The best that is known of what is sought. step : only on the way to it, which is told
+        until there is one."""
+        if self._sought is not None:
+            self._sought.found[len(self._parts) + 0.5 * step] = text
+
+    def forget_parts(self) -> None:
+        """What was found within parts of the work that have ended is known no more."""
+        if self._sought is not None:
+            found, depth = self._sought.found, len(self._parts)
+            self._sought.found = {k: text for k, text in found.items() if k <= depth}
+
+    def idle(self) -> None:
+        """The work waits for somebody: nothing is said of it until the next stage begins."""
+        self._stage = None
+
     def note(self, text: str) -> None:
         """Something that a user ought to know."""
         LOG.warning("%s", text)
@@ -116,9 +162,11 @@ class Progress:
         yield
 
     def beat(self) -> None:
-        """Say how far the stage is, if nothing was said for too long."""
+        """Say how far the stage is, if nothing was said for too long, and the best so far."""
         if self._stage is not None:
             self._stage.beat()
+        if self._sought is not None and (line := self._sought.overdue()):
+            self.note(line)
 
     def __enter__(self) -> Self:
         self._stage = ProgressStage(None, self._say, self._clock)
@@ -145,7 +193,7 @@ class Progress:
 
 
 _WATCHED: ContextVar[Progress | None] = ContextVar("watched", default=None)
-"""Who is told by `doing` and `part`."""
+"""Who is told by `doing`, `part`, `note`, `seeking` and `best_so_far`."""
 
 
 def doing(text: str) -> None:
@@ -169,6 +217,37 @@ def part(text: str) -> Iterator[None]:
         yield
     finally:
         watched._parts = above
+        watched.forget_parts()
+
+
+def note(text: str) -> None:
+    """Tell who is watched something that a user ought to know."""
+    watched = _WATCHED.get()
+    if watched is not None:
+        watched.note(text)
+
+
+@contextmanager
+def seeking(what: str) -> Iterator[None]:
+    """Inside, `best_so_far` says how good an answer is known, such as to "parts"; a search within
+    another one is a part of it."""
+    watched = _WATCHED.get()
+    if watched is None or watched._sought is not None:
+        yield
+        return
+    watched._sought = Sought(what, watched._clock)
+    try:
+        yield
+    finally:
+        watched._sought = None
+
+
+def best_so_far(text: str, *, step: bool = False) -> None:
+    """Tell who is watched the best that is known of what is sought, such as "an error of 1 %".
+    step : as of ``Progress.best_so_far``."""
+    watched = _WATCHED.get()
+    if watched is not None:
+        watched.best_so_far(text, step=step)
 
 
 class ProgressLines(Progress):
@@ -181,15 +260,15 @@ class ProgressLines(Progress):
         self._clock = clock
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
-        print(f"{text} …", file=sys.stderr, flush=True)
+        tell(f"{text} …")
         return super().stage(text, total)
 
     def note(self, text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
+        tell(text)
         super().note(text)
 
     def _say(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
+        tell(line)
         super()._say(line)
 
 
@@ -222,6 +301,7 @@ class Terminal(Progress):
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         counted = super().stage(text, total)
+        text = printable(text)
         self._finish()
         bars, task = self._bars, self._bars.add_task(text, total=total, rate="")
         self._shown = task, text
@@ -248,11 +328,16 @@ class Terminal(Progress):
         now = self._clock()
         if self._shown is not None and self._stage is not None and now - self._drawn >= REDRAWN:
             self._drawn, (task, name) = now, self._shown
-            self._bars.update(task, description=f"{name}: {self._stage.detail}")
+            self._bars.update(task, description=f"{name}: {printable(self._stage.detail)}")
+
+    def idle(self) -> None:
+        super().idle()
+        self._finish()
+        self._shown = None
 
     def note(self, text: str) -> None:
         super().note(text)
-        self._bars.console.print(text, markup=False, highlight=False)
+        self._bars.console.print(printable(text), markup=False, highlight=False)
 
     @contextmanager
     def aside(self) -> Iterator[None]:

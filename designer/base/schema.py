@@ -263,6 +263,8 @@ FIRST_FORMAT = whole_number("1, the format that this version reads", 1, 1)
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """A hint such as ``did you mean "zeta"?``, or nothing."""
+    if not word:
+        return ""
     folded = {name.casefold(): name for name in choices}
     close = difflib.get_close_matches(word.casefold()[:100], folded, n=1, cutoff=0.6)
     return f'did you mean "{folded[close[0]]}"?' if close else ""
@@ -313,17 +315,20 @@ def validated(
         field = _dotted((within, *place) if within else place)
         if problem["type"] == _UNKNOWN:
             keys = sorted(keys_of(_table_at(table, place[:-1])))
-            expected = one_of(str(place[-1]), keys)
+            # Past these nobody reads a hint, and ten thousand would take seconds.
+            word = str(place[-1]) if len(out) < _MOST_HINTS else ""
+            expected = one_of(word, keys)
             misspelt |= {(*place[:-1], name) for name in keys if f'mean "{name}"?' in expected}
             out.append(InputError(file, field, f"unknown key {place[-1]!r}", expected))
         elif problem["type"] == "missing":
             if place not in misspelt:
-                out.append(InputError(file, field, MISSING, _expected(table, place)))
+                out.append(InputError(file, field, MISSING, expected_of(table, place)))
         else:
-            out += _wrong(file, field, dict(problem), _expected(table, place))
+            out += _wrong(file, field, dict(problem), expected_of(table, place))
     return None, out
 
 
+_MOST_HINTS = 1000
 _UNKNOWN = "unexpected_keyword_argument"  # pydantic's name of an unknown key
 
 
@@ -396,10 +401,13 @@ def _dotted(place: tuple[int | str, ...]) -> str:
     return text or "the file"
 
 
-def keys_of(table: type[FileTable]) -> dict[str, Any]:
-    """The keys that a table may have, each with the annotation of its field."""
+def _keys_of(table: type[FileTable]) -> Mapping[str, Any]:
     hints = get_type_hints(table, include_extras=True)
     return {_key(field.name, hints[field.name]): hints[field.name] for field in fields(table)}
+
+
+keys_of: Callable[[Any], Mapping[str, Any]] = cache(_keys_of)
+"""The keys that a table may have, each with the annotation of its field."""
 
 
 def _key(name: str, annotation: Any) -> str:
@@ -413,20 +421,35 @@ def _table_at(table: type[FileTable], place: tuple[int | str, ...]) -> type[File
     current = table
     for part in place:
         if isinstance(part, str):
-            nested = _nested(keys_of(current)[part])
+            nested = nested_table(keys_of(current)[part])
             assert nested is not None
             current = nested
     return current
 
 
-def _nested(annotation: object) -> type[FileTable] | None:
+def nested_table(annotation: object) -> type[FileTable] | None:
     """The table inside an annotation such as ``tuple[Rails, ...]`` or ``Rails | None``."""
     if isinstance(annotation, type) and issubclass(annotation, FileTable):
         return annotation
-    return next((t for t in map(_nested, get_args(annotation)) if t is not None), None)
+    return next((t for t in map(nested_table, get_args(annotation)) if t is not None), None)
 
 
-def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
+def accepts_value(table: type[FileTable], key: str, value: object) -> bool:
+    """Whether a key of a table accepts this value; of one that holds tables, whether it is any."""
+    annotation = keys_of(table)[key]
+    if nested_table(annotation) is not None:
+        listed = value if isinstance(value, list) else [value]
+        return all(isinstance(each, Mapping) for each in listed)
+    for each in get_args(annotation)[1:] if get_origin(annotation) is Annotated else ():
+        if isinstance(each, Accepts) and not each.in_folder:
+            try:
+                each.check(value)
+            except ValueError:
+                return False
+    return True
+
+
+def expected_of(table: type[FileTable], place: tuple[int | str, ...]) -> str:
     """The values that the field at a place accepts, in words."""
     keys = [part for part in place if isinstance(part, str)]
     if not keys:
@@ -436,7 +459,7 @@ def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
     for each in metadata:
         if isinstance(each, Accepts):
             return each.expected
-    nested = _nested(kind)
+    nested = nested_table(kind)
     assert nested is not None
     listed = get_origin(kind) is tuple
     noun = "tables" if listed and isinstance(place[-1], str) else "a table"

@@ -17,12 +17,15 @@ from designer.base.errors import InputError
 
 DEEPEST = 100
 """Levels of nesting that a file may have; KiCad's own have about a dozen."""
+MOST_LISTS, MOST_WORDS, LONGEST = 1_500_000, 1_000_000, 1_000_000
+"""Lists of a file, different words of it, characters of a word. A board of 60 parts has 35,000
+lists and 20,000 words; each takes up to 400 bytes here."""
 LARGEST = 1e9
 """Size of a number: KiCad's own lengths are below 2147 mm. Squares and products stay finite."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _TOKEN = re.compile(
-    r'^[^\S\n]*\#[^\n]*|\s*\n|[^\S\n]+|(\()|(\))|"((?:[^"\\]|\\.)*)"|([^\s()"]+)|(")',
+    r'^[^\S\n]*\#[^\n]*|\s*\n|[^\S\n]+|(\()|(\))|"((?:[^"\\]++|\\.)*+)"|([^\s()"]+)|(")',
     re.DOTALL | re.MULTILINE,
 )
 """A comment or space (no group), or a token: its group says of which kind it is."""
@@ -33,7 +36,7 @@ _MEANS = {"n": "\n", "r": "\r", "t": "\t"}
 _WRITTEN = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Atom:
     """A word."""
 
@@ -173,7 +176,8 @@ def read(text: str, file: Path | None = None) -> Expression:
 
     Raises
     ------
-    InputError : not an S-expression, cut off, or more than one; with line and column.
+    InputError : not an S-expression, cut off, or more than one; with line and column. One of more
+        lists, levels or words than a file needs.
     """
     expressions = read_all(text, file)
     if len(expressions) != 1:
@@ -185,6 +189,9 @@ def read(text: str, file: Path | None = None) -> Expression:
 def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     """The expressions of a file; InputError as in ``read``."""
     source = SourceText(text, file)
+    # Counted before anything is made of them; one in quotation marks counts too.
+    if (count := text.count("(")) > MOST_LISTS:
+        raise InputError(file, "the file", f"{count} lists", f"at most {MOST_LISTS}")
     finished: list[Expression] = []
     words: dict[tuple[str, bool], Atom] = {}
     stack: list[tuple[int, list[Atom | Expression]]] = []
@@ -215,6 +222,13 @@ def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
             quoted = kind == _QUOTED
             atom = words.get((match[kind], quoted))
             if atom is None:
+                expected = "a file as KiCad writes"
+                if len(match[kind]) > LONGEST:
+                    found = f"a word of more than {LONGEST} characters"
+                    raise source.error(match.start(), found, expected)
+                if len(words) == MOST_WORDS:
+                    found = f"more than {MOST_WORDS} different words"
+                    raise source.error(match.start(), found, expected)
                 atom = Atom(_unescaped(match[kind]) if quoted else match[kind], quoted)
                 words[match[kind], quoted] = atom
             stack[-1][1].append(atom)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from designer.base.units import spaced_quantity
 
 PREFIXED = {
     "Hz": ((1e7, 1e6, "MHz"), (1e4, 1e3, "kHz"), (0.1, 1.0, "Hz"), (0.0, 1e-3, "mHz")),
@@ -28,9 +31,15 @@ class Unit:
         """The end of a JSON key for values in this unit."""
         return suffix(self.name)
 
-    def text(self, value: float) -> str:
+    @property
+    def own_si(self) -> bool:
+        """Whether the numbers are SI values themselves: m, m/s or rad/s."""
+        radian = 2.0 * math.pi if self.name == "Hz" else 1.0
+        return math.isclose(radian * self.scale, 1.0, rel_tol=1e-12)
+
+    def text(self, value: float, digits: int = DIGITS) -> str:
         """A dimensionless value in this unit, such as "54.11 Hz"."""
-        return value_text(value * self.scale, self.name)
+        return value_text(value * self.scale, self.name, digits)
 
     def axis(self, largest: float) -> tuple[float, str]:
         """For an axis of dimensionless values up to ``largest``: how many shown units are one
@@ -53,6 +62,25 @@ def prefixed(value: float, unit: str) -> tuple[float, str]:
             return factor, name
     _, factor, name = PREFIXED[unit][-1]
     return factor, name
+
+
+def is_angular(omega: float, hertz: float | None) -> bool:
+    """Whether ω is in rad/s, by the same frequency in hertz; None where there is none."""
+    return hertz is not None and math.isclose(omega, 2.0 * math.pi * hertz, rel_tol=1e-9)
+
+
+def drive_text(omega: float, hertz: float | None, digits: int = DIGITS) -> str:
+    """A drive frequency for people: "36 Hz" where ω is in rad/s, else "ω = 0.85"."""
+    if hertz is not None and is_angular(omega, hertz):
+        return value_text(hertz, "Hz", digits)
+    return f"ω = {omega:.{digits}g}"
+
+
+def quantity_text(value: float, unit: str, digits: int = DIGITS) -> str:
+    """A value in any SI unit for a table or a picture: "0.4 mm", "36 Hz", "30 kN/m", "120 g"."""
+    if unit in PREFIXED:
+        return value_text(value, unit, digits)
+    return spaced_quantity(value, unit, digits).replace("\u00a0", " ")
 
 
 def value_text(value: float, unit: str, digits: int = DIGITS) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from functools import lru_cache
@@ -27,6 +27,10 @@ _OHMS = ("Ω", "\N{OHM SIGN}", "ohms", "ohm", "Ohms", "Ohm", "R")
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _PREFIXED = re.compile(rf"({_NUMBER})\s*([fpnumkKMGT]?)", re.ASCII)
 _INFIX = re.compile(r"([+-]?\d+)([fpnumkKMGTR])(\d+)", re.ASCII)
+ACCELERATIONS = {"g": 9.80665, "m/s²": 1.0}
+"""Units of an acceleration, in m/s²."""
+_POWERS = ("²", "^2", "2", "**2")
+"""How the square of a unit may be written."""
 _LONGEST = 64  # characters; a quantity is never longer
 
 
@@ -86,10 +90,39 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
 
 
+def restated(value: float, unit: str, like: str) -> str:
+    """``value`` in the unit and prefix of another text of this unit, in no more digits than it
+    takes to read it back: 5.5e-4, "m" is "0.55 mm" like "0.4 mm", "550µm" like "400µm"."""
+    written = re.fullmatch(rf"{_NUMBER}(\s*)(.*)", like.strip(), re.ASCII | re.DOTALL)
+    space, ending = (written[1], written[2]) if written else ("", "")
+    try:
+        factor = parse_quantity(f"1{space}{ending}", unit)
+    except ValueError:  # such as 4k7
+        space, ending, factor = " ", unit, 1.0
+    return shortest(lambda text: parse_quantity(text, unit), value, value / factor, space + ending)
+
+
+def shortest(read: Callable[[str], float], value: float, number: float, ending: str) -> str:
+    """``number`` and ``ending`` in the fewest digits that ``read`` makes ``value`` of; in all of
+    them where none gives it to the last digit."""
+    for digits in range(1, 18):
+        figure = f"{number:.{digits}g}"
+        if 1e-5 < abs(number) < 1e15:
+            figure = f"{Decimal(figure):f}"
+        if read(figure + ending) == value:
+            return figure + ending
+    return f"{number!r}{ending}"
+
+
 def spaced_quantity(value: float, unit: str, digits: int = 4) -> str:
-    """``format_quantity`` as pages and pictures write it, "22.1 kΩ": the space does not break."""
-    if unit == "kg":  # it has a prefix already
-        return f"{value:.{digits}g}\u00a0kg"
+    """``format_quantity`` as pages and pictures write it, "22.1 kΩ": the space does not break.
+    Lengths are in mm down to 0.01 mm, masses below 1 kg in g."""
+    if unit == "m" and 1e-5 <= abs(value) < 1.0:  # mechanical lengths
+        return f"{1e3 * value:.{digits}g}\u00a0mm"
+    if unit == "kg" and 0.0 < abs(value) < 1.0:
+        value, unit = 1e3 * value, "g"
+    elif unit in ("kg", "g"):  # it has a prefix already; accelerations in g are written without one
+        return f"{value:.{digits}g}\u00a0{unit}"
     text = format_quantity(value, unit, digits).removesuffix(unit)
     figure = text.rstrip("fpnµmkMGT")
     return f"{figure}\u00a0{text[len(figure) :]}{unit}"
@@ -161,11 +194,23 @@ def _split_mass(text: str) -> tuple[Decimal, int]:
 
 
 def _without_unit(text: str, unit: str) -> str:
-    spellings = _OHMS if unit == _OHM else (unit, unit.replace(" ", "·"), unit.replace(" ", ""))
-    for spelling in spellings:
+    for spelling in _spellings(unit):
         if spelling and text.endswith(spelling):
             return text.removesuffix(spelling).rstrip()
     return text
+
+
+def _spellings(unit: str) -> Sequence[str]:
+    if unit.endswith("²"):
+        return [unit.removesuffix("²") + power for power in _POWERS]
+    return _OHMS if unit == _OHM else (unit, unit.replace(" ", "·"), unit.replace(" ", ""))
+
+
+def has_unit(text: str, unit: str) -> bool:
+    """Whether a text is a number with this unit, which may have a prefix."""
+    spellings = "|".join(map(re.escape, _spellings(unit)))
+    written = text.strip().translate(_MICRO)
+    return re.fullmatch(rf"{_NUMBER}\s*[fpnumkMGT]?({spellings})", written, re.ASCII) is not None
 
 
 def _without_denominator(text: str, unit: str) -> tuple[str, int]:

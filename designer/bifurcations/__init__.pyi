@@ -69,12 +69,17 @@ from .subject import (
     Subject as Subject,
 )
 from .sweep import (
+    BLOCK as BLOCK,
     DOWN as DOWN,
     UP as UP,
     Sweep as Sweep,
     SweepPlan as SweepPlan,
     Window as Window,
     next_start as next_start,
+)
+from .window_ends import (
+    SweptEnd as SweptEnd,
+    WindowEnds as WindowEnds,
 )
 from .windows import (
     NOT_LOCATED as NOT_LOCATED,

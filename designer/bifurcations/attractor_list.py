@@ -66,10 +66,6 @@ class AttractorList:
                 return number
         return None
 
-    def unsettled(self, status: OrbitStatus) -> int | None:
-        """Number of what is of this status, which is not periodic, if it was met."""
-        return next((k for k, a in enumerate(self.met) if a.motion.status is status), None)
-
     def twin(self, number: int) -> int | None:
         """Number of an attractor's mirror twin among those that were met."""
         one, mirror = self.met[number], self.flow.system.mirror

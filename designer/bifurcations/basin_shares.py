@@ -25,10 +25,11 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.parameter_map import COURSE
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import describe, shoot
+from designer.dynamics.coexisting_attractors import outlived
 from designer.dynamics.counts import Pairs
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
-from designer.dynamics.orbit import Motion, OrbitStatus
+from designer.dynamics.orbit import MOST_COUNTED, Motion, Orbit, OrbitStatus
 from designer.dynamics.steady_state import UPPER, Course, DrivenSystem, stopped
 from designer.kernels.kernel_orbit import CHAOS
 from designer.kernels.kernel_sweep import ALIGN, SPAN
@@ -182,6 +183,10 @@ def run(
     """Count the starts, or what of them ``store`` has not; ``progress`` is called once a value."""
     blocks = plan.blocks()
     known = [None if store is None else store.read(k) for k in range(len(blocks))]
+    known = [
+        steps if steps is not None and _may_be(steps, plan, block) else None
+        for block, steps in zip(blocks, known, strict=True)
+    ]
     open_ = [v for block, steps in zip(blocks, known, strict=True) if steps is None for v in block]
     settings = plan.subject.settings([{plan.parameter: float(v)} for v in open_])
 
@@ -207,6 +212,24 @@ def run(
     return BasinShares(plan, tuple(every))
 
 
+def _may_be(steps: Sequence[Step], plan: SharePlan, block: Array) -> bool:
+    """Whether stored steps are of as many values, and each counts all starts of this system."""
+    states, starts = len(plan.subject.states), len(plan.numbers)
+    return len(steps) == len(block) and all(
+        sum(share.count for share in step) == starts
+        and all(
+            share.countable
+            and 0 <= share.attractor < MOST_COUNTED
+            and (share.twin is None or 0 <= share.twin < MOST_COUNTED)
+            and share.count >= 0
+            and share.strobes
+            and all(len(strobe) == states for strobe in share.strobes)
+            for share in step
+        )
+        for step in steps
+    )
+
+
 # ---------------------------------------------------------------------------------------------
 
 
@@ -216,15 +239,31 @@ def _arrivals(plan: SharePlan, setting: DrivenSystem) -> tuple[AttractorList, li
     # One flow for all starts; which stops are shown is of no matter, and the upper one is fast.
     setting = replace(setting, flow=lambda: flow, stops=UPPER)
     met = AttractorList(flow, plan.subject.weights)
-    ends = [
-        _end(plan, setting, met, x, phase)
-        for x, phase in zip(plan.starts, plan.phases.tolist(), strict=True)
-    ]
+    ends: list[int] = []
+    chaotic: list[Orbit] = []
+    for x, phase in zip(plan.starts, plan.phases.tolist(), strict=True):
+        end = _end(plan, setting, met, x, phase, chaos=bool(chaotic))
+        if isinstance(end, Orbit):
+            chaotic.append(end)
+        else:
+            ends.append(end)
+    for before, orbit in zip(chaotic, outlived(flow, chaotic), strict=True):
+        motion, x = _named(orbit), orbit.start if len(orbit.start) else before.start
+        ends.append(met.number(motion, motion.symmetric, x))
     return met, np.bincount(ends, minlength=len(met.met)).tolist()
 
 
-def _end(plan: SharePlan, setting: DrivenSystem, met: AttractorList, x: Array, phase: float) -> int:
-    """Number of the attractor that a start ends on."""
+def _end(
+    plan: SharePlan,
+    setting: DrivenSystem,
+    met: AttractorList,
+    x: Array,
+    phase: float,
+    *,
+    chaos: bool,
+) -> int | Orbit:
+    """Number of the attractor that a start ends on, or a chaotic motion, which may be a transient.
+    chaos : whether one was met before, so that growth is enough to call another one so."""
     flow = met.flow
     run = flow.to_strobe(x, phase)
     for look in LOOKS:
@@ -235,11 +274,18 @@ def _end(plan: SharePlan, setting: DrivenSystem, met: AttractorList, x: Array, p
         number = met.at(run.strobes[-1])
         if number is not None:
             return number
-        chaos = met.unsettled(OrbitStatus.APERIODIC)
-        if chaos is not None and look == LOOKS[0] and _grows(flow, run.strobes[-1]):
-            return chaos
+        if chaos and look == LOOKS[0] and _grows(flow, run.strobes[-1]):
+            return Orbit(OrbitStatus.APERIODIC, start=run.strobes[-1], mode=run.mode)
     steady = setting.steady(run.strobes[-1], plan.course)
+    if steady.status is OrbitStatus.APERIODIC:
+        return Orbit(OrbitStatus.APERIODIC, start=steady.end)
     return met.number(steady, steady.symmetric, steady.start)
+
+
+def _named(orbit: Orbit) -> Orbit:
+    """As a sweep names it: a count near a tangency is given as it was run."""
+    grazing = orbit.status is OrbitStatus.GRAZING
+    return replace(orbit, status=OrbitStatus.PERIODIC) if grazing else orbit
 
 
 def _grows(flow: Flow, x: Array) -> bool:
@@ -349,9 +395,7 @@ def _continuation(met: AttractorList, before: MetAttractor, way: _Way) -> int | 
     if k is not None:
         alike = met.met[k].motion.n == n and met.met[k].symmetric is before.symmetric
         return k if alike else None
-    orbit = describe(met.flow, x, n, monodromy)
-    if orbit.status is OrbitStatus.GRAZING:
-        orbit = replace(orbit, status=OrbitStatus.PERIODIC)
+    orbit = _named(describe(met.flow, x, n, monodromy))
     if orbit.status is not OrbitStatus.PERIODIC or orbit.symmetric is not before.symmetric:
         return None
     laps = met.flow.run(x, n).strobes

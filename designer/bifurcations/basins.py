@@ -11,7 +11,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.bifurcations.attractor_list import AttractorList
-from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of
+from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of, may_be
 from designer.bifurcations.subject import Subject
 from designer.dynamics.steady_state import Course, DrivenSystem
 
@@ -97,7 +97,7 @@ def run(
 
     def row(i: int) -> list[MapCell]:
         cells = None if store is None else store.read(i)
-        if cells is None:
+        if cells is None or not all(may_be(cell, plan.subject) for cell in cells):
             cells = [
                 cell_of(i, j, setting.steady(plan.state(i, j), plan.course))
                 for j in range(len(plan.xs))

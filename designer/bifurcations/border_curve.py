@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.record_check import checked_record
 from designer.bifurcations.curve_switch import OtherCurve, other_curve, read_other_curve
 from designer.bifurcations.plane_curves import PlaneCurve
+from designer.bifurcations.points import PointKind
 from designer.dynamics.counts import read_counts
 
 FOLLOWED, NO_OTHER, NOT_BUILT = "followed", "no other curve", "not built"
@@ -122,21 +124,41 @@ class BorderCurve:
 
 
 def read_curve(row: Mapping[str, Any]) -> BorderCurve:
-    """A curve from its plain data (``BorderCurve.as_dict``)."""
+    """A curve from its plain data (``BorderCurve.as_dict``).
+
+    Raises
+    ------
+    ValueError, TypeError, LookupError : it is no curve's.
+    """
     at = row["begun_at"]
-    return BorderCurve(
-        row["kind"],
-        row["response"],
-        row["symmetric"],
-        np.array(row["points"], dtype=float),
-        tuple(row["stable"]),
-        (row["ends"][0], row["ends"][1]),
-        tuple(_read_meeting(met, symmetric=row["symmetric"]) for met in row["codimension_two"]),
-        None if at is None else CurveOrigin(at["curve"], at["kind"], (*at["values"],)),
-    )
+    symmetric = row["symmetric"]
+    values = {
+        "kind": str(PointKind(row["kind"])),
+        "response": row["response"],
+        "symmetric": symmetric,
+        "points": np.array([(float(a), float(b)) for a, b in row["points"]]).reshape(-1, 2),
+        "stable": tuple(row["stable"]),
+        "ends": tuple(row["ends"]),
+        "codimension_two": tuple(
+            _read_meeting(met, symmetric=symmetric) for met in row["codimension_two"]
+        ),
+        "begun_at": None if at is None else _read_origin(at),
+    }
+    curve = checked_record(BorderCurve, values)
+    if not 0 < len(curve.points) == len(curve.stable):
+        raise ValueError("a curve of no points, or of more points than it has stabilities")
+    return curve
+
+
+def _read_origin(row: Mapping[str, Any]) -> CurveOrigin:
+    a, b = row["values"]
+    values = {"curve": row["curve"], "name": row["kind"], "values": (a, b)}
+    return checked_record(CurveOrigin, values)
 
 
 def _read_meeting(row: Mapping[str, Any], *, symmetric: bool) -> CurveMeeting:
     a, b = row["values"]
     other = row["other"]
-    return CurveMeeting(row["kind"], (a, b), read_other_curve(other, (a, b), symmetric=symmetric))
+    values = {"name": row["kind"], "values": (a, b)}
+    values["other"] = read_other_curve(other, (a, b), symmetric=symmetric)
+    return checked_record(CurveMeeting, values)

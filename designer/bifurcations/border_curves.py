@@ -31,7 +31,7 @@ from designer.bifurcations.plane_curves import CLOSED, PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.windows import WindowEnd, window
-from designer.dynamics.orbit import Orbit
+from designer.dynamics.orbit import MOST_COUNTED, Orbit
 
 BLOCKS = 8
 """Blocks that the curves through the sweep's points are kept in: point number k belongs to block k
@@ -95,18 +95,19 @@ def run(
         return [BorderCurve.of(curve) for curve in curves if curve is not None]
 
     found = _Found(plan.window.widths)
-    found.add(_level(0, through_points, jobs, store, progress))
+    found.add(_level(plan, 0, through_points, jobs, store, progress))
     for depth in range(1, plan.depth + 1):
         starts = found.starts()
 
         def from_meetings(number: int, starts: list[_Start] = starts) -> list[BorderCurve]:
             return list(_switched_to(plan, starts, number))
 
-        found.add(_level(depth, from_meetings, jobs, store, progress))
+        found.add(_level(plan, depth, from_meetings, jobs, store, progress))
     return found.with_status()
 
 
 def _level(
+    plan: CurvePlan,
     depth: int,
     follow: Callable[[int], list[BorderCurve]],
     jobs: int,
@@ -118,7 +119,7 @@ def _level(
     def block(number: int) -> list[BorderCurve]:
         place = depth * BLOCKS + number
         curves = None if store is None else store.read(place)
-        if curves is None:
+        if curves is None or not all(_may_be(curve, plan.subject) for curve in curves):
             curves = follow(number)
             if store is not None:
                 store.write(place, curves)
@@ -126,6 +127,22 @@ def _level(
         return curves
 
     return [c for curves in parallel(block, range(BLOCKS), jobs) for c in curves]
+
+
+def _may_be(curve: BorderCurve, subject: Subject) -> bool:
+    """Whether a stored curve is of this system."""
+    clearances = {stop.clearance for stop in subject.stops}
+    others = [met.other for met in curve.codimension_two if met.other is not None]
+    return bool(np.isfinite(curve.points).all()) and all(
+        1 <= other.n <= MOST_COUNTED
+        and len(other.state) == len(subject.states)
+        and bool(np.isfinite([*other.state, *other.values, other.phase, other.size]).all())
+        and (
+            other.touch is None
+            or (other.touch.clearance in clearances and other.touch.side in (1, -1))
+        )
+        for other in others
+    )
 
 
 @dataclass(frozen=True)

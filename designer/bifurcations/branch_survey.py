@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.bifurcations.branch_switch import birth, close, switch
-from designer.bifurcations.continuation import Branch, End, start, trace
+from designer.bifurcations.continuation import Branch, BranchPoint, End, start, trace
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.loop_check import images, place
 from designer.bifurcations.orbit_curve import Curve
@@ -46,13 +46,15 @@ def survey(
     high: float,
     *,
     depth: int = DEPTH,
+    until: Callable[[BranchPoint], bool] = lambda _: False,
     progress: Callable[[], None] = lambda: None,
 ) -> Survey:
     """Follow orbits both ways, and the branches that leave them where stability changes.
 
     orbits : values of the parameter with a periodic orbit found there, stable or not; those that
     lie on a branch already followed add none. low, high : ends of the interval. depth : branch
-    switches in a row. progress : called once a branch.
+    switches in a row. until : where the branches of the orbits themselves are let go
+    (``continuation.follow``). progress : called once a branch.
     """
     branches: list[Branch] = []
     parents: list[int] = []
@@ -84,7 +86,7 @@ def survey(
             origin = start(family, orbit, value)
         except ArithmeticError:
             continue
-        queue = [(add(trace(origin, low, high), -1), 0)]
+        queue = [(add(trace(origin, low, high, until=until), -1), 0)]
         while queue:
             number, deep = queue.pop(0)
             if deep == depth:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array, Index
+from designer.base.record_check import checked_record
 from designer.bifurcations.codimension_two import CodimensionTwo
 from designer.bifurcations.conditions import Condition, Grazing, Multiplier, MultiplierPair
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
@@ -85,15 +86,27 @@ class OtherCurve:
 def read_other_curve(
     row: Mapping[str, Any] | None, values: tuple[float, float], *, symmetric: bool
 ) -> OtherCurve | None:
-    """The other curve from its plain data (``OtherCurve.as_dict``), or None of None."""
+    """The other curve from its plain data (``OtherCurve.as_dict``), or None of None.
+
+    Raises
+    ------
+    ValueError, TypeError, LookupError : it is no curve's.
+    """
     if row is None:
         return None
-    t = row["touch"]
-    touch = () if t is None else (StopTouch(t["clearance"], t["side"], t["tip"]),)
-    more = () if t is None else (t["phase"], t["size"])
-    state = tuple(row["state"])
-    kind = PointKind(row["kind"])
-    return OtherCurve(kind, row["n"], symmetric, values, state, row["stable"], *touch, *more)
+    fields = {
+        "kind": PointKind(row["kind"]),
+        "n": row["n"],
+        "symmetric": symmetric,
+        "values": values,
+        "state": tuple(row["state"]),
+        "stable": row["stable"],
+    }
+    if (t := row["touch"]) is not None:
+        touch = {key: t[key] for key in ("clearance", "side", "tip")}
+        fields["touch"] = checked_record(StopTouch, touch)
+        fields |= {"phase": t["phase"], "size": t["size"]}
+    return checked_record(OtherCurve, fields)
 
 
 def other_curve(system: ExtendedSystem, c: CodimensionTwo) -> OtherCurve | None:

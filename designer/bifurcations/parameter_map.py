@@ -117,7 +117,7 @@ def run(
 
     def row(i: int) -> list[MapCell]:
         cells = None if store is None else store.read(i)
-        if cells is None:
+        if cells is None or not all(may_be(cell, plan.subject) for cell in cells):
             cells = list(cells_at(plan, [(i, j) for j in range(len(plan.xs))]))
             if store is not None:
                 store.write(i, cells)
@@ -126,6 +126,11 @@ def run(
 
     rows = parallel(row, range(len(plan.ys)), jobs)
     return ParameterMap(plan, tuple(cell for cells in rows for cell in cells))
+
+
+def may_be(cell: MapCell, subject: Subject) -> bool:
+    """Whether a stored cell is of this system."""
+    return cell.countable and len(cell.strobe) == len(subject.states)
 
 
 def cells_at(

@@ -185,7 +185,7 @@ def run(
         for track, number in task:
             block = plan.blocks(track)[number]
             steps = None if store is None else store.read(track, number)
-            if steps is None:
+            if steps is None or not _may_be(steps, plan, block):
                 if plan.followed:
                     steps = _followed(plan, block, x)
                 else:
@@ -204,6 +204,19 @@ def run(
     return Sweep(
         plan,
         {t: tuple(s[::-1] if t == DOWN else s) for t, s in by_track.items()},
+    )
+
+
+def _may_be(steps: Sequence[Steady], plan: SweepPlan, block: Array) -> bool:
+    """Whether stored steps are of these values and this system."""
+    states, periods, stops = len(plan.subject.states), plan.course.keep, len(plan.subject.stops)
+    return len(steps) == len(block) and all(
+        step.countable
+        and len(step.start) == len(step.end) == states
+        and len(step.minima) <= periods
+        and len(step.further) in (0, stops - 1)
+        and (not len(step.minima) or bool(np.isfinite(step.end).all()))
+        for step in steps
     )
 
 

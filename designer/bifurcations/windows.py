@@ -52,6 +52,8 @@ class BranchWindow:
     """Upper end of the window."""
     branch: int
     """The number of the branch."""
+    span: tuple[int, int] = (0, -1)
+    """The numbers of its first and of its last point on the branch."""
 
     @property
     def width(self) -> float:
@@ -93,7 +95,8 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
             b = _end(branch, after, 1) if j == last else _unlocated(branch, j + 1, j)
             low, high = (a, b) if a.value <= b.value else (b, a)
             response, symmetric = branch.points[j].response, branch.curve.symmetric
-            out.append(BranchWindow(branch.parameter, response, symmetric, low, high, number))
+            between = (low, high, number, (i, j))
+            out.append(BranchWindow(branch.parameter, response, symmetric, *between))
     return out
 
 

@@ -13,7 +13,7 @@ from typing import Annotated
 
 from designer.base.csv_tables import csv_text
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import parse_toml, read_text
+from designer.base.guarded_reading import read_text
 from designer.base.schema import (
     FIRST_FORMAT,
     FileTable,
@@ -24,6 +24,7 @@ from designer.base.schema import (
     one_of,
     such,
 )
+from designer.base.toml_reader import parse_toml
 from designer.board.bom import COLUMNS, Line
 from designer.catalog.read import LAYOUTS
 from designer.catalog.stock_list import order_number

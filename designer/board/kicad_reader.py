@@ -21,8 +21,8 @@ from designer.board.outline import Outline, circle, pen_path, read_outline
 
 OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
-LARGEST = 50_000_000
-"""Bytes of a board file."""
+LARGEST = 30_000_000
+"""Bytes of a board file; one of 60 parts, routed and with its pours, has 830,000."""
 SHOWN = 5
 """Differences that a message lists."""
 COURTYARDS = ("F.CrtYd", "B.CrtYd")

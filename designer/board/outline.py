@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from designer.base.sexpr import Expression
 LAYER = "Edge.Cuts"
 CHORDS = 72
 """Of a whole circle: at a radius of 10 mm a chord is at most 0.01 mm inside it."""
+MOST_SIDES = 40_000
+"""Straight pieces of an edge: 550 circles cut out, or 10,000 slots with corners."""
 JOINED = 0.01
 """Ends that are nearer than this [mm] are one point."""
 Point = tuple[float, float]
@@ -66,18 +68,32 @@ class Outline:
 
         corners : shape (k, 2), in order.
         """
-        inside = self.inside(corners)
+        # No side is farther from a corner than the one that is nearest to the middle: only those
+        # that may be nearer are looked at.
+        middle = corners.mean(axis=0)
+        reach = float(np.linalg.norm(corners - middle, axis=1).max())
+        away = _to_sides(middle[None], self.sides)[0]
+        sides = self.sides[away <= away.min() + 2.0 * reach]
+        if away.min() > reach:  # the edge does not pass the shape: one point tells for all
+            inside = np.repeat(self.inside(middle[None]), len(corners))
+        else:
+            inside = self.inside(corners)
         if not inside.all():
-            return -float(_to_sides(corners[~inside], self.sides).min(axis=1).max())
+            return -float(_to_sides(corners[~inside], sides).min(axis=1).max())
         around = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        if _cross(around, self.sides) or _any_within(self.sides.reshape(-1, 2), around):
+        if _cross(around, sides) or _any_within(sides.reshape(-1, 2), around):
             return 0.0
-        gaps = _to_sides(corners, self.sides), _to_sides(self.sides.reshape(-1, 2), around)
+        gaps = _to_sides(corners, sides), _to_sides(sides.reshape(-1, 2), around)
         return float(min(gap.min() for gap in gaps))
 
 
 def read_outline(board: Expression) -> Outline:
-    """The edge of a board file; without any side where it has none."""
+    """The edge of a board file; without any side where it has none.
+
+    Raises
+    ------
+    InputError : it has more than ``MOST_SIDES``, or an item is not as KiCad 9 writes it.
+    """
     sides: list[tuple[Point, Point]] = []
     ends: list[Point] = []
     for each in board.children:
@@ -87,6 +103,8 @@ def read_outline(board: Expression) -> Outline:
         if not _closed(each):
             ends += points[:1] + points[-1:]
         sides += pairwise(points)
+        if len(sides) > MOST_SIDES:
+            raise each.error(f"an edge of more than {MOST_SIDES} pieces", "a simpler one")
     return Outline(np.array(sides, dtype=float).reshape(-1, 2, 2), tuple(ends))
 
 
@@ -117,7 +135,9 @@ def _closed(item: Expression) -> list[Point]:
         centre = _point(item.get("center"))
         points = circle(centre, math.dist(centre, _point(item.get("end"))))
     elif item.name == "gr_poly":
-        points = list(_corners(item.get("pts")))
+        points = list(islice(_corners(item.get("pts")), MOST_SIDES + 1))
+        if len(points) > MOST_SIDES:
+            raise item.error(f"more than {MOST_SIDES} points", "a simpler polygon")
     return points + points[:1]
 
 

@@ -23,7 +23,7 @@ import platformdirs
 
 from designer.base.errors import MISSING, InputError, InputErrors
 from designer.base.eseries import series_values
-from designer.base.guarded_reading import csv_rows, decode, parse_toml, read_bytes, reading
+from designer.base.guarded_reading import csv_rows, decode, read_bytes, reading
 from designer.base.schema import (
     FIRST_FORMAT,
     Accepts,
@@ -34,6 +34,7 @@ from designer.base.schema import (
     validated,
     whole_number,
 )
+from designer.base.toml_reader import parse_toml
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.build_cost import BuildCost
 from designer.catalog.coaxial_jack import CoaxialJack

@@ -1,5 +1,6 @@
 from . import (
     cure_table as cure_table,
+    stage_choice as stage_choice,
 )
 from .answer_cache import (
     AnswerCache as AnswerCache,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,15 +41,19 @@ class AnswerCache:
             self._read(path)
 
     def get_all(
-        self, queries: list[Any], make: Callable[[list[int]], list[tuple[int, ...]]]
+        self,
+        queries: list[Any],
+        make: Callable[[list[int]], list[tuple[int, ...]]],
+        most: Sequence[int],
     ) -> list[tuple[int, ...]]:
         """The answer to each query, in their order.
 
         queries : plain data that decides an answer. make : computes the answers to the queries with
-        these numbers, which no earlier call or run has answered.
+        these numbers, which no earlier call or run has answered. most : greatest value of each
+        number of an answer; a stored one that is none, or has others, is computed again.
         """
         keys = [_key(self._whose, one) for one in queries]
-        new = [k for k, key in enumerate(keys) if key not in self._known]
+        new = [k for k, key in enumerate(keys) if not _may_be(self._known.get(key), most)]
         self.wanted += len(keys)
         if new:
             answers = dict(zip((keys[k] for k in new), make(new), strict=True))
@@ -98,6 +102,13 @@ class AnswerCache:
             ) from None
 
 
+def _may_be(answer: tuple[int, ...] | None, most: Sequence[int]) -> bool:
+    """Whether there is an answer, of as many boards as there are at most."""
+    if answer is None or len(answer) != len(most):
+        return False
+    return all(0 <= value <= limit for value, limit in zip(answer, most, strict=True))
+
+
 def _values(line: bytes) -> list[Any] | None:
     """The values of a line; None where it is damaged."""
     try:
@@ -110,7 +121,9 @@ def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
     """Key and answer of a line; None where it is damaged."""
     try:
         key, ok = read_line(line)
-        return str(key), tuple(int(v) for v in ok)
+        if not all(type(v) is int for v in ok):
+            raise TypeError("a number of boards that is none")
+        return str(key), tuple(ok)
     except (*UNREADABLE, InputError):
         return None
 

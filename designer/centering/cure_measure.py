@@ -68,7 +68,10 @@ class Book:
         studies: Mapping[str, Mapping[str, str]] | None = None,
         save: Callable[[dict[str, Any]], None] = lambda _: None,
     ) -> None:
-        self._known = {study: dict(blocks) for study, blocks in (studies or {}).items()}
+        self._known = {
+            study: {place: letters for place, letters in blocks.items() if _are_verdicts(letters)}
+            for study, blocks in (studies or {}).items()
+        }
         self._save = save
 
     def block(
@@ -100,6 +103,10 @@ class Book:
         self._known.setdefault(study, {})[place] = letters
         self._save({"format": 1, "studies": self._known})
         return letters, True
+
+
+def _are_verdicts(letters: object) -> bool:
+    return isinstance(letters, str) and set(letters) <= set(_LETTERS.values())
 
 
 @dataclass(frozen=True)

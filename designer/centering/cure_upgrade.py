@@ -9,13 +9,13 @@ is ``[board] dc_trim``.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
@@ -31,6 +31,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.response_table import placed
 from designer.synthesis import output_loads, side_conditions
 
 
@@ -114,7 +115,7 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     """
     if upgrades == Upgrades():
         return modelfile
-    data = tomllib.loads(modelfile.text)
+    data = parse_toml(modelfile.text, None)
     circuit = data.setdefault("circuit", {})
     if upgrades.opamp is not None:
         circuit["opamp"] = upgrades.opamp
@@ -124,9 +125,9 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     if upgrades.reference is not None:
         circuit["reference"] = upgrades.reference
     for number, place in upgrades.places.items():
-        response = data["response"][number]
-        response.pop("Omega", None)
-        response |= {"omega": place.omega, "b": place.b}
+        table, moves = data["response"][number], place.omega != modelfile.responses[number].omega
+        omega = place.omega if moves else None
+        data["response"][number] = placed(table, omega, place.b, modelfile.si)
     if upgrades.trim is not None:
         data["tuning"] = {"frequency": 0.0, "amplitude": 0.0, "offset": upgrades.trim}
     if upgrades.trimmer:

@@ -14,13 +14,13 @@ Nothing of the chain (model, match, circuit, predictions) imports a module of th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from scipy.stats import norm
 
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import Progress
+from designer.base.progress import Progress, doing, part, seeking
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.centering.answer_cache import AnswerCache
@@ -99,17 +99,27 @@ def search(
             listen,
             progress,
         )
-        return hunt.run()
+        with seeking("design"):
+            return hunt.run()
 
 
 def look(
     modelfile: ModelFile, catalog: Catalog, jobs: int, progress: Progress
 ) -> tuple[tuple[Stretch, ...], ...]:
-    """Everything that may be refused, refused; and where the model shows each response."""
+    """Everything that may be refused, refused; and where the model shows each response.
+
+    Raises
+    ------
+    InputError : as ``search``. ResponseNotFound : no start finds a response at its place.
+    """
     need_responses(modelfile)
     catalog = modelfile.choices(catalog)
     with naming(modelfile):
         _check_topologies(modelfile, catalog.mounted(modelfile.board.mounting))
+        wanted = {n: r for n, r in enumerate(modelfile.responses, start=1) if not open_in(r)}
+        found = find_responses.find(modelfile.model, list(wanted.values()))
+        there = dict(zip(wanted, found, strict=True))
+        find_responses.need_found(there, modelfile.si, modelfile.source)
         step = progress.stage("windows of the responses on the model")
         return stretches(
             modelfile.model, modelfile.responses, modelfile.search, jobs=jobs, progress=step
@@ -154,12 +164,24 @@ class _Hunt:
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
+        self._step: Callable[[], None] = lambda: None
+
+    @property
+    def _most_designs(self) -> int:
+        """How many designs are made, at most, before real op-amps are asked."""
+        choice = DesignChoice.of(self.modelfile.circuit)
+        every = topologies(self.modelfile, self.catalog)
+        number = len(every) + (choice not in every)
+        if any(open_in(spec) for spec in self.modelfile.responses):
+            number += len(every)
+        return number + sum(len(list(variants(choice, lever))) for lever in LEVERS[2:])
 
     def run(self) -> SearchResult:
         middle = tuple(
             self._there(spec, [s.at((0.5,))[0] for s in window])
             for spec, window in zip(self.modelfile.responses, self.windows, strict=True)
         )
+        self._step = self.progress.stage("designs", self._most_designs)
         start, best = self._topology(middle)
         if any(open_in(spec) for spec in self.modelfile.responses):
             best = self._placed(best)
@@ -220,11 +242,10 @@ class _Hunt:
             if not open_in(spec):
                 responses.append(best.model_responses[number])
                 continue
-            step = self.progress.stage(f"place of response {number + 1}, {spec.expect}")
-            room = room_of(
-                spec, self.modelfile.model.b, self.modelfile.search.band(self.modelfile.model)
-            )
-            ranked, trials = best_points(bench, spec, self.windows[number], room, progress=step)
+            band = self.modelfile.search.band(self.modelfile.model)
+            room = room_of(spec, self.modelfile.model.b, band)
+            with part(f"place of response {number + 1}, {spec.expect}"):
+                ranked, trials = best_points(bench, spec, self.windows[number], room)
             self.places += trials
             if not ranked:
                 raise self._nowhere(number, spec)
@@ -274,6 +295,7 @@ class _Hunt:
         low, _ = self.modelfile.circuit.frequency
         for choice in slower(best.choice, self._frequency(best), low):
             setting = _setting_text(choice.frequency)
+            self._step = self.progress.stage("slower designs")
             candidate = self._candidate(choice, best.model_responses, f"time scale {setting}")
             if candidate is None:
                 self._note("time scale", setting, None, False)
@@ -309,8 +331,13 @@ class _Hunt:
         self, choice: DesignChoice, responses: tuple[ModelResponse, ...], title: str
     ) -> Candidate | None:
         """A design made so; None where there is none, and then ``short`` says why."""
-        step = self.progress.stage(f"candidate {self.candidates + 1}: {title}")
         self.candidates += 1
+        with part(f"design {self.candidates}, {title}"):
+            made = self._made(choice, responses)
+        self._step()
+        return made
+
+    def _made(self, choice: DesignChoice, responses: tuple[ModelResponse, ...]) -> Candidate | None:
         model, spec = self.modelfile.model, choice.spec(self.modelfile.circuit)
         try:
             model_peaks = find_responses.peaks(model, responses)
@@ -330,10 +357,9 @@ class _Hunt:
             self.short = error
             return None
         bench = self._bench(choice, responses, design, BOARDS)
+        doing("boards")
         scored = tuple(
-            score(
-                bench, r.spec, [OperatingPoint(r.omega, r.b, r.orbit.start)], BOARDS, progress=step
-            )[0]
+            score(bench, r.spec, [OperatingPoint(r.omega, r.b, r.orbit.start)], BOARDS)[0]
             for r in responses
         )
         self.places += len(scored)
@@ -343,6 +369,9 @@ class _Hunt:
         """One lever at a time: moved from the match design, and moved back from the final one."""
         if start is None:
             return ()
+        moved = [lv for lv in LEVERS if start.choice.get(lv) != final.choice.get(lv)]
+        number = 2 * (len(moved) + (final.wanted != start.wanted))
+        self._step = self.progress.stage("what each lever is worth", number)
         out = []
         if final.wanted != start.wanted:
             out.append(
@@ -423,10 +452,10 @@ class _Hunt:
         self.steps.append(Step(lever, setting, rank, adopted, reason))
         if candidate is not None:
             worst = float(norm.cdf(candidate.rank[0]))
-            self.progress.note(
-                f"  {lever}: {setting}: smallest distance {candidate.rank[0]:.2f} σ "
-                f"(predicted yield {worst:.4f}){', kept' if adopted else ''}"
-            )
+            text = f"smallest distance {candidate.rank[0]:.2f} σ (predicted yield {worst:.4f})"
+            self.progress.note(f"  {lever}: {setting}: {text}{', kept' if adopted else ''}")
+            if adopted:
+                self.progress.best_so_far(f"{text}, with {lever} {setting}")
 
 
 def _most_surviving(asked: Sequence[tuple[Candidate, RungOutcome]]) -> Candidate:

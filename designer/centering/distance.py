@@ -142,7 +142,7 @@ class Stretched:
             return self._made([stands[k] for k in new], boards, stretches, progress)
 
         samples = (len(boards),) * len(stretches)
-        answers = self._memory.get_all(queries, make)
+        answers = self._memory.get_all(queries, make, samples)
         return [StretchCounts(tuple(stretches), samples, ok) for ok in answers]
 
     def _made(

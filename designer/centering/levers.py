@@ -41,13 +41,13 @@ class DesignChoice:
     @classmethod
     def of(cls, spec: CircuitSpec) -> DesignChoice:
         """What the model file says."""
-        return cls(spec.opamp, spec.dead_zone, spec.frequency)
+        return cls(spec.opamp, spec.dead_zone or "saturation", spec.frequency)
 
     def spec(self, base: CircuitSpec) -> CircuitSpec:
         """The table ``[circuit]`` of a design made so; the match decides over its parts."""
         return replace(
             base,
-            objective="match",
+            objective="match" if base.objective == "match" else "margin",
             opamp=self.opamp,
             # A saturation that is stated belongs to the op-amp that it is stated for.
             saturation=base.saturation if self.opamp == base.opamp else None,

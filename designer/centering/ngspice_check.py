@@ -89,7 +89,8 @@ def agreements(
         agreement = Agreement(0, 0)
         if stand is not None:
             query = [*question, bench.query(stand, range(LISTENED), (STRETCH,))]
-            (counts,) = memory.get_all([query], partial(count, bench, stand))
+            made = partial(count, bench, stand)
+            (counts,) = memory.get_all([query], made, (LISTENED, LISTENED, LISTENED))
             agreement = Agreement(*counts)
         out.append(agreement)
         progress()

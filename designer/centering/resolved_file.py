@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
 from designer.centering.levers import DesignChoice
 from designer.check.synthesis_result import Synthesis
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.response_table import placed
 
 
 def resolved(
@@ -30,13 +31,13 @@ def resolved(
 
 
 def _text(modelfile: ModelFile, responses: Sequence[ModelResponse], choice: DesignChoice) -> str:
-    data: dict[str, Any] = tomllib.loads(modelfile.text.lstrip("\ufeff"))
+    data: dict[str, Any] = parse_toml(modelfile.text.lstrip("\ufeff"), None)
     data.setdefault("title", modelfile.title)
-    for table, spec, response in zip(data["response"], modelfile.responses, responses, strict=True):
-        if spec.omega is None:
-            table["omega"] = response.omega
-        if isinstance(spec.b, tuple):
-            table["b"] = response.b
+    wanted = zip(modelfile.responses, responses, strict=True)
+    for index, (spec, response) in enumerate(wanted):
+        omega = response.omega if spec.omega is None else None
+        b = response.b if isinstance(spec.b, tuple) else None
+        data["response"][index] = placed(data["response"][index], omega, b, modelfile.si)
     circuit = data.setdefault("circuit", {})
     circuit |= {"opamp": choice.opamp, "dead_zone": choice.dead_zone}
     if choice.opamp != modelfile.circuit.opamp:

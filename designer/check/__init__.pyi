@@ -29,6 +29,7 @@ from .simulation import (
 from .synthesis_result import (
     Synthesis as Synthesis,
     synthesise as synthesise,
+    with_stage as with_stage,
 )
 from .trust import (
     WORDS as WORDS,

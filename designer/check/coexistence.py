@@ -20,6 +20,7 @@ from designer.base.errors import InputError
 from designer.base.proportion import wilson
 from designer.dynamics import step_budget
 from designer.dynamics.attractors import mirrored_strobes, same, settle
+from designer.dynamics.coexisting_attractors import outlived
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
@@ -45,7 +46,8 @@ class Basin:
     """Starts that end on it or on its twin."""
     twins: int | None
     """How many of these starts end on the twin; None where it is its own, where the model has no
-    mirror, or where none is told apart (aperiodic motions are all one)."""
+    mirror, or where none is told apart (aperiodic motions are all one, as are quasi-periodic
+    ones)."""
 
 
 @dataclass(frozen=True)
@@ -179,20 +181,22 @@ class _Tally:
     def take(self, states: Array) -> tuple[int, int]:
         """Settle these starts while there are steps left; returns how many were run, and how many
         of them lead to no attractor."""
-        left, run, unsettled = float(step_budget.STARTS), 0, 0
+        left, unsettled = float(step_budget.STARTS), 0
+        met: list[Orbit] = []
         for x in states:
             if left <= 0.0:
                 break
             budget = Budget(min(step_budget.SETTLING, left))
-            orbit = settle(self._flow, x, budget=budget)
+            met.append(settle(self._flow, x, budget=budget, watch=0))
             left -= budget.spent
-            run += 1
+        new = all(orbit.status is not OrbitStatus.APERIODIC for orbit in self._orbits)
+        for orbit in outlived(self._flow, met, measure=new):
             if orbit.status not in ANSWERS:
                 unsettled += 1
                 continue
             place = self._place(orbit) or (self._add(orbit), 0)
             self._counts[place[0]][place[1]] += 1
-        return run, unsettled
+        return len(met), unsettled
 
     def basins(self) -> tuple[Basin, ...]:
         """In the order in which they were met."""

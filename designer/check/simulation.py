@@ -27,7 +27,8 @@ from designer.circuit import nominal
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
-from designer.dynamics.attractors import coexisting, settle, starts as sobol_starts
+from designer.dynamics.attractors import settle, starts as sobol_starts
+from designer.dynamics.coexisting_attractors import coexisting, outlived
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -44,7 +45,12 @@ from designer.model.find_responses import (
 )
 from designer.model.mechanics import MechanicalModel, check_omega
 from designer.model.model_file import ModelFile, naming, need_responses
-from designer.model.relative_motion import RelativeMotion, ground_of, relative_motions
+from designer.model.relative_motion import (
+    RelativeMotion,
+    companion_motions,
+    ground_of,
+    relative_motions,
+)
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
 from designer.spice.opamp_model import Rung
@@ -78,6 +84,11 @@ class Simulated:
     """The clearance."""
     motions: tuple[RelativeMotion, ...] = ()
     """What moves in each clearance."""
+    companions: tuple[RelativeMotion, ...] = ()
+    """Where the base moves, the other displacement of each mass with a clearance to ground: the
+    absolute one, or the one from the base."""
+    base: float = 0.0
+    """Amplitude of the base's displacement; 0 where it rests."""
     masses: tuple[str, ...] = ()
     """Names of the masses; () where they have none."""
     clearances: tuple[str, ...] = ()
@@ -226,10 +237,10 @@ def _on_model(
         (r,) = find(modelfile.model, [spec])
     model = modelfile.model.at(r.b)
     flow = model_flow(model, r.omega)
-    first = _attractors((r.orbit, *r.others))
+    orbits = _apart(flow, [_measured(flow, o) for o in (r.orbit, *_attractors(r.others))])
+    first = _attractors(orbits)
     result = coexistence.of_flow(flow, scale_of(model, r.omega), *sampling, first)
-    others = (*_attractors(r.others), *(b.orbit for b in result.basins[len(first) :]))
-    orbits = [_measured(flow, o) for o in (r.orbit, *others)]
+    orbits += [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
     twins = [None if flow.system.mirror is None else _twin(flow, o) for o in orbits]
     units = np.ones(flow.system.size)
     return Simulated(
@@ -246,9 +257,19 @@ def _on_model(
         record=record_of(flow, orbits[0], units, 1.0) if traces else None,
         trust=trust.of_orbit(flow, orbits[0]),
         coexistence=result,
-        absolute=tuple(absolute_extremes(flow, o, ground_of(model)) for o in orbits),
-        **_of_system(model),
+        absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
+        **_of_system(model, r.omega),
     )
+
+
+def _apart(flow: Flow, orbits: Sequence[Orbit]) -> list[Orbit]:
+    """The first, and of the others the answers that are no orbit before them: a motion whose chaos
+    was a transient has become another one."""
+    apart = [orbits[0]]
+    for orbit in _attractors(orbits[1:]):
+        if not any(attractors.same(flow, orbit, known) for known in apart):
+            apart.append(orbit)
+    return apart
 
 
 def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
@@ -256,11 +277,13 @@ def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
     return [o for o in orbits if o.status in ANSWERS]
 
 
-def _of_system(model: MechanicalModel) -> dict[str, Any]:
+def _of_system(model: MechanicalModel, omega: float) -> dict[str, Any]:
     """What ``Simulated`` says of the model itself."""
     system = model.second_order()
     return {
         "motions": relative_motions(system),
+        "companions": companion_motions(system),
+        "base": system.ground(omega),
         "masses": system.names,
         "clearances": tuple(stop.name for stop in system.clearances),
     }
@@ -306,8 +329,9 @@ def _circuit_orbits(
     if scan:
         model = synthesis.modelfile.model.at(r.b)
         return r, flow, coexisting(flow, sobol_starts(scale_of(model, r.omega) * volts, STARTS))
-    orbits = [settle(flow, o.start * volts) for o in (r.orbit, *r.others) if len(o.start)]
-    return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
+    starts = [o.start * volts for o in (r.orbit, *r.others) if len(o.start)]
+    settled = [settle(flow, x, watch=0) for x in starts or [np.zeros(flow.system.size)]]
+    return r, flow, outlived(flow, settled)
 
 
 def _on_circuit(
@@ -321,7 +345,7 @@ def _on_circuit(
     rows = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
     first = _attractors([measured[i] for i in rows])
     model = synthesis.modelfile.model.at(r.b)
-    box, ground = scale_of(model, r.omega), ground_of(model) * volts
+    box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts
     result = coexistence.of_flow(flow, box, *sampling, first, volts)
     more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
     rows += range(len(measured), len(measured) + len(more))
@@ -343,7 +367,7 @@ def _on_circuit(
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
-        **_of_system(model),
+        **_of_system(model, r.omega),
     )
 
 
@@ -393,7 +417,7 @@ def _in_ngspice(
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
                 absolute=_unmoved(model, [scaled[i] for i in _distinct(scaled)]),
-                **_of_system(model.at(r.b)),
+                **_of_system(model.at(r.b), r.omega),
             )
         )
     return tuple(out)
@@ -402,7 +426,7 @@ def _in_ngspice(
 def _unmoved(model: MechanicalModel, orbits: Sequence[Orbit]) -> tuple[Array, ...]:
     """Extremes of the absolute displacements where the ground rests; of a moving one ngspice has
     none."""
-    moved = ground_of(model).any()
+    moved = model.second_order().ground_moves
     return tuple(np.zeros((0, 2)) if moved else orbit.extremes for orbit in orbits)
 
 

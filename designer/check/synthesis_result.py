@@ -6,12 +6,16 @@ Nothing here writes a file or prints; ``jobs.synthesise_job`` does the same with
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.base.frames import table_html
+from designer.base.progress import note, seeking
 from designer.catalog.catalog import Catalog, load_catalog
+from designer.circuit.coefficients import EXACT
+from designer.circuit.dead_zone_parts import stage_kind
 from designer.circuit.design import Design, settings
-from designer.model.find_responses import ModelResponse, find, peaks
+from designer.model.circuit_table import DeadZone
+from designer.model.find_responses import ModelResponse, find, need_found, peaks
 from designer.model.model_file import ModelFile, naming
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
@@ -32,6 +36,8 @@ class Synthesis:
     """The parts chosen for it."""
     seconds: float = 0.0
     """Wall time [s]."""
+    stage_reason: str = ""
+    """Why the circuit has its dead-zone stage, where the model file states none."""
 
     def _repr_html_(self) -> str:
         responses = self.model_responses
@@ -49,23 +55,49 @@ class Synthesis:
         return table_html(self.modelfile.title, rows, note)
 
 
-def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:
+def synthesise(
+    modelfile: ModelFile, catalog: Catalog | None = None, *, all_found: bool = False
+) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
+
+    all_found : whether there have to be all of them before a part is chosen; one that is not there
+    has the swing of what was found instead otherwise.
 
     Raises
     ------
     InputError, Unreachable : the model file asks for what cannot be built.
+    ResponseNotFound : ``all_found``, and the model does not show a response.
     """
     began = time.perf_counter()
+    modelfile = with_stage(modelfile)
     catalog = modelfile.choices(load_catalog() if catalog is None else catalog)
     with naming(modelfile):
         choice = modelfile.model, modelfile.circuit, catalog
         check_choices(*choice)
         check_names(modelfile, unit_circuit(*choice), catalog)
         responses = find(modelfile.model, modelfile.responses)
-        design = parts_choice.synthesise(*choice, peaks(modelfile.model, responses), responses)
+        if all_found:
+            need_found(dict(enumerate(responses, start=1)), modelfile.si, modelfile.source)
+        held = peaks(modelfile.model, responses)
+        with seeking("parts"):
+            design = parts_choice.synthesise(*choice, held, responses)
+        note(stands(design, time.perf_counter() - began))
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
+
+
+def with_stage(modelfile: ModelFile, kind: DeadZone | None = None) -> ModelFile:
+    """The model file with this stage stated; the kind that is built without one, if None."""
+    spec = modelfile.circuit
+    kind = kind or stage_kind(spec, modelfile.model.second_order().clearances)
+    return replace(modelfile, circuit=replace(spec, dead_zone=kind))
+
+
+def stands(design: Design, seconds: float) -> str:
+    """The line that says that parts are chosen. seconds : since the work on them began."""
+    error, number = design.errors.max_error, len(design.circuit.values)
+    worst = f"{100 * error:.3g} %" if error > EXACT else "0 to rounding"
+    return f"parts stand after {seconds:.1f} s: {number} of them, largest error {worst}"
 
 
 synthesize = synthesise

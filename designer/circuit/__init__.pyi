@@ -24,10 +24,12 @@ from .coefficients import (
 )
 from .dead_zone_parts import (
     DeadZoneStage as DeadZoneStage,
+    HalfNames as HalfNames,
     Kind as Kind,
     dead_zone_stage as dead_zone_stage,
     half_parts as half_parts,
     idle_limits as idle_limits,
+    stage_kind as stage_kind,
 )
 from .dead_zone_place import (
     OUTPUT as OUTPUT,
@@ -46,6 +48,9 @@ from .design import (
 from .ensemble import (
     Ensemble as Ensemble,
     displacement as displacement,
+)
+from .feedback_loops import (
+    feedback_share as feedback_share,
 )
 from .netlist import (
     GROUND as GROUND,

@@ -101,6 +101,15 @@ def _as_clearances(side: int, stop: Side) -> str:
     return f"one [[clearance]] for each step, at the same place: {steps}"
 
 
+def stage_kind(spec: CircuitSpec, clearances: Sequence[Clearance]) -> Kind:
+    """Kind of the stage: as stated; else the saturating one where it makes these clearances."""
+    if spec.dead_zone is not None:
+        return spec.dead_zone
+    saturates = DeadZoneStage("saturation")
+    able = len(clearances) < 2 and all(saturates.refused(c) is None for c in clearances)
+    return "saturation" if able else "rectifier"
+
+
 def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
     """The stage that a model file asks for.
 
@@ -108,12 +117,14 @@ def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog)
     ------
     InputError : the catalogue has no such diode or reference.
     """
-    if spec.dead_zone == "rectifier":
+    system = model.second_order()
+    kind = stage_kind(spec, system.clearances)
+    if kind == "rectifier":
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-        return DeadZoneStage(spec.dead_zone, diode, reference)
-    if model.second_order().constant.any():
-        return DeadZoneStage(spec.dead_zone, None, catalog.reference(spec.reference))
-    return DeadZoneStage(spec.dead_zone)
+        return DeadZoneStage(kind, diode, reference)
+    if system.constant.any():
+        return DeadZoneStage(kind, None, catalog.reference(spec.reference))
+    return DeadZoneStage(kind)
 
 
 def _saturation(place: DeadZonePlace, resistor: Resistors) -> tuple[list[Part], Stop]:

@@ -192,6 +192,7 @@ class Design:
             impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
             lyapunov=orbit.lyapunov * seconds,
             lyapunov_error=orbit.lyapunov_error * seconds,
+            frequencies=tuple(w * seconds for w in orbit.frequencies),
             graze=graze,
         )
 

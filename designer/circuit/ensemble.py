@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.base.arrays import Array, Index
+from designer.base.arrays import Array, Index, Mask
 from designer.base.threads import heed, parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
@@ -26,7 +26,7 @@ from designer.dynamics.flow_result import FlowResult
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 from designer.kernels import kernel_boards as kernel
-from designer.kernels.kernel_orbit import CHAOS, FOUND
+from designer.kernels.kernel_orbit import CHAOS, DONE, FOUND, LEFT
 
 CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""
@@ -176,6 +176,41 @@ class Ensemble:
 
         return list(parallel(one, range(len(which)), jobs))
 
+    def swept(
+        self, board: int, stages: Sequence[tuple[Drive, int]], starts: Array
+    ) -> tuple[Array, Mask]:
+        """(E, n) the states of a board after each drive for its whole periods, phase-continuous,
+        from ``starts`` (E, n) at drive phase 0, and (E,) where the compiled way knows them: there
+        the board kept to its working modes, in which nothing clips that ought to be linear."""
+        ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
+        if self._modes is None or not self._modes.good[board] or not len(ends):
+            return ends, np.zeros(len(ends), dtype=bool)
+        modes, missing = self._modes.take(np.array([board])), np.zeros(2, dtype=np.int64)
+        drives = np.array([working_modes.drive_of(drive, MAX_EVENTS) for drive, _ in stages])
+        periods = np.array([count for _, count in stages], dtype=np.int64)
+        while True:
+            heed()
+            ends[:], room = starts, working_modes.driven(modes.modes, drives[0])
+            kernel.sweep_all(
+                modes.modes,
+                0,
+                drives,
+                periods,
+                ends,
+                working_modes.ANCHORS,
+                room.data,
+                room.ints,
+                room.width,
+                room.far,
+                room.unit,
+                codes,
+                missing,
+            )
+            if missing[0] >= 0:
+                modes.enter([modes.targets.beyond(int(missing[0]), int(missing[1]))])
+            elif not ((codes == LEFT).any() and modes.enter_all()):
+                return ends, np.asarray(codes == DONE)
+
     def _alone(self, board: int, drive: Drive, start: Array) -> SettledBoard:
         """One question, in Python."""
         try:
@@ -212,9 +247,12 @@ class Ensemble:
             responses = self._responses(answers, closed, periods, modes)
             for k, response in zip(asked[closed], responses, strict=True):
                 out[k] = response
-            missing = answers.whole[code == kernel.BUILD, kernel.MISSING :][:, :2]
+            again = code == kernel.BUILD
+            missing = answers.whole[again, kernel.MISSING :][:, :2]
             modes.enter({modes.targets.beyond(int(m), int(g)) for m, g in missing})
-            asked, rows = asked[code == kernel.BUILD], rows[code == kernel.BUILD]
+            if (code == kernel.NOWHERE).any() and modes.enter_all():
+                again |= code == kernel.NOWHERE
+            asked, rows = asked[again], rows[again]
         return out
 
     def _answers(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -278,23 +279,23 @@ class Circuit:
         loads = self.output_loads()
         return {name: min(stage.limit_into(load), self.supply) for name, load in loads.items()}
 
-    @property
+    @cached_property
     def resistors(self) -> tuple[Resistor, ...]:
         return tuple(p for p in self.parts if isinstance(p, Resistor))
 
-    @property
+    @cached_property
     def capacitors(self) -> tuple[Capacitor, ...]:
         return tuple(p for p in self.parts if isinstance(p, Capacitor))
 
-    @property
+    @cached_property
     def sections(self) -> tuple[Section, ...]:
         return tuple(p for p in self.parts if isinstance(p, Section))
 
-    @property
+    @cached_property
     def diodes(self) -> tuple[Diode, ...]:
         return tuple(p for p in self.parts if isinstance(p, Diode))
 
-    @property
+    @cached_property
     def references(self) -> tuple[Reference, ...]:
         return tuple(p for p in self.parts if isinstance(p, Reference))
 
@@ -333,18 +334,18 @@ class Circuit:
         """Nets that carry the displacements of the masses."""
         return self.state_nets[::2]
 
-    @property
+    @cached_property
     def switches(self) -> tuple[str, ...]:
         """What changes the circuit's mode: op-amp sections in order, then diodes."""
         return (*(s.name for s in self.sections), *(d.name for d in self.diodes))
 
-    @property
+    @cached_property
     def rest(self) -> tuple[int, ...]:
         """Position of each switch with every displacement at zero: op-amps linear, diodes as they
         say. A preloaded stop carries force there."""
         return (*(0 for _ in self.sections), *(int(d.rest) for d in self.diodes))
 
-    @property
+    @cached_property
     def open(self) -> tuple[int, ...]:
         """Position of each switch with every clearance open."""
         contacts = [contact for stop in self.stops for _, contact in stop.contacts]
@@ -390,7 +391,7 @@ class Circuit:
         """Op-amp packages in the order of their numbers."""
         return tuple(sorted({s.package for s in self.sections}, key=natural_key))
 
-    @property
+    @cached_property
     def nets(self) -> tuple[str, ...]:
         """Every net but ground, sorted."""
         nets = {self.generator.net}.union(*(p.nets for p in self.parts))

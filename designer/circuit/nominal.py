@@ -13,7 +13,7 @@ from designer.circuit.design import Design
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
@@ -87,7 +87,7 @@ def traces_of(
 def record_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace | None:
     """A motion without a period over ``RECORD_PERIODS``, for its section and its spectrum; None of
     any other."""
-    if orbit.status is not OrbitStatus.APERIODIC or not len(orbit.start):
+    if orbit.status not in WITHOUT_PERIOD or not len(orbit.start):
         return None
     return _trace(flow, orbit, volts, seconds, RECORD_PERIODS, RECORD_POINTS)
 

@@ -174,6 +174,12 @@ class BoardModes:
         beside = (keys_beside(self._boards.circuit, key) for key in keys)
         self.add(sorted(frozenset().union(*beside)))
 
+    def enter_all(self) -> bool:
+        """Solve all working modes; returns whether one was not there yet."""
+        before = len(self.targets.keys)
+        self.add(working_keys(self._boards.circuit))
+        return len(self.targets.keys) > before
+
     def add(self, keys: Iterable[ModeKey]) -> None:
         """Solve further modes; those that are there already are left as they are."""
         new = [key for key in keys if key not in self.targets.numbers]

@@ -16,7 +16,8 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from designer.base.errors import DesignerError, InputError
+from designer.base.errors import DesignerError, InputError, ResponseNotFound
+from designer.base.printed import printable
 from designer.base.progress import Progress, progress_for
 from designer.base.version import __version__
 
@@ -147,12 +148,17 @@ def verb(
         def command(
             *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
         ) -> int:
-            with (
-                _logged(log),
-                progress_for(quiet) as progress,
-                _announced(progress) if computes else nullcontext(),
-            ):
-                output = function(Session(progress, not (json or quiet)), **words)
+            try:
+                with (
+                    _logged(log),
+                    progress_for(quiet) as progress,
+                    _announced(progress) if computes else nullcontext(),
+                ):
+                    output = function(Session(progress, not (json or quiet)), **words)
+            except ResponseNotFound as error:
+                if json:
+                    print_json(error.answer)
+                raise
             if json:
                 print_json(output.json)
             elif not quiet:
@@ -179,6 +185,11 @@ def _parameter(name: str) -> inspect.Parameter:
     )
 
 
+class _LogLine(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
 @contextmanager
 def _logged(log: Path | None) -> Iterator[None]:
     """The log as asked."""
@@ -194,7 +205,7 @@ def _logged(log: Path | None) -> Iterator[None]:
             raise InputError(
                 log, "--log", error.strerror or str(error), "a file that can be written"
             ) from None
-        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        handler.setFormatter(_LogLine("%(asctime)s %(levelname)s %(message)s"))
         logger.addHandler(handler)
     logger.info("designer %s %s", __version__, " ".join(sys.argv[1:]))
     try:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from designer.base.si_unit import suffix, value_text
+from designer.base.si_unit import quantity_text, suffix, value_text
+from designer.bifurcations import window_ends
+from designer.bifurcations.continuation import End
+from designer.bifurcations.windows import NOT_LOCATED
 from designer.cli.console import say, table
 from designer.cli.tables import YES_NO, files
 
@@ -39,6 +42,7 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     widest = sorted(windows, key=lambda w: -w["steps"])[:LONGEST]
     si = answer.get("si_unit")
     chaos = any("lyapunov" in w for w in widest)
+    followed = any("from_end" in w for w in widest)
     table(
         "Windows",
         (
@@ -48,27 +52,51 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
+                **(_located(w, answer["unit"], si, in_si=in_si) if followed else {}),
                 **({f"λ{' [1/s]' if unit else ''}": _exponents(w)} if chaos else {}),
             }
             for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
         ),
     )
+    left_out = {end["reason"] for w in widest for end in _not_sought(w)}
+    if left_out:
+        say(f"-: the ends of a window are not looked for where {' or '.join(sorted(left_out))}")
     if len(windows) > len(widest):
         say(f"and {len(windows) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
         say("\nBifurcation points")
         for text in _points(answer["points"][:LONGEST], answer["unit"], si, in_si=in_si):
             say(text)
+    first = _written(answer, in_si=in_si)
     if "shares" in answer:
-        _shares(answer)
+        _shares(answer, first)
     if "curves" in answer:
-        _curves(answer)
-    if "region" in answer:
-        for text in _region(answer):
-            say(text)
+        both = (first, _written(answer["and"], in_si=in_si))
+        _curves(answer, both)
+        if "region" in answer:
+            for text in _region(answer, both):
+                say(text)
 
 
-def _shares(answer: Mapping[str, Any]) -> None:
+Written = Callable[[float], str]
+"""How a value of a parameter is written."""
+
+
+def _written(axis: Mapping[str, Any], *, in_si: bool) -> Written:
+    """Of a model in SI, or one that was asked in SI units, with the unit that people write: hertz
+    and millimetres. Else, and of answers of older versions, a plain number.
+
+    axis : the keys ``unit``, ``si_unit`` and ``si_scale``, where there are any.
+    """
+    unit, si, scale = axis.get("unit", ""), axis.get("si_unit"), axis.get("si_scale")
+    if si and scale and (unit or in_si):
+        return lambda value: value_text(value * scale, si, digits=6)
+    if unit:
+        return lambda value: quantity_text(value, unit, 6)
+    return lambda value: f"{value:.6g}"
+
+
+def _shares(answer: Mapping[str, Any], written: Written) -> None:
     """Every attractor that random starts ended on, the largest share of all starts first."""
     shares, steps = answer["shares"], answer["steps"]
     attractors = sorted(shares["attractors"], key=lambda a: -sum(s["count"] for s in a["steps"]))
@@ -79,11 +107,11 @@ def _shares(answer: Mapping[str, Any]) -> None:
             {
                 "number": str(a["number"]),
                 "responses": ", ".join(dict.fromkeys(s["response"] for s in a["steps"])),
-                "from": f"{a['steps'][0]['value']:.6g}",
-                "to": f"{a['steps'][-1]['value']:.6g}",
+                "from": written(a["steps"][0]["value"]),
+                "to": written(a["steps"][-1]["value"]),
                 "share of all": f"{sum(s['share'] for s in a['steps']) / steps:.2%}",
                 "largest share": f"{top['share']:.1%} ({top['low']:.1%} to {top['high']:.1%})",
-                "at": f"{top['value']:.6g}",
+                "at": written(top["value"]),
             }
             for a, top in zip(attractors[:LONGEST], largest, strict=False)
         ),
@@ -92,7 +120,7 @@ def _shares(answer: Mapping[str, Any]) -> None:
         say(f"and {len(attractors) - LONGEST} rarer ones (--json has them all)")
 
 
-def _curves(answer: Mapping[str, Any]) -> None:
+def _curves(answer: Mapping[str, Any], written: tuple[Written, Written]) -> None:
     """Every curve, and below them the points of codimension two."""
     first, second = answer["parameter"], answer["and"]["name"]
     switched = any(c.get("begun_at") for c in answer["curves"])
@@ -105,7 +133,7 @@ def _curves(answer: Mapping[str, Any]) -> None:
                 "response": c["response"],
                 "points": str(len(c["points"])),
                 **{
-                    f"{end} ({first}, {second})": f"({at[0]:.6g}, {at[1]:.6g}): {why}"
+                    f"{end} ({first}, {second})": f"({_both(at, written)}): {why}"
                     for end, at, why in zip(
                         ("from", "to"), (c["points"][0], c["points"][-1]), c["ends"], strict=True
                     )
@@ -117,8 +145,8 @@ def _curves(answer: Mapping[str, Any]) -> None:
     )
     for number, c in enumerate(answer["curves"][:LONGEST], 1):
         for met in c["codimension_two"]:
-            a, b = met["values"]
-            text = f"curve {number}: {met['kind']} at {first} = {a:.9g}, {second} = {b:.9g}"
+            a, b = (write(v) for write, v in zip(written, met["values"], strict=True))
+            text = f"curve {number}: {met['kind']} at {first} = {a}, {second} = {b}"
             say(text + _other_curve(met))
 
 
@@ -136,12 +164,17 @@ def _other_curve(met: Mapping[str, Any]) -> str:
     return f" ({kind}: " + (f"curve {met['curve']})" if met["curve"] else f"{met['status']})")
 
 
-def _region(answer: Mapping[str, Any]) -> Iterator[str]:
+def _both(values: Sequence[float], written: tuple[Written, Written]) -> str:
+    return ", ".join(write(value) for write, value in zip(written, values, strict=True))
+
+
+def _region(answer: Mapping[str, Any], written: tuple[Written, Written]) -> Iterator[str]:
     """What bounds the region of a response, and where to sit in it."""
     region, names = answer["region"], (answer["parameter"], answer["and"]["name"])
 
     def place(values: Sequence[float]) -> str:
-        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True))
+        rows = zip(names, written, values, strict=True)
+        return ", ".join(f"{name} = {write(value)}" for name, write, value in rows)
 
     kinds = Counter(end["kind"] for end in region["border"])
     rays = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
@@ -184,9 +217,34 @@ def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) 
     in_si : whether the SI unit comes first.
     """
     names = ("from", "to")
+    if unit and not si:
+        return {end: quantity_text(window[end], unit.strip(" []"), 6) for end in names}
     own = {f"{end}{unit}": f"{window[end]:.6g}" for end in names}
     other = {f"{end} [{si}]": _si(window, end, si) for end in names} if si else {}
     return {**other, **own} if in_si else {**own, **other}
+
+
+def _not_sought(window: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The ends of a window that were not looked for."""
+    ends = [window[key] for key in ("from_end", "to_end") if key in window]
+    return [end for end in ends if end["kind"] == window_ends.NOT_SOUGHT]
+
+
+def _located(
+    window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool
+) -> dict[str, str]:
+    """What ends a window on the branch that its response lies on, and where."""
+    out = {}
+    for column, key in (("lower end", "from_end"), ("upper end", "to_end")):
+        end = window.get(key)
+        kind = "" if end is None else str(end["kind"])
+        text = "-" if kind == window_ends.NOT_SOUGHT else kind.replace("-", " ")
+        if end is not None and kind not in (End.LIMIT, window_ends.NOT_SOUGHT):
+            own = quantity_text(end["value"], unit, 6) if unit else f"{end['value']:.6g}"
+            place = _si(end, "value", si) if si and in_si else own
+            text += f", known to {place}" if kind == NOT_LOCATED else f" {place}"
+        out[column] = text
+    return out
 
 
 def _points(
@@ -205,6 +263,9 @@ def _points(
             own, shown = place[0], _si(p, "value", si)
             both = f"{shown} ({own})" if in_si else f"{own} ({shown})"
             text = text.replace(own, both, 1)
+        elif unit and place:
+            shown = f"{place[1] or ''}{quantity_text(p['value'], unit, 9)}"
+            text = text.replace(place[0], shown, 1)
         yield text
         for c in p.get("changes", []):
             if c["track"] is not None:

@@ -1,18 +1,34 @@
-"""Tables and lines for people, on standard error."""
+"""Tables and lines for people, on standard error; on standard output where they are the answer."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
+from designer.base.printed import printable
+
+_ANSWERING = ContextVar("_ANSWERING", default=False)
+
+
+@contextlib.contextmanager
+def answering() -> Iterator[None]:
+    """A block whose tables and lines are the answer: they go to standard output."""
+    token = _ANSWERING.set(True)
+    try:
+        yield
+    finally:
+        _ANSWERING.reset(token)
+
 
 def say(text: str) -> None:
     """A line of any length."""
-    _console().print(Text(text), soft_wrap=True)
+    _console().print(_text(text), soft_wrap=True)
 
 
 def table(title: str, rows: Iterable[Mapping[str, str]], gap: int = 2) -> None:
@@ -27,13 +43,18 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
         say(f"\n{title}: none")
         return
     say(f"\n{title}")
-    rich_table = Table(*(Column(Text(head)) for head in heads), box=None)
+    rich_table = Table(*(Column(_text(head)) for head in heads), box=None)
     rich_table.padding = (0, gap, 0, 0)
     for row in rows:
-        rich_table.add_row(*(Text(cell) for cell in row))
+        rich_table.add_row(*(_text(cell) for cell in row))
     _console().print(rich_table)
+
+
+def _text(text: str) -> Text:
+    return Text(printable(text))
 
 
 def _console() -> Console:
     """Wide enough for a row where there is no terminal to ask."""
-    return Console(stderr=True, width=None if sys.stderr.isatty() else 120)
+    stream = sys.stdout if _ANSWERING.get() else sys.stderr
+    return Console(file=stream, width=None if stream.isatty() else 120)

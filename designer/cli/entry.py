@@ -13,6 +13,7 @@ import traceback
 from collections.abc import Sequence
 
 from designer.base.errors import DesignerError
+from designer.base.printed import tell
 
 INTERRUPTED = 130
 _INTERRUPTED = "interrupted; --resume goes on with what has been written, if anything was"
@@ -20,6 +21,11 @@ _INTERRUPTED = "interrupted; --resume goes on with what has been written, if any
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit status (docs/contract.md)."""
+    # Whatever starts a Python from here on takes no module from the working directory.
+    os.environ.update(PYTHONSAFEPATH="1")
+    # The matrices are small: a second thread for one costs more time than it saves.
+    for library in ("OPENBLAS", "MKL", "BLIS"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     # A page and a board are some 100,000 objects without circles: at Python's own thresholds the
     # collector goes through all libraries' objects again and again, a fifth of a study's CPU time.
     gc.set_threshold(50_000, 20, 20)
@@ -69,7 +75,7 @@ def _unexpected(error: Exception, arguments: Sequence[str]) -> int:
     kind = type(error).__name__
     _say(f"internal error: {kind}: {print_line(str(error))}; please report it (-v shows where)")
     if "-v" in arguments or "--verbose" in arguments:
-        traceback.print_exception(error, file=sys.stderr)
+        tell("".join(traceback.format_exception(error)))
     return 1
 
 
@@ -78,4 +84,4 @@ def print_line(text: str) -> str:
 
 
 def _say(text: str) -> None:
-    print(f"designer: {text}", file=sys.stderr, flush=True)
+    tell(f"designer: {text}")

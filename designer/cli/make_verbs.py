@@ -183,7 +183,7 @@ def bench(
 ) -> Output:
     """Say what records of a board show, and how sure that is; exit status 1 where it is not sure or
     not what is wanted there."""
-    from designer.cli import record_tables, tables
+    from designer.cli import console, record_tables, tables
     from designer.jobs import bench_job
 
     roles = None if channels is None else bench_job.channels_of(channels)
@@ -202,7 +202,8 @@ def bench(
     )
 
     def show() -> None:
-        record_tables.benched(result.answer)
+        with console.answering():
+            record_tables.benched(result.answer)
         if out is not None:
             tables.files(out, False)
 

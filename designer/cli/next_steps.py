@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from designer.base.si_unit import is_angular, value_text
 from designer.cli.console import say
 
 Step = tuple[str, str]
@@ -37,20 +38,31 @@ def after_model(model: Path) -> Iterator[Step]:
 def after_design(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     """With a design that nothing was counted of. answer : of ``synthesise``."""
     yield from after_response(folder, answer["knobs"])
+    failing = list(after_failed_rules(folder, answer))
+    yield from failing
     yield _step("how many boards will work", "tolerance", folder)
-    yield _step("circuit against design rules", "rules", folder)
+    if not failing:
+        yield _step("circuit against design rules", "rules", folder)
 
 
 def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     """With a study. answer : of ``tolerance`` or ``run``."""
     responses = answer["responses"]
     yield f"open {shlex.quote(str(folder / 'report.html'))}", "the report"
+    yield from after_failed_rules(folder, answer)
     yield from after_response(folder, responses)
     if any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses):
         yield _step("the cheapest cure", "search", folder, "--yield", GOOD)
     if _board(folder) is None:
         yield _step("the KiCad project, its board routed", "export", folder, "--routed")
     yield from after_board(folder)
+
+
+def after_failed_rules(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+    """With design rules that fail on the circuit. answer : with ``failed_rules``; older ones have
+    none."""
+    if names := ", ".join(rule["id"] for rule in answer.get("failed_rules", ())):
+        yield _step(f"design rules that fail: {names}", "rules", folder)
 
 
 def after_board(folder: Path) -> Iterator[Step]:
@@ -72,10 +84,20 @@ def after_response(place: Path, responses: Iterable[Mapping[str, Any]]) -> Itera
     """With a wanted response that was not found. place : model file or design folder."""
     for row in responses:
         if not row["found"]:
-            low, high = (f"{row['omega'] * (1.0 + side * AROUND):.4g}" for side in (-1.0, 1.0))
+            low, high = (_frequency(row, 1.0 + side * AROUND) for side in (-1.0, 1.0))
             sweep = ("--from", low, "--to", high, "--steps", 61, "--up", "--down")
-            yield _step(f"where {row['expected']} lives", "bifurcation", place, *sweep)
+            wanted = row["expected"]
+            why = "what there is about it" if wanted is None else f"where {wanted} lives"
+            yield _step(why, "bifurcation", place, *sweep)
             return
+
+
+def _frequency(row: Mapping[str, Any], share: float) -> str:
+    """A share of a response's frequency, as the options of ``bifurcation`` read it."""
+    hertz = row.get("mechanism_hz", row.get("frequency_hz"))
+    if is_angular(row["omega"], hertz):
+        return value_text(share * hertz, "Hz")
+    return f"{share * row['omega']:.4g}"
 
 
 def _board(folder: Path) -> Path | None:

@@ -1,4 +1,4 @@
-"""What ``bench`` answers, as tables and lines for people on standard error."""
+"""What ``bench`` answers, as tables and lines for people."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ def benched(answer: Mapping[str, Any]) -> None:
         ),
     )
     for r in rows:
+        for cut in r["clipped"]:
+            say(f"{r['file']}: {cut['words']}")
         if r["others"]:
             say(f"{r['file']}: {r['response']}, or {' or '.join(r['others'])}")
         if r["reason"]:

@@ -33,17 +33,57 @@ def simulated(answer: Mapping[str, Any]) -> None:
         gap=1,
     )
     in_si = bool(masses) and all("frequency_hz" in r for r in rows)
+    if any("base_amplitude" in r for r in rows):
+        from_base = [_from_base(r, masses, in_si=in_si) for r in rows]
+        table("Displacements from the base", from_base, gap=1)
     for r in rows:
-        place = f"ω = {r['omega']:g}{' rad/s' if in_si else ''}"
+        place = _place(r, in_si=in_si)
         if r["starts"] is not None:
             say(f"{place}: {coexisting(r['starts'], masses, in_si=in_si)}")
         if r["reason"]:
             say(f"{place}: {r['response']}: {r['reason']}")
+        if r["frequencies"] is not None:
+            say(f"{place}: {frequencies(r)}")
+        for other in r["others"]:
+            if other["frequencies"] is not None:
+                say(f"{place}: of the others, {frequencies(other)}")
         if r["lyapunov_error"] is not None:
             growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}{' 1/s' if in_si else ''}"
             say(f"{place}: largest exponent {growth} (standard error)")
         for line in untrusted({"this response": r.get("trust")}):
             say(f"{place}: {line}")
+
+
+def _place(row: Mapping[str, Any], *, in_si: bool) -> str:
+    """The drive frequency that a response belongs to."""
+    return value_text(row["frequency_hz"], "Hz", 6) if in_si else f"ω = {row['omega']:g}"
+
+
+def _from_base(row: Mapping[str, Any], masses: Sequence[str], *, in_si: bool) -> dict[str, str]:
+    """How far the masses go from a base that moves, and how far that goes."""
+    lows, highs = row["from_base_min"], row["from_base_max"]
+    cells = {"at": _place(row, in_si=in_si), "response": row["response"]}
+    for i, name in enumerate(masses):
+        ends = () if lows is None else (lows[i], highs[i])
+        cells[f"x{i + 1} − y ({name})"] = _between(ends, in_si=in_si)
+    y = row["base_amplitude"]
+    return {**cells, "y (base)": f"± {value_text(y, 'm') if in_si else format(y, '.6g')}"}
+
+
+def _between(ends: Sequence[float], *, in_si: bool) -> str:
+    return " to ".join(value_text(x, "m") if in_si else f"{x:.6g}" for x in ends) or "-"
+
+
+def frequencies(row: Mapping[str, Any]) -> str:
+    """The two frequencies of a quasi-periodic motion, and their ratio."""
+    drive, second = row["frequencies"]
+    in_hertz = row.get("frequencies_hz")
+    if in_hertz is None:
+        pair = f"ω {drive:.6g} of the drive and {second:.7g}"
+    else:
+        first, other = value_text(in_hertz[0], "Hz"), value_text(in_hertz[1], "Hz", 7)
+        pair = f"{first} of the drive and {other}"
+    return f"quasi-periodic with the frequencies {pair}, {second / drive:.7g} times the drive's"
 
 
 def _reach(
@@ -54,8 +94,7 @@ def _reach(
     cells = {}
     for i, name in enumerate(masses):
         ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
-        ends_text = (value_text(x, "m") if in_si else f"{x:.6g}" for x in ends)
-        cells[f"x{i + 1} ({name})"] = " to ".join(ends_text) or "-"
+        cells[f"x{i + 1} ({name})"] = _between(ends, in_si=in_si)
     if masses:
         return cells
     si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
@@ -103,7 +142,7 @@ def _response_cells_in_si(
     cells = response_cells(row, rows)
     if "mechanism" not in cells:
         return cells
-    return {"ω [rad/s]": cells["ω"], "frequency": cells["mechanism"], "expected": cells["expected"]}
+    return {"frequency": cells["mechanism"], "expected": cells["expected"]}
 
 
 def _share(counted: Mapping[str, Any]) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from designer.base.si_unit import value_text
+from designer.base.printed import tell
+from designer.base.si_unit import drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.cli.console import grid, say, table
 
@@ -21,8 +21,20 @@ def run(answer: Mapping[str, Any]) -> None:
     tolerance(answer)
 
 
+def not_good_enough(answer: Mapping[str, Any]) -> None:
+    """What stands before everything else that a verb says of a design, where there is
+    something."""
+    for warning in answer.get("warnings", ()):
+        say(f"Not good enough: {warning}")
+    if failed := answer.get("failed_rules"):
+        columns = {"rule": "id", "found": "found", "limit": "limit", "what to do": "do"}
+        rows = ({head: rule[key] for head, key in columns.items()} for rule in failed)
+        table("Design rules that fail", rows)
+
+
 def synthesised(answer: Mapping[str, Any]) -> None:
-    """The chosen parts, their error and the generator's settings."""
+    """What is not good enough; the chosen parts, their error and the generator's settings."""
+    not_good_enough(answer)
     equal: dict[tuple[str, float], list[str]] = defaultdict(list)
     for name, value in answer["parts"].items():
         equal[name[0], value].append(name)
@@ -44,6 +56,8 @@ def synthesised(answer: Mapping[str, Any]) -> None:
             for name, g in answer["better_grades"].items()
         }
         say(better_grades_text(better))
+    if reason := (answer.get("dead_zone") or {}).get("reason"):
+        say(f"The stage of the clearance was chosen. {reason}.")
     certificate = answer["certificate"]
     say(
         f"Largest coefficient error {_error(answer['max_error'])} "
@@ -56,9 +70,7 @@ def synthesised(answer: Mapping[str, Any]) -> None:
             "Generator",
             (
                 {
-                    "ω": f"{r['omega']:g}",
-                    **_mechanism(r, rows, "mechanism_hz"),
-                    "expected": r["expected"] or "-",
+                    **response_cells(r, rows, "mechanism_hz"),
                     "frequency": f"{r['frequency_hz']:.4g} Hz",
                     "amplitude (peak, high-Z)": f"{r['amplitude_v_peak']:.4g} V",
                 }
@@ -90,7 +102,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         _boards(answer)
     for r in rows:
         for line in untrusted(_trust_with_figures(r)):
-            say(f"ω = {r['omega']:g}: {line}")
+            say(f"{drive_text(r['omega'], r.get('frequency_hz'), 6)}: {line}")
     if answer.get("equation_check") is not None:
         from designer.spice.equation_check import EquationCheck
 
@@ -118,7 +130,7 @@ def _counts(row: Mapping[str, Any]) -> dict[str, str]:
 def _boards(answer: Mapping[str, Any]) -> None:
     """One row for each measured board, where the study is of all of them."""
     boards = answer["boards"]
-    heads = [f"{r['omega']:g} {r['expected'] or '-'}" for r in answer["responses"]]
+    heads = [_head(r) for r in answer["responses"]]
     rows = ([b["board"], *(cell or "-" for cell in b["cells"]), b["all"] or "-"] for b in boards)
     grid(f"All {len(boards)} boards", ["board", *heads, "all of them"], rows, gap=1)
 
@@ -229,14 +241,14 @@ def cured(answer: Mapping[str, Any]) -> None:
     """The upgrades of a cure."""
     from designer.centering import cure_table
 
-    print(cure_table.text(answer), file=sys.stderr)
+    tell(cure_table.text(answer))
 
 
 def traded(answer: Mapping[str, Any]) -> None:
     """Time and error of every rung."""
     from designer.fidelity.trade_files import sheet
 
-    print(sheet(answer), file=sys.stderr)
+    tell(sheet(answer))
 
 
 def rules(answer: Mapping[str, Any]) -> None:
@@ -327,13 +339,21 @@ def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
     return trust
 
 
-def response_cells(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """The first cells of a response: its frequency and the wanted n-p-q."""
-    return {
-        "ω": f"{row['omega']:g}",
-        **_mechanism(row, rows, "frequency_hz"),
-        "expected": row["expected"] or "-",
-    }
+def response_cells(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz"
+) -> dict[str, str]:
+    """The first cells of a response: its frequency and the wanted n-p-q; ω not where it is in
+    rad/s. key : of the mechanism's frequency."""
+    mechanism = _mechanism(row, rows, key)
+    if mechanism and all(is_angular(r["omega"], r[key]) for r in rows):
+        return {**mechanism, "expected": row["expected"] or "-"}
+    return {"ω": f"{row['omega']:g}", **mechanism, "expected": row["expected"] or "-"}
+
+
+def _head(row: Mapping[str, Any]) -> str:
+    """A response above a column: its frequency and the wanted n-p-q."""
+    place = drive_text(row["omega"], row.get("frequency_hz"), 6).removeprefix("ω = ")
+    return f"{place} {row['expected'] or '-'}"
 
 
 def _mechanism(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -10,6 +9,7 @@ from typing import Annotated, Any, Literal, cast
 import typer
 
 from designer.base.errors import InputError
+from designer.base.printed import tell
 from designer.cli import next_steps
 from designer.cli.app import Output, Session, option, verb
 
@@ -72,7 +72,7 @@ def new(
     answer = {"format": 1, "files": files}
 
     def show() -> None:
-        print(f"written: {', '.join(files)}", file=sys.stderr)
+        tell(f"written: {', '.join(files)}")
         next_steps.show(next_steps.after_model(path))
 
     return Output(answer, show)

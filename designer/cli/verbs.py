@@ -83,6 +83,7 @@ def _designer(
 def _surroundings() -> Iterator[tuple[str, str]]:
     """The programs that verbs call and the cores that they use, as they are on this machine."""
     from designer.design_rules.kicad_program import kicad_version
+    from designer.linear_network.solver_check import solver_words
     from designer.spice.batch_backend import program_version
 
     yield "Python", platform.python_version()
@@ -91,6 +92,7 @@ def _surroundings() -> Iterator[tuple[str, str]]:
     except EnvironmentMissing as missing:
         yield "ngspice", str(missing)
     yield "KiCad", kicad_version() or "none (kicad-cli 9 checks boards in designer rules)"
+    yield "solver", solver_words()
     yield "cores", str(cores())
 
 

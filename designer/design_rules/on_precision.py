@@ -9,8 +9,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
-from designer.design_rules.force_at_clearance import Forces, leftovers, thermal
 from designer.design_rules.subject import RuleSubject
+from designer.synthesis.force_at_clearance import Forces, leftovers, thermal
 
 INSULATION = 1e9
 """Ohm between a node and a rail across the board."""

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from designer.catalog.design_rule import Finding, value_text
-from designer.catalog.entries import OpAmp
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Diode
 from designer.circuit.noise_gains import conductance, stages
-from designer.design_rules.operating_point import Operating, Peak
 from designer.design_rules.subject import RuleSubject
 from designer.synthesis.limits import bandwidth_limit, guaranteed
-from designer.synthesis.side_conditions import saturating
+from designer.synthesis.operating_point import Operating, Peak
+from designer.synthesis.side_conditions import guaranteed_swing, saturating
 
 GENERATOR = 10.0
 """Most that a generator gives into a high impedance [V]: what common ones do."""
 INPUT = 2e-3
 """Largest current into an input where no sheet gives one [A]: DS21733J, MCP6004, has the least."""
-HEAVY, LIGHT = 2e3, 10e3
-"""Loads that data sheets state the swing for [Ω]."""
 
 
 def swing(s: RuleSubject) -> Iterator[Finding]:
@@ -29,21 +26,6 @@ def swing(s: RuleSubject) -> Iterator[Finding]:
             peak = max(peaks.high[section.output], peaks.low[section.output], key=lambda p: p.value)
             limit = guaranteed_swing(s.opamp, s.circuit, peaks.source[section.name].value)
             yield Finding(peak.value, _at(section.name, peak), limit)
-
-
-def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
-    """Least output swing [V] at this output current [A] and the circuit's rails.
-
-    The figures are those into 10 kΩ and 2 kΩ; between and beyond them in proportion to the current.
-    """
-    shift = circuit.supply - opamp.rated_supply
-    light = guaranteed(opamp.swing)
-    if opamp.swing_2k is None:
-        return light + shift
-    heavy = guaranteed(opamp.swing_2k)
-    from_, to = light / LIGHT, heavy / HEAVY
-    share = max((current - from_) / (to - from_), 0.0)
-    return light + share * (heavy - light) + shift
 
 
 def load(s: RuleSubject) -> Iterator[Finding]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from designer.base.units import parse_quantity
-from designer.board.component import Component
+from designer.board.board_parts import board_circuit
+from designer.board.component import Component, components
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import NotRun
 from designer.catalog.entries import OpAmp
@@ -18,10 +20,10 @@ from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
-from designer.design_rules.force_at_clearance import Forces, Statics
-from designer.design_rules.operating_point import Operating, operating, stuck
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
+from designer.synthesis.force_at_clearance import Forces, Statics
+from designer.synthesis.operating_point import Operating, operating, stuck
 from designer.synthesis.output_loads import Run
 
 
@@ -38,6 +40,18 @@ class RuleSubject:
     """The circuit with its fittings."""
     components: Sequence[Component]
     """The components of its board."""
+
+    @classmethod
+    def of(cls, synthesis: Synthesis) -> Self:
+        """A design with the board that its model file asks for.
+
+        Raises
+        ------
+        InputError : there can be no such board, as ``board_parts.fitted`` and
+            ``component.components`` say.
+        """
+        circuit, choice = board_circuit(synthesis)
+        return cls(synthesis, circuit, components(circuit, synthesis.catalog, choice))
 
     @property
     def design(self) -> Design:

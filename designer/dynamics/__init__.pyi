@@ -8,7 +8,6 @@ from . import (
 from .attractors import (
     ENGINE_ERROR as ENGINE_ERROR,
     STROBE_TOLERANCE as STROBE_TOLERANCE,
-    coexisting as coexisting,
     describe as describe,
     mirrored_strobes as mirrored_strobes,
     peaks_near as peaks_near,
@@ -17,6 +16,10 @@ from .attractors import (
     shoot as shoot,
     starts as starts,
     twin as twin,
+)
+from .coexisting_attractors import (
+    coexisting as coexisting,
+    outlived as outlived,
 )
 from .continued_orbit import (
     ContinuedOrbit as ContinuedOrbit,
@@ -47,7 +50,9 @@ from .mode_tables import (
 )
 from .orbit import (
     ANSWERS as ANSWERS,
+    MOST_COUNTED as MOST_COUNTED,
     SYMMETRY_TOLERANCE as SYMMETRY_TOLERANCE,
+    WITHOUT_PERIOD as WITHOUT_PERIOD,
     Complex as Complex,
     Motion as Motion,
     Orbit as Orbit,

@@ -4,15 +4,15 @@ Settle for 20 drive periods, look for the period n at which the strobe nearly re
 Newton's method on the n-period map and accept only what converged, is stable, lies where the
 settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800,
 4000 periods in all). Newton at once would be faster and wrong: it also lands on unstable orbits and
-on other attractors. What has neither a short period nor chaos after 800 periods is looked at for
-longer periods, and after 4000 for whether it has settled at all: if not, once more after the many
-periods over which a small growth is measured.
+on other attractors. What is chaotic after 800 or 4000 periods is watched for longer, since chaos
+may be a transient. What has neither a short period nor chaos is run on, and is of a long period,
+quasi-periodic, weakly chaotic, or not settled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -23,9 +23,17 @@ from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowResult, FlowStatus
-from designer.dynamics.lyapunov_exponent import BLOCK, Bound, LyapunovExponent, lyapunov
+from designer.dynamics.lyapunov_exponent import (
+    BLOCK,
+    SURE,
+    Bound,
+    LyapunovExponent,
+    lyapunov,
+    sign,
+)
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
+from designer.dynamics.quasi_periodic import DRIFT, closed_curve, frequencies
 from designer.dynamics.step_budget import Budget
 from designer.kernels.kernel_orbit import (
     CHAOS,
@@ -37,15 +45,28 @@ from designer.kernels.kernel_orbit import (
 
 STAGES = (20, 20, 100, 660, 3200)
 LONG_PERIOD = 4 * MAX_PERIOD
-"""Longest period that is looked for where there is neither one up to ``MAX_PERIOD`` nor chaos."""
-STATIONARY = 0.01
-"""Change of how far a motion is from repeating, over half of the last stage, below which it has
-settled. What approaches an orbit of multiplier ρ changes by 1 - ρ^1600, so only ρ > 0.999994 may be
-taken for settled."""
+"""Longest period that is looked for where there is neither one up to ``MAX_PERIOD`` nor chaos, and
+the strobe does not come back by itself."""
+LAST = 12_800
+"""Drive periods of the run that decides where no stage did."""
 FIRST = 300
 """Drive periods over which chaos is first looked for."""
-SURE = 4.0
-"""Standard errors that a small exponent has to be above 0 to be called chaos."""
+FAINTEST = Bound(1.0 / SURE, 0.0, 20_000)
+"""How long an exponent is measured for its sign."""
+PLAIN = 3e-8
+"""Difference of the two halves in the rotation number below which the run of the last stage is long
+enough to call a motion quasi-periodic."""
+ON_TORUS = Bound(0.0, 1e-3, 20_000)
+"""How closely the exponent of a torus has to be 0."""
+LOOK = 300
+"""Drive periods between two looks at whether chaos has ended on a periodic orbit."""
+WATCH = 4000
+"""Drive periods that a single chaotic motion is watched for before it is called one."""
+NEARLY = 1e-6
+"""Of the spread of each state: a strobe that has come back as near as this is worth polishing,
+whatever its period."""
+TURNS = 4
+"""How often a motion whose chaos has ended is settled anew."""
 RATTLES = (
     f"more than {MAX_EVENTS} changes of contact in a drive period: something rests on a stop whose "
     "force jumps at the touch, and rattles on it lower and faster without end"
@@ -56,33 +77,50 @@ ENGINE_ERROR = 1e-10
 
 
 def settle(
-    flow: Flow, x: Array, mode: ModeKey | None = None, budget: Budget | None = None
+    flow: Flow,
+    x: Array,
+    mode: ModeKey | None = None,
+    budget: Budget | None = None,
+    *,
+    watch: int = WATCH,
 ) -> Orbit:
     """The attractor reached from state x (n,) at drive phase 0.
 
     budget : steps that it may take, ``step_budget.SETTLING`` by default; with none left its status
-    is not settled, and the reason says after how many drive periods.
+    is not settled, and the reason says after how many drive periods. watch : drive periods that
+    chaos is watched for, since it may end; 0 where that is done for many starts together
+    (``coexisting_attractors.outlived``).
 
     Returns an orbit of any status; it never raises for lack of an answer.
     """
     with flow.within(Budget(step_budget.SETTLING) if budget is None else budget) as given:
-        return _settle(flow, x, mode, given)
+        return _settle(flow, x, mode, given, watch)
 
 
-def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit:
+def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget, watch: int) -> Orbit:
+    spent = 0
+    for _ in range(TURNS):
+        orbit = _arrive(flow, x, mode, budget)
+        spent += orbit.periods
+        if orbit.status is not OrbitStatus.APERIODIC or not watch:
+            return replace(orbit, periods=spent)
+        watched = _watched(flow, orbit, watch, budget)
+        spent += watched.periods
+        if not isinstance(watched, _Ended):
+            return replace(watched, periods=spent)
+        x, mode = watched.start, watched.mode
+    reason = f"chaos that ends and comes back, in {spent} drive periods"
+    return Orbit(OrbitStatus.NOT_SETTLED, start=x, mode=mode or (), reason=reason, periods=spent)
+
+
+def _arrive(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit:
+    """What the start leads to, as far as chaos that is no transient."""
     spent = 0
     for stage, periods in enumerate(STAGES):
         run = flow.run(x, periods, mode=mode)
         spent += len(run.strobes) - 1
         if run.status is not FlowStatus.DONE:
-            diverged = run.status is FlowStatus.DIVERGED
-            status = OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED
-            reason = str(run.status)
-            if run.status is FlowStatus.CHATTER and not flow.system.continuous:
-                reason = RATTLES
-            if run.status is FlowStatus.TOO_LONG:
-                reason = _too_long(flow, spent, budget)
-            return Orbit(status, reason=reason, periods=spent)
+            return _stopped(flow, run, spent, budget)
         x, mode = run.strobes[-1], run.mode
         orbit, cost = _polish(flow, run)
         spent += cost
@@ -91,36 +129,72 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         if stage >= 3:
             growth = lyapunov(flow, x, mode, FIRST)
             spent, x, mode = spent + FIRST, growth.start, growth.mode
-            if growth.value * flow.drive.period > CHAOS:
+            if growth.value * flow.drive.period > CHAOS and growth.sign > 0:
                 return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
             orbit, cost = long_orbit(flow, x, mode)
             spent += cost
+            if orbit is None and stage == 4:
+                orbit, cost = _regular(flow, run, PLAIN)
+                spent += cost
             if orbit is not None:
                 return replace(orbit, periods=spent)
-    still = _without_period(flow, run)
-    if not still:  # a growth too small to be seen at once
-        growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
-        spent += BLOCK * len(growth.rates)
-        if growth.value > SURE * growth.error:
-            return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
-        run = flow.run(growth.start, STAGES[-1], mode=growth.mode)
-        orbit, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
-        spent += len(run.strobes) - 1 + cost
+    for last in (False, True):
+        run = flow.run(x, LAST, mode=mode)
+        spent += len(run.strobes) - 1
+        if run.status is not FlowStatus.DONE:
+            return _stopped(flow, run, spent, budget)
+        x, mode = run.strobes[-1], run.mode
+        orbit, cost = _regular(flow, run)
+        spent += cost
         if orbit is not None:
             return replace(orbit, periods=spent)
-        still = run.status is FlowStatus.DONE and _without_period(flow, run)
-    why = "quasi-periodic, or of a longer period" if still else "very slow"
-    return _unperiodic(
-        OrbitStatus.APERIODIC if still else OrbitStatus.NOT_SETTLED,
-        growth,
-        spent,
-        f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: {why}",
+        if not run.counts.any() and _decays(flow, mode):
+            break
+        if not last:  # a growth too small to be seen at once
+            growth = lyapunov(flow, x, mode, FIRST, FAINTEST)
+            spent, x, mode = spent + BLOCK * len(growth.rates), growth.start, growth.mode
+            if growth.sign > 0:
+                return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
+    why = (
+        f"after {spent} drive periods neither a period nor chaos nor a closed curve of strobes: "
+        "very slow, or of more than two frequencies"
     )
+    return _unperiodic(OrbitStatus.NOT_SETTLED, growth, spent, why)
 
 
-def _without_period(flow: Flow, run: FlowResult) -> bool:
-    """Whether a run shows a motion that has settled without a period."""
-    return is_stationary(run.strobes) and (bool(np.any(run.counts)) or not _decays(flow, run.mode))
+def _stopped(flow: Flow, run: FlowResult, spent: int, budget: Budget) -> Orbit:
+    """What is said of a motion whose run came to no end."""
+    diverged = run.status is FlowStatus.DIVERGED
+    status = OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED
+    reason = str(run.status)
+    if run.status is FlowStatus.CHATTER and not flow.system.continuous:
+        reason = RATTLES
+    if run.status is FlowStatus.TOO_LONG:
+        reason = _too_long(flow, spent, budget)
+    return Orbit(status, reason=reason, periods=spent)
+
+
+def _regular(flow: Flow, run: FlowResult, drift: float = DRIFT) -> tuple[Orbit | None, int]:
+    """The stable orbit or the torus that a long run has arrived at, if any; also what it cost.
+    drift : by how much the two halves of a torus may differ in its rotation number."""
+    periods, strobes = list(range(1, LONG_PERIOD + 1)), run.strobes
+    spread = np.maximum(np.ptp(strobes, axis=0), 1e-300)
+    back = np.abs(strobes[: -len(strobes) // 2 : -1] - strobes[-1]) / spread
+    near = np.flatnonzero(back.max(axis=1)[1:] < NEARLY)
+    if len(near):
+        periods += [n for n in (int(near[0]) + 1,) if n > LONG_PERIOD]
+    orbit, cost = _polish(flow, run, periods)
+    if orbit is not None:
+        return orbit, cost
+    curve = closed_curve(strobes)
+    if curve is None or curve.error > drift or (not run.counts.any() and _decays(flow, run.mode)):
+        return None, cost
+    growth = lyapunov(flow, strobes[-1], run.mode, FIRST, ON_TORUS)
+    cost += BLOCK * len(growth.rates)
+    if growth.sign:
+        return None, cost
+    torus = _unperiodic(OrbitStatus.QUASI_PERIODIC, growth, 0)
+    return replace(torus, frequencies=frequencies(flow, growth.start, growth.mode, curve)), cost
 
 
 def _decays(flow: Flow, mode: ModeKey) -> bool:
@@ -128,6 +202,48 @@ def _decays(flow: Flow, mode: ModeKey) -> bool:
     drive's own period, however long it repeats as if it had settled."""
     rates = np.linalg.eigvals(flow.system.mode(mode).A)
     return bool(rates.real.max() < -1e-12 * np.abs(rates).max())
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """Chaos that is over: where the motion is then."""
+
+    start: Array
+    mode: ModeKey | None
+    periods: int
+
+
+def _watched(flow: Flow, orbit: Orbit, periods: int, budget: Budget) -> Orbit | _Ended:
+    """A chaotic motion after so many more drive periods: chaotic still, the periodic orbit that it
+    has ended on, or not chaotic any more. The drive periods are those of the watch alone."""
+    x, mode, spent = orbit.start, orbit.mode or None, 0
+    while spent < periods:
+        run = flow.run(x, min(LOOK, periods - spent), mode=mode)
+        spent += len(run.strobes) - 1
+        if run.status is not FlowStatus.DONE:
+            return _stopped(flow, run, spent, budget)
+        x, mode = run.strobes[-1], run.mode
+        found, cost = _polish(flow, run)
+        spent += cost
+        if found is not None:
+            return replace(found, periods=spent)
+    growth = lyapunov(flow, x, mode, min(FIRST, periods), FAINTEST)
+    spent += BLOCK * len(growth.rates)
+    if growth.sign > 0:
+        return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
+    return _Ended(growth.start, growth.mode, spent)
+
+
+def followed(flow: Flow, orbit: Orbit, periods: int, budget: Budget | None = None) -> Orbit:
+    """An aperiodic motion followed for so many more drive periods: itself where it is chaotic to
+    their end, else what it leads to."""
+    with flow.within(Budget(step_budget.SETTLING) if budget is None else budget) as given:
+        watched = _watched(flow, orbit, periods, given)
+        spent = orbit.periods + watched.periods
+        if isinstance(watched, _Ended):
+            watched = _settle(flow, watched.start, watched.mode, given, periods)
+            spent += watched.periods
+        return replace(watched, periods=spent)
 
 
 def _unperiodic(
@@ -152,20 +268,6 @@ def long_orbit(flow: Flow, x: Array, mode: ModeKey | None = None) -> tuple[Orbit
         return None, len(run.strobes) - 1
     orbit, cost = _polish(flow, run, range(MAX_PERIOD + 1, LONG_PERIOD + 1))
     return orbit, LONG_PERIOD + cost
-
-
-def is_stationary(strobes: Array) -> bool:
-    """Whether a motion has settled, though without a period: for every n up to ``LONG_PERIOD`` the
-    strobes (k, states), k > 8 ``LONG_PERIOD``, repeat after n periods no better at the end than in
-    the middle. What approaches a periodic orbit repeats ever better."""
-    peak = np.maximum(np.abs(strobes).max(axis=0), 1e-300)
-    scaled, quarter = strobes / peak, len(strobes) // 4
-    for n in range(1, LONG_PERIOD + 1):
-        gap = np.abs(scaled[n:] - scaled[:-n]).max(axis=1)
-        middle, end = float(gap[quarter : 2 * quarter].max()), float(gap[-quarter:].max())
-        if end <= STROBE_TOLERANCE or abs(end - middle) > STATIONARY * middle:
-            return False
-    return True
 
 
 def _too_long(flow: Flow, spent: int, budget: Budget) -> str:
@@ -315,37 +417,29 @@ def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> f
 
 
 def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
-    """An aperiodic motion with its exponent to ``lyapunov_exponent.Bound``; any other as it is."""
+    """An aperiodic motion with its exponent to ``lyapunov_exponent.Bound``, or what it is where
+    that shows that its chaos was a transient; any other as it is."""
     if orbit.status is not OrbitStatus.APERIODIC or not len(orbit.start):
         return orbit
-    with flow.within(Budget(step_budget.SETTLING)):
+    if Bound().holds(orbit.lyapunov, orbit.lyapunov_error, flow.drive.period):
+        return orbit
+    with flow.within(Budget(step_budget.SETTLING)) as budget:
         growth = lyapunov(flow, orbit.start, orbit.mode or None, FIRST, Bound())
-    return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
+        spent = orbit.periods + BLOCK * len(growth.rates)
+        if min(growth.sign, sign(growth.rates[-len(growth.rates) // 4 :])) <= 0:
+            later = _settle(flow, growth.start, growth.mode, budget, WATCH)
+            return replace(later, periods=spent + later.periods)
+        run = flow.run(growth.start, 2 * MAX_PERIOD, mode=growth.mode)
+        found, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
+        if found is not None:
+            return replace(found, periods=spent + len(run.strobes) - 1 + cost)
+        return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
 
 
 def starts(scale: Array, count: int, seed: int = 0) -> Array:
     """(count, n) initial states: rest, then a scrambled Sobol set in the box ± scale."""
     box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
     return np.vstack([np.zeros((1, len(scale))), scale * (2.0 * box - 1.0)])[:count]
-
-
-def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
-    """The different attractors that these starts lead to, in order of discovery.
-
-    Starts that are left when ``step_budget.STARTS`` steps are spent are not run. Mirror twins
-    count as one; aperiodic ones are not told apart.
-    """
-    attractors: list[Orbit] = []
-    left = float(step_budget.STARTS)
-    for x in states:
-        if left <= 0.0:
-            break
-        budget = Budget(min(step_budget.SETTLING, left))
-        orbit = settle(flow, np.asarray(x, dtype=float), budget=budget)
-        left -= budget.spent
-        if not any(same(flow, orbit, other) for other in attractors):
-            attractors.append(orbit)
-    return attractors
 
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
@@ -379,7 +473,7 @@ def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
 
 
 def _polish(
-    flow: Flow, run: FlowResult, periods: range = range(1, MAX_PERIOD + 1)
+    flow: Flow, run: FlowResult, periods: Iterable[int] = range(1, MAX_PERIOD + 1)
 ) -> tuple[Orbit | None, int]:
     """Try to turn the end of a settling run into an orbit of one of these periods; also what it
     cost."""
@@ -410,7 +504,7 @@ def _polish(
         radius = float(np.abs(np.linalg.eigvals(monodromy)).max())
         if radius >= 1.0 or (np.abs(x - strobes[-1]) / peak).max() >= NEAR:
             continue
-        turns = int(np.clip(np.log(1e-4) / np.log(max(radius, 1e-3)), 2, CLOSING // n))
+        turns = int(np.clip(np.log(1e-4) / np.log(max(radius, 1e-3)), 2, max(CLOSING // n, 1)))
         cost += turns * n
         if not _closes_in(flow, run, x, turns * n, radius**turns, peak):
             continue

@@ -123,10 +123,13 @@ class Flow:
         stretches = periods * points if stretches is None else stretches
         phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float, order="C")
         plain = points == 1 and not measure and stretches == periods
-        if self._modal is not None and plain and (self.system.continuous or not phi.size):
+        # The fast paths stop at strobes alone; the general one pauses inside a period.
+        short = FAST_PERIOD + FAST_STEP * self.steps_a_period <= SLICE
+        modal = short and plain and (self.system.continuous or not phi.size)
+        if self._modal is not None and modal:
             return self._run_modal(self._modal, x, periods, key, phi, max_events)
         room = 8 + 16 * periods if measure else 0
-        if self._tabulated is not None and self._tabulated.targets.may_enter(key):
+        if short and self._tabulated is not None and self._tabulated.targets.may_enter(key):
             result = self._run_tabulated(
                 self._tabulated,
                 x,

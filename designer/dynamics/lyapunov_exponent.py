@@ -25,6 +25,12 @@ BATCHES = 64
 """Batches of the series: few enough to be long against the motion's memory."""
 
 
+SURE = 4.0
+"""Standard errors that an exponent has to be away from 0 to be told from it."""
+LEAST = 1e-6
+"""Growth per drive period that is never told from 0: less is rounding."""
+
+
 class Bound(NamedTuple):
     """How small the standard error has to become, and how much is run for it."""
 
@@ -39,7 +45,11 @@ class Bound(NamedTuple):
         """Whether a series of growth rates per drive period is enough."""
         if len(rates) < BATCHES:
             return False
-        return batch_error(rates) <= max(self.relative * abs(float(rates.mean())), self.absolute)
+        return self.holds(float(rates.mean()), batch_error(rates), 1.0)
+
+    def holds(self, value: float, error: float, period: float) -> bool:
+        """Whether an exponent per unit of time has a small enough error; period : of the drive."""
+        return error <= max(self.relative * abs(value), self.absolute / period)
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,11 @@ class LyapunovExponent:
         """Standard error of ``value``."""
         return batch_error(self.rates) / self.period
 
+    @property
+    def sign(self) -> int:
+        """1 or -1 where it is surely above or below 0, else 0."""
+        return sign(self.rates)
+
 
 def batch_error(rates: Array) -> float:
     """Standard error of the mean of a stationary series (k,); nan of fewer than two figures.
@@ -80,6 +95,17 @@ def batch_error(rates: Array) -> float:
     off = means - means.mean()
     shared = max(float(off[1:] @ off[:-1]) / count, 0.0)
     return float(np.sqrt((float(off @ off) / (count - 1) + 2.0 * shared) / count))
+
+
+def sign(rates: Array) -> int:
+    """1 or -1 where the mean of a series of growth rates (k,) per drive period is above or below 0
+    by more than ``SURE`` standard errors and ``LEAST``, else 0. On a torus the vector's length only
+    swings, so that batches repeat; then the error is what one term more or less would make."""
+    if len(rates) < 2:
+        return 0
+    mean = float(rates.mean())
+    error = max(batch_error(rates), float(rates.std()) / len(rates))
+    return int(np.sign(mean)) if abs(mean) > max(SURE * error, LEAST) else 0
 
 
 def lyapunov(

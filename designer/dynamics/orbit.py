@@ -14,6 +14,8 @@ from designer.dynamics.counts import Counts, Pairs
 Complex = NDArray[np.complex128]
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
+MOST_COUNTED = 1_000_000
+"""Drive periods or impacts that a stored motion may have."""
 
 
 class OrbitStatus(StrEnum):
@@ -21,6 +23,7 @@ class OrbitStatus(StrEnum):
 
     PERIODIC = "periodic"
     APERIODIC = "aperiodic"
+    QUASI_PERIODIC = "quasi-periodic"
     GRAZING = "grazing"
     CLIPPED = "clipped"
     NOT_SETTLED = "not settled"
@@ -29,9 +32,17 @@ class OrbitStatus(StrEnum):
 
 
 ANSWERS = frozenset(
-    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
+    {
+        OrbitStatus.PERIODIC,
+        OrbitStatus.APERIODIC,
+        OrbitStatus.QUASI_PERIODIC,
+        OrbitStatus.GRAZING,
+        OrbitStatus.CLIPPED,
+    }
 )
 """Statuses that answer the question where no response was wanted."""
+WITHOUT_PERIOD = frozenset({OrbitStatus.APERIODIC, OrbitStatus.QUASI_PERIODIC})
+"""Answers that no n-p-q names."""
 
 
 class Motion:
@@ -52,6 +63,13 @@ class Motion:
     def response(self) -> str:
         """ "n-p-q" of a periodic motion, otherwise its status."""
         return str(self.counts if self.status is OrbitStatus.PERIODIC else self.status)
+
+    @property
+    def countable(self) -> bool:
+        """Whether its numbers are such as a count gives: what is stored may be anything."""
+        counts = (self.n, self.p, self.q, *(side for pair in self.more for side in pair))
+        least = 1 if self.status is OrbitStatus.PERIODIC else 0
+        return self.n >= least and all(0 <= count <= MOST_COUNTED for count in counts)
 
 
 @dataclass(frozen=True)
@@ -99,6 +117,9 @@ class Orbit(Motion):
     """Drive periods that the search cost."""
     more: Pairs = ()
     """Impacts on the upper and the lower stop of each further clearance in n drive periods."""
+    frequencies: tuple[float, ...] = ()
+    """Of a quasi-periodic motion the drive's angular frequency and the second one, per unit of the
+    system's time (``quasi_periodic.frequencies``); () of any other."""
 
     def __post_init__(self) -> None:
         if not len(self.impact_clearances):

@@ -18,7 +18,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import interrupt
 from designer.dynamics import attractors
-from designer.dynamics.attractors import peaks_near, settle
+from designer.dynamics.attractors import followed, peaks_near, settle
 from designer.dynamics.counts import MAX_PERIOD, Pairs
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -39,8 +39,10 @@ SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
 ROOM = 48
 """Impacts on the upper stop per period that are kept at first; more where there are more."""
-SWEPT = Bound(relative=0.1, absolute=CHAOS, periods=4000)
+SWEPT = Bound(relative=0.1, absolute=0.0, periods=4000)
 """Of the exponents of a diagram; a single motion's is measured ten times as closely."""
+WATCHES = 2
+"""How many times the periods of settling chaos is watched for, since it may end."""
 _STATUS = {
     kernel.PERIODIC: OrbitStatus.PERIODIC,
     kernel.APERIODIC: OrbitStatus.APERIODIC,
@@ -74,8 +76,9 @@ class Steady(Motion):
     """What a start leads to."""
 
     status: OrbitStatus
-    """Periodic, aperiodic, not settled or diverged; of a board also clipped (an op-amp is at its
-    limit). Never grazing: a count within rounding of a tangency is given as it was run."""
+    """Periodic, quasi-periodic, aperiodic, not settled or diverged; of a board also clipped (an
+    op-amp is at its limit). Never grazing: a count within rounding of a tangency is given as it was
+    run."""
     n: int
     """Least period in drive periods; 0 unless periodic."""
     p: int
@@ -102,7 +105,7 @@ class Steady(Motion):
     more: Pairs = ()
     """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
     lyapunov_error: float = float("nan")
-    """Standard error of ``lyapunov``; nan unless aperiodic."""
+    """Standard error of ``lyapunov``; nan of a periodic motion."""
     further: tuple[Array, ...] = ()
     """The same as ``velocities`` of each further stop of interest."""
 
@@ -139,8 +142,29 @@ class DrivenSystem:
         if self.tables is None or self.stops != UPPER:
             flow = self.flow()
             with nullcontext() if budget is None else flow.within(budget):
-                return by_flow(flow, x, course, self.stops, budget)
-        return _by_kernel(self.flow, self.tables, self.period, x, course, budget)
+                steady = by_flow(flow, x, course, self.stops, budget)
+        else:
+            steady = _by_kernel(self.flow, self.tables, self.period, x, course, budget)
+        return _outlasting(self.flow, steady, course, budget)
+
+
+def _outlasting(
+    flow: Callable[[], Flow], steady: Steady, course: Course, budget: Budget | None
+) -> Steady:
+    """What is left of chaos after it was watched for ``WATCHES`` times the periods of settling."""
+    if steady.status is not OrbitStatus.APERIODIC:
+        return steady
+    chaos = Orbit(
+        steady.status,
+        start=steady.end,
+        lyapunov=steady.lyapunov,
+        lyapunov_error=steady.lyapunov_error,
+    )
+    later = followed(flow(), chaos, WATCHES * course.settle, budget)
+    if later.status is OrbitStatus.APERIODIC:
+        return replace(steady, periods=steady.periods + later.periods)
+    extremes = (steady.minima, steady.velocities, *steady.further)
+    return _of_orbit(later, steady.end, extremes, steady.periods)
 
 
 def by_flow(
@@ -194,8 +218,9 @@ def _faded(rates: Array) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> tuple[Orbit, Array | None]:
-    """An aperiodic motion with its exponent to ``SWEPT``; also the state that it was left in, if it
-    was a transient. rates : what is known of its growth."""
+    """An aperiodic motion with its exponent to ``SWEPT``, or what it is if that is not surely above
+    0; also the state that it was left in, if its chaos was a transient. rates : what is known of
+    its growth."""
     x, mode = orbit.start, orbit.mode or None
 
     def further(blocks: int) -> Array:
@@ -206,8 +231,11 @@ def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> tuple[Orb
 
     known = until(SWEPT, np.zeros(0) if rates is None else rates, further)
     growth = LyapunovExponent(known, flow.drive.period, x, mode or ())
-    measured = replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
-    return measured, x if _faded(known) else None
+    if _faded(known):
+        return orbit, x
+    if growth.sign <= 0:
+        return settle(flow, x, mode), None
+    return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error), None
 
 
 def _of_orbit(orbit: Orbit, end: Array, extremes: tuple[Array, ...], spent: int) -> Steady:
@@ -299,11 +327,13 @@ def _by_kernel(
     exponent = float(facts[2]) / period, float("nan")
     if code == kernel.APERIODIC:
         plain = growth > CHAOS and course.tangents >= kernel.SPAN  # else it was later that it was
-        value, error, after = _swept_exponent(model, orbit, rates if plain else rates[:0])
+        measured, after = _swept_exponent(model, orbit, rates if plain else rates[:0])
         if after is not None:
             steady = _by_kernel(flow, tables, period, after, course, budget)
             return replace(steady, periods=spent + steady.periods)
-        exponent = value, error
+        if measured.sign <= 0:
+            return _of_orbit(settle(flow(), orbit, budget=budget), strobes[-1], extremes, spent)
+        exponent = measured.value, measured.error
     stopped = code == kernel.STOPPED
     n, p, q = (
         int(counted[place]) if code == kernel.PERIODIC else 0
@@ -328,9 +358,9 @@ def _by_kernel(
 
 def _swept_exponent(
     model: kernel.DrivenModel, x: Array, rates: Array
-) -> tuple[float, float, Array | None]:
-    """Exponent and its error of the chaos through x (4,), of which some rates are known; also the
-    state that it was left in, if it was a transient."""
+) -> tuple[LyapunovExponent, Array | None]:
+    """Exponent of the chaos through x (4,), of which some rates are known; also the state that it
+    was left in, if it was a transient."""
     x, place = x.copy(), np.array([-1, kernel_orbit.DONE])
 
     def further(blocks: int) -> Array:
@@ -340,7 +370,7 @@ def _swept_exponent(
 
     known = until(SWEPT, rates, further)
     growth = LyapunovExponent(known, model.period, x, ())
-    return growth.value, growth.error, x if _faded(known) else None
+    return growth, x if _faded(known) else None
 
 
 def _symmetric(flow: Callable[[], Flow], half: float, x: Array, n: int, peak: Array) -> bool:

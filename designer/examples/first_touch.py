@@ -44,7 +44,7 @@ def first_touches(model: MechanicalModel, omega: float) -> tuple[Touch, ...]:
     wave, rest = _linear_response(system, omega)
     out = []
     for clearance in system.clearances:
-        swing = abs(_in_clearance(system, clearance, wave, moved=True))
+        swing = abs(_in_clearance(system, clearance, wave, system.ground(omega)))
         middle = float(np.real(_in_clearance(system, clearance, rest.astype(complex))))
         for side, stop in clearance.sides:
             room = stop.gap - side * middle
@@ -111,11 +111,11 @@ def _linear_response(system: SecondOrderSystem, omega: float) -> tuple[Complex, 
 
 
 def _in_clearance(
-    system: SecondOrderSystem, clearance: Clearance, wave: Complex, *, moved: bool = False
+    system: SecondOrderSystem, clearance: Clearance, wave: Complex, ground: float = 0.0
 ) -> complex:
-    """The displacement in a clearance. moved : stops that stay where they are see the ground
-    move."""
+    """The displacement in a clearance. ground : its displacement, which stops that stay where they
+    are see."""
     out = complex(system.displacement(clearance) @ wave)
-    if moved and system.fixed_stops and clearance.other is None:
-        out += system.base
+    if system.fixed_stops and clearance.other is None:
+        out += ground
     return out

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import replace
 from functools import cached_property
-from multiprocessing import get_context
 
 from designer.base.defaults import SAMPLES, SEED
+from designer.base.environment import spawn_context
 from designer.base.errors import InputError
 from designer.base.units import format_quantity
 from designer.check import checked_design
@@ -34,7 +34,7 @@ class PartsProcess:
 
     @cached_property
     def _pool(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+        return ProcessPoolExecutor(1, mp_context=spawn_context())
 
     def __call__(self, modelfile: ModelFile) -> Synthesis:
         """``synthesise`` of the file, in that process."""

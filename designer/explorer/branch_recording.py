@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from designer.base.progress import Progress
+from designer.base.si_unit import value_text
 from designer.base.threads import parallel
 from designer.bifurcations import window_ends
 from designer.bifurcations.continuation import End
@@ -27,6 +28,7 @@ from designer.explorer.response_view import (
 )
 from designer.explorer.wire import Message, short_columns
 from designer.model.model_file import ModelFile
+from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
 
 DETAIL = Detail(points=512, fewest=40, most=256, long=12, strobes=120)
@@ -46,22 +48,27 @@ class RecordedWindow:
 
     omega: float
     """Drive frequency of a recorded place that shows the response."""
+    orbit: Orbit
+    """The response there."""
     window: BranchWindow
     """The window, its ends located by continuation."""
+    in_hertz: bool = False
+    """Whether people read the drive frequency in hertz, since it is in rad/s."""
 
     def message(self) -> Message:
         """What the page writes of it."""
-        symmetry = "symmetric" if self.window.symmetric else "asymmetric"
         return {
             "omega": self.omega,
-            "summary": f"{self.window.response}, {symmetry}",
-            "words": f"{_end(self.window.low)} to {_end(self.window.high)}",
+            "summary": summary(self.orbit),
+            "words": f"{self._end(self.window.low)} to {self._end(self.window.high)}",
         }
 
-
-def _end(end: WindowEnd) -> str:
-    why = "end of the slider" if end.why == End.LIMIT else end.why
-    return f"{end.value:.6g} ({why})"
+    def _end(self, end: WindowEnd) -> str:
+        why = "end of the slider" if end.why == End.LIMIT else end.why
+        place = f"{end.value:.6g}"
+        if self.in_hertz:
+            place = value_text(end.value / (2.0 * np.pi), "Hz", 6)
+        return f"{place} ({why})"
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ def record(
     model = modelfile.model
 
     def visit(omega: float) -> tuple[Orbit, Message]:
-        orbit, view = _visit(ModelPlace(model, omega))
+        orbit, view = _visit(ModelPlace(model, omega, in_si=in_si(modelfile.si, model)))
         step()
         return orbit, view
 
@@ -118,7 +125,7 @@ def record(
 
 def _along(control: Control, count: int) -> list[float]:
     """Values along a slider, with the digits that it shows."""
-    return [float(f"{w:.6g}") for w in np.geomspace(control.low, control.high, count)[1:-1]]
+    return [control.rounded(w, 6) for w in np.geomspace(control.low, control.high, count)[1:-1]]
 
 
 def _visit(place: ModelPlace) -> tuple[Orbit, Message]:
@@ -171,9 +178,10 @@ def _window(
     """None where continuation does not follow the orbit."""
     family = ModelSubject(modelfile.model, omega).family(OMEGA)
     try:
-        return RecordedWindow(omega, window(family, orbit, omega, *span))
+        found = window(family, orbit, omega, *span)
     except ArithmeticError:
         return None
+    return RecordedWindow(omega, orbit, found, in_si(modelfile.si, modelfile.model))
 
 
 def _distinct(windows: Sequence[RecordedWindow]) -> list[RecordedWindow]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from designer.base.si_unit import quantity_text
+from designer.base.units import parse_quantity
 from designer.explorer.place import OMEGA, ModelPlace, first_place
 from designer.model.mechanics import MechanicalModel, frequency_range
 from designer.model.model_file import ModelFile
+from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
 
 REACH = 5.0
@@ -40,7 +43,7 @@ class Control:
     label: str
     """What people read."""
     unit: str
-    """Unit of its numbers; "" for none."""
+    """Unit that its numbers are shown in; "" for none."""
     low: float
     """Value at the left end of the slider."""
     high: float
@@ -51,23 +54,50 @@ class Control:
     """Whether equal ways on the slider are equal factors."""
     drive: bool
     """Whether the generator sets it."""
+    scale: float = 1.0
+    """How many of the numbers that are shown are one of the model's."""
+
+    def rounded(self, value: float, digits: int) -> float:
+        """A value of the model that is shown in so many digits."""
+        return float(f"{value * self.scale:.{digits}g}") / self.scale
 
 
 def controls(modelfile: ModelFile) -> tuple[Control, ...]:
     """One for ω, then one for every parameter, those of the drive first."""
     place, subject = first_place(modelfile), ModelSubject(modelfile.model, scales=modelfile.si)
-    units = subject.units
-    each = [_of_omega(modelfile, place, units.get(OMEGA, "")), *_parameters(place.model, units)]
+    each = [_of_omega(modelfile, place, subject), *_parameters(place.model, subject.units)]
     return tuple(sorted(each, key=lambda control: not control.drive))
 
 
-def _of_omega(modelfile: ModelFile, place: ModelPlace, unit: str) -> Control:
+def length_unit(modelfile: ModelFile) -> tuple[str, float]:
+    """The unit that displacements are drawn in, and how many of it are one of the model's length:
+    that of the largest gap, and mm without one; ("", 1) of a model that has no SI values of its
+    own."""
+    if not in_si(modelfile.si, modelfile.model):
+        return "", 1.0
+    clearances = modelfile.model.second_order().clearances
+    gaps = [abs(stop.gap) for clearance in clearances for _, stop in clearance.sides]
+    return _shown_in(max(gaps, default=0.0) or 1e-3, "m")
+
+
+def _shown_in(value: float, unit: str) -> tuple[str, float]:
+    """The unit with a prefix that suits a value, and how many of it are one without."""
+    if not unit:
+        return "", 1.0
+    _, _, shown = quantity_text(value, unit).partition(" ")
+    return shown, 1.0 / parse_quantity(f"1 {shown}", unit)
+
+
+def _of_omega(modelfile: ModelFile, place: ModelPlace, subject: ModelSubject) -> Control:
     own = place.model.second_order().own_frequency
     wanted = [r.omega for r in modelfile.responses if r.omega is not None] or [place.omega]
     least, most = frequency_range(place.model)
     low = max(least, min(LOWEST * own, 0.8 * min(wanted)))
     high = min(most, max(HIGHEST * own, 1.25 * max(wanted)))
-    return Control(OMEGA, LABELS[OMEGA], unit, low, high, place.omega, True, True)
+    si = subject.si.get(OMEGA)
+    if si is None or not si.own_si:
+        return Control(OMEGA, LABELS[OMEGA], "", low, high, place.omega, True, True)
+    return Control(OMEGA, "drive frequency", si.name, low, high, place.omega, True, True, si.scale)
 
 
 def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Control]:
@@ -77,7 +107,8 @@ def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Co
         factor = name == "b" and "b" not in model.units
         label = FACTOR if factor else LABELS.get(name, name)
         drive = name == "b" or name.endswith(".amplitude")
-        yield Control(name, label, units.get(name, ""), low, high, value, logarithmic, drive)
+        unit, scale = _shown_in(value, units.get(name, ""))
+        yield Control(name, label, unit, low, high, value, logarithmic, drive, scale)
 
 
 def _range(value: float, least: float, most: float) -> tuple[float, float, bool]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
 
+from designer.base.environment import python_command
 from designer.base.errors import InputError
 from designer.explorer.wire import Message
 
@@ -82,7 +82,7 @@ class JobProcesses:
             expected = f"at most {MOST_AT_ONCE} jobs at a time; wait for one to end"
             raise InputError(None, verb, "another job", expected)
         folder = _free(model.with_suffix(""), verb)
-        words = [sys.executable, "-m", "designer", verb, str(model), "--out", str(folder)]
+        words = python_command("-m", "designer", verb, str(model), "--out", str(folder))
         process = subprocess.Popen(
             words,
             cwd=model.parent,

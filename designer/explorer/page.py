@@ -13,7 +13,7 @@ from markupsafe import Markup
 from designer.base.html_templates import page_templates
 from designer.base.script_policy import script_source
 from designer.explorer import plots
-from designer.explorer.controls import Control, controls
+from designer.explorer.controls import Control, controls, length_unit
 from designer.explorer.omega_strip import PERIODS
 from designer.explorer.place import OMEGA, first_place
 from designer.explorer.response_view import shown_motions
@@ -80,7 +80,15 @@ def _render(
     if recording is not None:
         motions = motions[: len(recording["views"][0]["motions"])]
     items = plots.items(omega) | (plots.map_item() if recording is None else {})
-    data = _script_text({"plots": items, "recording": recording, "settled_within": PERIODS})
+    unit, scale = length_unit(modelfile)
+    data = _script_text(
+        {
+            "plots": items,
+            "recording": recording,
+            "settled_within": PERIODS,
+            "length": {"unit": unit, "scale": scale},
+        }
+    )
     return (
         _templates()
         .get_template("explore.html.j2")

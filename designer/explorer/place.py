@@ -13,7 +13,7 @@ from designer.base.errors import InputError
 from designer.base.schema import one_of
 from designer.model.mechanics import MechanicalModel, check_omega
 from designer.model.model_file import ModelFile
-from designer.model.si_units import Reader
+from designer.model.si_units import Reader, in_si
 from designer.model.swept_model import ModelSubject
 
 OMEGA, START, SHOWN = "omega", "start", "shown"
@@ -33,6 +33,8 @@ class ModelPlace:
     """State at drive phase 0 from which the motion is followed; () for rest."""
     shown: int = 0
     """Index of the displacement that the plots show (``response_view.shown_motions``)."""
+    in_si: bool = False
+    """Whether the model's numbers are SI values."""
 
     @property
     def state(self) -> Array:
@@ -44,7 +46,8 @@ class ModelPlace:
 def first_place(modelfile: ModelFile) -> ModelPlace:
     """The model file's own values, at the frequency of its first response, or the model's own."""
     omegas = [r.omega for r in modelfile.responses if r.omega is not None]
-    return ModelPlace(modelfile.model, omegas[0] if omegas else _own(modelfile.model))
+    omega = omegas[0] if omegas else _own(modelfile.model)
+    return ModelPlace(modelfile.model, omega, in_si=in_si(modelfile.si, modelfile.model))
 
 
 def read_place(modelfile: ModelFile, words: Mapping[str, object]) -> ModelPlace:
@@ -72,7 +75,8 @@ def read_place(modelfile: ModelFile, words: Mapping[str, object]) -> ModelPlace:
     model = first.model.changed(changes)
     check_omega(OMEGA, omega, model)
     size = 2 * model.second_order().size
-    return ModelPlace(model, omega, _start(words.get(START, ""), size), _shown(words.get(SHOWN, 0)))
+    start, shown = _start(words.get(START, ""), size), _shown(words.get(SHOWN, 0))
+    return ModelPlace(model, omega, start, shown, first.in_si)
 
 
 def words_of(place: ModelPlace) -> dict[str, str]:

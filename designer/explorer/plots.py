@@ -18,7 +18,7 @@ MAP = "map"
 TITLES = {
     "portrait": "phase portrait",
     "trace": "displacement over time",
-    "strip": "bifurcation diagram around the present ω",
+    "strip": "bifurcation diagram around the present drive frequency",
 }
 COLUMNS = {
     "trace": ("t", "x", "v"),
@@ -101,11 +101,13 @@ def _trace(data: dict[str, ColumnDataSource]) -> figure:
 
 def _strip(data: dict[str, ColumnDataSource], omega: Control) -> figure:
     plot = _empty(
-        200, "xpan,xbox_zoom,save,reset", x_range=Range1d(start=omega.low, end=omega.high)
+        200,
+        "xpan,xbox_zoom,save,reset",
+        x_range=Range1d(start=omega.scale * omega.low, end=omega.scale * omega.high),
     )
     plot.scatter("omega", "x", source=data["strip"], color="colour", size=2.5, line_color=None)
     plot.vspan(x="at", source=data["now"], color=STROBE, line_width=1)
-    plot.xaxis.axis_label = f"ω [{omega.unit}]" if omega.unit else "ω"
+    plot.xaxis.axis_label = f"{omega.label} [{omega.unit}]" if omega.unit else "ω"
     plot.yaxis.axis_label = "least x"
     return plot
 

@@ -92,7 +92,7 @@ def _answers(plan: StudyPlan, options: Options, progress: Progress) -> list[Answ
 
 def _summary(response: ModelResponse) -> str:
     shown = "any response" if response.spec.expect is None else str(response.spec.expect)
-    return f"{shown} at ω = {response.omega:.6g}"
+    return f"{shown} at {response.spec.place_text(6)}"
 
 
 def _words(counted: Yield) -> str:

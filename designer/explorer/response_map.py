@@ -22,6 +22,7 @@ from designer.explorer.place import OMEGA, ModelPlace, number_of
 from designer.explorer.response_view import reached, summary
 from designer.explorer.stepped_call import stepped
 from designer.explorer.wire import Message, columns
+from designer.model.model import SiScales
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
 from designer.plots.response_colours import MARKS, palette_legend, response_palette
@@ -76,7 +77,8 @@ class MapRequest:
     @property
     def subject(self) -> ModelSubject:
         """The model at the place."""
-        return ModelSubject(self.place.model, self.place.omega)
+        scales = SiScales() if self.place.in_si else None
+        return ModelSubject(self.place.model, self.place.omega, scales=scales)
 
     @property
     def plan(self) -> MapPlan:
@@ -187,11 +189,7 @@ def _around(control: Control, value: float) -> tuple[float, float]:
     """The ends around a value where nobody says, with the digits that a page shows."""
     reach = REACH * abs(value) or 0.5 * REACH * (control.high - control.low)
     low, high = min(control.low, value), max(control.high, value)
-    return max(low, _rounded(value - reach)), min(high, _rounded(value + reach))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
+    return max(low, control.rounded(value - reach, 4)), min(high, control.rounded(value + reach, 4))
 
 
 def _value(place: ModelPlace, name: str) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.base.si_unit import value_text
 from designer.dynamics.attractors import ENGINE_ERROR, settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -21,9 +22,9 @@ from designer.model.driven import model_flow
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.relative_motion import (
     RelativeMotion,
+    mass_motion,
     relative_motions,
     state_labels,
-    subscripted,
 )
 
 STEPS = 4_000_000
@@ -73,19 +74,13 @@ def shown_motions(system: SecondOrderSystem) -> tuple[ShownMotion, ...]:
         ShownMotion(motion, k if system.clearances else None)
         for k, motion in enumerate(relative_motions(system))
     ]
-    rows = [each.motion.row.tolist() for each in gaps if not system.base]
+    rows = [each.motion.row.tolist() for each in gaps if not system.ground_moves]
     masses = [
-        ShownMotion(_of_mass(system, mass), None)
+        ShownMotion(mass_motion(system, mass), None)
         for mass in range(system.size)
         if np.eye(system.size)[mass].tolist() not in rows
     ]
     return (*gaps, *masses)
-
-
-def _of_mass(system: SecondOrderSystem, mass: int) -> RelativeMotion:
-    name = system.names[mass] if system.names else ""
-    row = np.eye(system.size)[mass]
-    return RelativeMotion(subscripted(f"x{mass + 1}"), name, row, system.base, ())
 
 
 @dataclass(frozen=True)
@@ -212,12 +207,16 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):
-            rows.append((name, f"{low:.4g} … {high:.4g}"))
+            rows.append((name, f"{_length(low, place, 4)} … {_length(high, place, 4)}"))
     if np.isfinite(orbit.penetration):
-        rows.append(("shallowest contact", f"{orbit.penetration:.3g}"))
+        rows.append(("shallowest contact", _length(orbit.penetration, place, 3)))
     if np.isfinite(orbit.miss):
-        rows.append(("nearest miss", f"{orbit.miss:.3g}"))
+        rows.append(("nearest miss", _length(orbit.miss, place, 3)))
     return rows
+
+
+def _length(value: float, place: ModelPlace, digits: int) -> str:
+    return value_text(value, "m", digits) if place.in_si else f"{value:.{digits}g}"
 
 
 def multipliers_text(multipliers: Sequence[complex] | np.ndarray) -> str:

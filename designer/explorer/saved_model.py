@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from designer.base import atomic_write
 from designer.base.errors import InputError
-from designer.base.guarded_reading import parse_toml
+from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
+from designer.base.units import restated, shortest
 from designer.dynamics.counts import Counts
 from designer.explorer.place import ModelPlace, read_place
 from designer.model.find_responses import find
 from designer.model.lumped_system import LumpedSystem
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.model_file import ModelFile, parse_model_file
-from designer.model.si_units import MECHANICAL_UNITS, in_si
+from designer.model.si_units import MECHANICAL_UNITS, angular_frequency, in_si
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}")
 """What a file may be called: one name, without a folder."""
@@ -81,7 +83,8 @@ def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedRes
     _put_values(data, modelfile, place)
     own = parse_model_file(toml_text(data)).model.b
     if pins:
-        data["response"] = [_table(pin, own) for pin in pins]
+        key = _frequency_key(data.get("response", ()), modelfile.si)
+        data["response"] = [_table(pin, own, key, modelfile.si) for pin in pins]
     text = f"# Saved by designer explore from {_one_line(modelfile.title)}\n{toml_text(data)}"
     parse_model_file(text)
     return text
@@ -91,8 +94,25 @@ def _one_line(title: str) -> str:
     return "".join(ch if ch.isprintable() else " " for ch in title)
 
 
-def _table(pin: PinnedResponse, own: float) -> dict[str, Any]:
-    table: dict[str, Any] = {"omega": pin.omega, "expect": pin.expect}
+def _frequency_key(responses: Sequence[Mapping[str, Any]], si: SiScales | None) -> str:
+    """How a file gives frequencies: by the key of its first response. One in SI that has none is
+    given hertz."""
+    keys = ("omega", "Omega", "frequency")
+    own = (key for response in responses for key in keys if key in response)
+    return next(own, "omega" if si is None else "frequency")
+
+
+def _table(pin: PinnedResponse, own: float, key: str, si: SiScales | None) -> dict[str, Any]:
+    value: float | str = pin.omega
+    if si is not None and key == "frequency":
+
+        def read(text: str) -> float:
+            return si.omega(angular_frequency(text))
+
+        value = shortest(read, pin.omega, si.hertz(pin.omega), " Hz")
+    elif si is not None and key == "Omega":
+        value = 2.0 * math.pi * si.hertz(pin.omega)
+    table: dict[str, Any] = {key: value, "expect": pin.expect}
     return table if pin.b == own else {**table, "b": pin.b}
 
 
@@ -106,7 +126,7 @@ def _put_values(data: dict[str, Any], modelfile: ModelFile, place: ModelPlace) -
             if name != "b":
                 table, index, key = model.places[name]
                 entry = data[table] if index is None else data[table][index]
-                entry[key] = _with_unit(new.parameter(name), units.get(name, ""))
+                entry[key] = _with_unit(new.parameter(name), units.get(name, ""), entry.get(key))
     elif modelfile.mechanical is None:
         data["model"] |= {name: new.parameter(name) for name in changed}
     elif changed:
@@ -120,18 +140,21 @@ def _put_si(table: dict[str, Any], old: Mechanical, model: Dimensionless) -> Non
     for name, unit in MECHANICAL_UNITS.items():
         value = float(getattr(new, name))
         if abs(value - getattr(old, name)) > 1e-12 * abs(value):
-            table[name] = _with_unit(value, unit)
+            table[name] = _with_unit(value, unit, table.get(name))
 
 
-def _with_unit(value: float, unit: str) -> float | str:
-    return f"{value!r} {unit}" if unit else value
+def _with_unit(value: float, unit: str, old: object) -> float | str:
+    """As the file writes it: in the unit and prefix of its text; a plain number with the unit."""
+    if not unit:
+        return value
+    return restated(value, unit, old if isinstance(old, str) else f"1 {unit}")
 
 
 def not_found(modelfile: ModelFile) -> list[str]:
     """The wanted responses that the model does not show, such as "1-2-2 at ω = 0.85"."""
     wanted = [r for r in modelfile.responses if r.omega is not None and not isinstance(r.b, tuple)]
     return [
-        f"{each.expected} at ω = {each.omega:.6g}"
+        f"{each.expected} at {each.spec.place_text(6)}"
         for each in find(modelfile.model, wanted)
         if not each.found
     ]

@@ -39,7 +39,8 @@ PORT = 8610
 MOST_PORT = 65_535
 LOOPBACK = "127.0.0.1"
 LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
-"""Addresses that no other machine reaches, and names by which a browser may call them."""
+"""Addresses that no other machine reaches; written as in an address (``_written``), the names by
+which a browser may call them."""
 LARGEST = 65_536
 """Bytes of one message from a page."""
 POLICY = (
@@ -163,6 +164,7 @@ def explore(
 
     def started() -> None:
         progress.note(f"{address} shows {modelfile.title}; Ctrl-C ends it")
+        progress.idle()
         if browser:
             webbrowser.open(address)
         ready(address)
@@ -213,8 +215,12 @@ def _listening(host: str, port: int | None) -> socket.socket:
 
 
 def _address(host: str, port: int, token: str) -> str:
-    shown = f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+    return f"http://{_written(host)}:{port}/" + (f"?token={token}" if token else "")
+
+
+def _written(host: str) -> str:
+    """A host as it stands in an address and in the header Host: IPv6 in brackets."""
+    return f"[{host}]" if ":" in host else host
 
 
 async def _serve(explorer: Explorer, listening: socket.socket, started: Callable[[], None]) -> None:
@@ -238,7 +244,7 @@ class _Guarded(RequestHandler):
     def prepare(self) -> None:
         """Refuse a name that another site gave this machine, and a page without the token."""
         name = self.request.host_name
-        if self.explorer.local and name not in LOCAL:
+        if self.explorer.local and name not in map(_written, LOCAL):
             raise HTTPError(403, "this server is asked under another name than it has")
         if not self.open_to_all and not self._knows():
             raise HTTPError(403, "the address needs ?token=… as the terminal shows it")

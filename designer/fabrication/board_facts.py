@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from designer.base.errors import InputError
 from designer.base.sexpr import Expression, read
 from designer.board.kicad_reader import BoardFile
+from designer.board.outline import LAYER
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,22 @@ class BoardFacts:
     """Parts that are soldered through holes."""
 
 
+def check_edge(board: BoardFile) -> None:
+    """Whether a board has an edge that a maker can mill.
+
+    Raises
+    ------
+    InputError : it has none, or one that is not closed.
+    """
+    found = None if len(board.outline.sides) else "no edge"
+    if (at := board.outline.open_at) is not None:
+        found = f"an edge that is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)"
+    if found is not None:
+        raise InputError(board.path, LAYER, found, f"a closed line on {LAYER}")
+
+
 def board_facts(board: BoardFile) -> BoardFacts:
-    """The figures of a board with an edge.
+    """The figures of a board with an edge (``check_edge``).
 
     Raises
     ------

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import parse_toml, read_text
+from designer.base.guarded_reading import read_text
 from designer.base.schema import (
     FIRST_FORMAT,
     FileTable,
@@ -25,6 +25,7 @@ from designer.base.schema import (
     number,
     one_of,
 )
+from designer.base.toml_reader import parse_toml
 from designer.catalog.read import FABS
 
 PositionField = Literal["reference", "value", "package", "x", "y", "rotation", "side"]

@@ -14,8 +14,10 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from designer.base.guarded_reading import UNREADABLE
 from designer.base.keyed_store import Lines, Note, quiet
 from designer.base.plain_json import plain
+from designer.base.record_check import checked_record
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rung_errors import RungError, Truth
 from designer.fidelity.yields import Tally
@@ -65,7 +67,25 @@ def read_pieces(path: Path, key: str, note: Note = quiet) -> dict[str, dict[str,
 
     note : told of the others, which are made again.
     """
-    return _lines(key).load(path, note)
+    pieces = _lines(key).load(path, note)
+    fine = {name: piece for name, piece in pieces.items() if _may_be(name, piece)}
+    if len(fine) < len(pieces):
+        note(f"{path}: {len(pieces) - len(fine)} that are no pieces of a trade, computed again")
+    return fine
+
+
+def _may_be(name: str, piece: Mapping[str, Any]) -> bool:
+    """Whether a piece is such as ``rungs`` or ``tally`` read."""
+    try:
+        if name.startswith("rungs "):
+            rungs(piece)
+            return _number(piece["elapsed"]) >= 0.0
+        counts = {k: v for k, v in asdict(tally(piece)).items() if isinstance(v, int)}
+    except UNREADABLE:
+        return False
+    counts.pop("runs", None)
+    boards = all(0 <= count <= CHUNK for count in counts.values())
+    return boards and _number(piece["elapsed"]) >= 0.0
 
 
 def _lines(key: str) -> Lines:
@@ -92,38 +112,40 @@ def rungs(
     return (
         tuple(_compared(row) for row in piece["rows"]),
         _truth(piece["truth"]),
-        None if settings is None else SolverSettings(**settings),
+        None if settings is None else checked_record(SolverSettings, settings),
         _number(piece["seconds"]),
     )
 
 
 def tally(piece: Mapping[str, Any]) -> Tally:
     """Counts of a piece of boards."""
-    return Tally(**{f.name: piece[f.name] for f in fields(Tally)})
+    return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
 
 
 def _compared(row: Mapping[str, Any]) -> RungError:
-    return RungError(
-        **{
+    return checked_record(
+        RungError,
+        {
             **row,
-            "label": ResponseLabel(**row["label"]),
+            "label": checked_record(ResponseLabel, row["label"]),
             "seconds": _number(row["seconds"]),
             "error": {of: _number(v) for of, v in row["error"].items()},
             "velocity": {of: _number(v) for of, v in row["velocity"].items()},
             "numerical": _number(row["numerical"]),
             "convergence": _number(row["convergence"]),
-        }
+        },
     )
 
 
 def _truth(piece: Mapping[str, Any]) -> Truth:
-    return Truth(
-        **{
+    return checked_record(
+        Truth,
+        {
             **piece,
-            "label": ResponseLabel(**piece["label"]),
+            "label": checked_record(ResponseLabel, piece["label"]),
             "error": _number(piece["error"]),
             "velocity": _number(piece["velocity"]),
-        }
+        },
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer, Truths
 from designer.verdicts.exact_rung import images, waveform_error
@@ -150,7 +150,7 @@ def _speeds(orbit: Orbit, clearance: int, side: float) -> Array:
 def alike(first: Orbit, second: Orbit) -> bool:
     """Whether two orbits are the same n-p-q, either twin; both without a period are alike too."""
     if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
-        return first.status is second.status and first.status is OrbitStatus.APERIODIC
+        return first.status in WITHOUT_PERIOD and second.status in WITHOUT_PERIOD
     return first.counts.family == second.counts.family
 
 

@@ -31,7 +31,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.fidelity import runge_kutta, system_runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.kernels.kernel_boards import POINTS
@@ -44,7 +44,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import RUNGS as SPICE_RUNGS
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import Read, Reading, clearance_rows, read
+from designer.spice.read_orbit import Read, Reading, clearance_rows, name_in_ngspice, read
 from designer.spice.simulator import SimulationFailed, Waveforms
 
 Run = Read | SimulationFailed
@@ -379,12 +379,12 @@ def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
     if len(read) < 3 or isinstance(own, SimulationFailed):
         return False
     exact, orbit = subject.orbit, own.orbit
-    if orbit.status not in (OrbitStatus.PERIODIC, OrbitStatus.APERIODIC):
+    if orbit.status is not OrbitStatus.PERIODIC and orbit.status not in WITHOUT_PERIOD:
         return False
     if len({run.orbit.response for run in read}) > 1:
         return False
     ideal = subject.rung == "ideal"
-    if ideal and orbit.response != exact.response:
+    if ideal and orbit.response != name_in_ngspice(exact.response):
         return False
     if orbit.status is not OrbitStatus.PERIODIC:
         return True  # there is no strobe and no wave to compare

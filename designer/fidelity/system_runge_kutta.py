@@ -46,7 +46,7 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
         along = system.displacement(stop)
         force = np.zeros(size)
         force[1::2] = along / system.mass
-        moves = system.base if system.fixed_stops and stop.other is None else 0.0
+        moves = system.ground(omega) if system.fixed_stops and stop.other is None else 0.0
         rate = np.zeros(size)
         rate[1::2] = along
         for side, spring in stop.sides:

@@ -15,6 +15,7 @@ from .design_files import (
 )
 from .design_source import (
     bills_are_of_old as bills_are_of_old,
+    design_answer as design_answer,
     design_inputs as design_inputs,
     design_inputs_of as design_inputs_of,
     design_stage as design_stage,
@@ -59,6 +60,10 @@ from .sweep_store import (
     SweepStore as SweepStore,
     work_hash as work_hash,
     write_sweep as write_sweep,
+)
+from .sweep_tables import (
+    points_csv as points_csv,
+    windows_csv as windows_csv,
 )
 from .work_files import (
     WorkFiles as WorkFiles,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
@@ -66,12 +67,19 @@ def setup_csv(
             "amplitude_vpp": repr(2.0 * float(volts(s.amplitude_v_peak))),
             "offset_v": repr(s.offset_v),
             "load": LOAD,
-            "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
+            "start": _start(recipe, si) + _coexisting(r),
             **({} if si is None else {MECHANISM: hertz(si.hertz(s.omega))}),
         }
         for s, omega, r, recipe in zip(bench_settings, omegas, responses, recipes, strict=True)
     ]
     return csv_text(COLUMNS if si is None else (*COLUMNS, MECHANISM), rows)
+
+
+def _start(recipe: Recipe | None, si: SiScales | None) -> str:
+    """A recipe in words, its frequencies also as those of the mechanism."""
+    if recipe is None:
+        return NO_RECIPE
+    return (recipe if si is None else replace(recipe, hertz_scale=si.hertz(1.0))).text
 
 
 def start_recipes(synthesis: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:

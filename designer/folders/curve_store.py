@@ -69,8 +69,9 @@ class CurveBlocks:
 
     def read(self, block: int) -> list[BorderCurve] | None:
         """The curves of a finished block of this very work, or None."""
-        rows = self.files.read(self.name(block), _FORM, block=block)
-        return None if rows is None else [read_curve(row) for row in rows]
+        return self.files.read(
+            self.name(block), _FORM, lambda rows: list(map(read_curve, rows)), block=block
+        )
 
     def write(self, block: int, curves: Sequence[BorderCurve]) -> None:
         """Keep a finished block, a row a curve."""

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
-from designer.base.defaults import cores
 from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
+from designer.base.progress import doing
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import circuit_notes, first_run
-from designer.check.synthesis_result import Synthesis
+from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit import build
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
@@ -27,9 +27,11 @@ from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.fabrication.board_cost import cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes
+from designer.folders.design_findings import findings
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
 from designer.linear_network.milp import SOLVER
+from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import find, peaks
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming
@@ -47,26 +49,31 @@ def check(modelfile: ModelFile, catalog: Catalog) -> None:
 
 
 def texts(synthesis: Synthesis) -> dict[str, str]:
-    """Every file of the design stage but ``design.json``; made before the folder is touched."""
+    """Every file of the design stage but ``setup.csv`` and ``design.json``; made before the folder
+    is touched."""
     modelfile, design = synthesis.modelfile, synthesis.design
     return {
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(synthesis),
-        SETUP: setup_csv(
-            design, synthesis.model_responses, start_recipes(synthesis, cores()), modelfile.si
-        ),
         "scales.csv": scales_csv(modelfile, design, synthesis.model_responses),
         **board_files.texts(synthesis),
     }
 
 
 def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:
-    """Write the stage. files : its ``texts``."""
+    """Write what is known without a look at how the circuit moves. files : ``texts``."""
     for name, text in files.items():
         folder.write(name, text)
     folder.write(board_files.PICTURE, board_files.picture(synthesis))
     if synthesis.modelfile.measured is not None:
         folder.write(MEASURED, synthesis.modelfile.measured.content)
+
+
+def write_last(folder: Folder, synthesis: Synthesis, jobs: int) -> None:
+    """Write the rest of the stage: how to start each response, and ``design.json``."""
+    design, responses = synthesis.design, synthesis.model_responses
+    recipes = start_recipes(synthesis, jobs)
+    folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
     folder.write(DESIGN, dumps(answer(synthesis)))
 
 
@@ -89,7 +96,11 @@ def answer(synthesis: Synthesis) -> dict[str, Any]:
         synthesis.seconds,
         better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
     )
-    return {**document, "board_cost": None if cost is None else cost.as_dict()}
+    if synthesis.stage_reason:
+        document["dead_zone"]["reason"] = synthesis.stage_reason
+    document |= {"board_cost": None if cost is None else cost.as_dict()}
+    doing("design rules of the circuit")
+    return document | findings(synthesis)
 
 
 def design_provenance(synthesis: Synthesis) -> dict[str, Any]:
@@ -102,6 +113,9 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     Nothing is chosen again; the errors are computed afresh and must be those that were written.
     """
     document, file = folder.json(DESIGN), folder / DESIGN
+    stage = document.get("dead_zone") or {}
+    if isinstance(stage, Mapping) and stage.get("kind") in get_args(DeadZone):
+        modelfile = with_stage(modelfile, stage["kind"])
     model, spec = modelfile.model, modelfile.circuit
     responses = find(model, modelfile.responses)
     catalog = modelfile.choices(catalog)
@@ -139,7 +153,8 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             checks=tuple(ConditionCheck(**check) for check in listed["checked"]),
             binding=dict(listed["binding"]),
         )
-    return Synthesis(modelfile, catalog, responses, design)
+    reason = str(stage.get("reason", "")) if isinstance(stage, Mapping) else ""
+    return Synthesis(modelfile, catalog, responses, design, stage_reason=reason)
 
 
 def _size(value: object, file: Path, name: str) -> float:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
-from designer.base.manifest import Stages
+from designer.base.manifest import Stages, object_hash
+from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files
 from designer.folders.design_files import load
+from designer.folders.design_findings import FINDINGS, findings
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, read_model_file
 from designer.spread.part_grades import once_otherwise
@@ -79,6 +82,22 @@ def read_design(
     if progress is not None:
         standing_design(folder, modelfile, catalog, progress)
     return load(folder, modelfile, catalog)
+
+
+def design_answer(folder: Folder) -> dict[str, Any]:
+    """The JSON object of a folder's design; with the findings that older versions did not write,
+    judged now."""
+    document = folder.json(DESIGN)
+    if document.keys() >= FINDINGS:
+        return document
+    return document | _findings(folder.path, object_hash(document))
+
+
+@lru_cache(maxsize=4)
+def _findings(path: Path, _hash: str) -> dict[str, Any]:
+    """Of a design that was written without them; a run asks more than once."""
+    found: dict[str, Any] = plain(findings(read_design(path)))
+    return found
 
 
 def design_inputs_of(folder: Folder) -> dict[str, Any]:

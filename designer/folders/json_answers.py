@@ -75,7 +75,7 @@ def synthesis_json(
             }
             for s, r in zip(settings(design, responses), responses, strict=True)
         ],
-        "dead_zone": _dead_zone(modelfile, design),
+        "dead_zone": _dead_zone(design),
         "distinct_values": design.distinct_values,
         "conditions": _conditions(design),
         "solver": design.solver,
@@ -151,8 +151,8 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
     orbit = (simulated.orbit, *simulated.others)[number]
     twin = _twin_json(simulated.twins[number] if simulated.twins else None)
     if not simulated.masses:
-        return {**orbit_json(orbit, si), "twin": twin}
-    answer = orbit_json(orbit)
+        return {**orbit_json(orbit, si), **_frequencies_hz(orbit, si), "twin": twin}
+    answer = {**orbit_json(orbit), **_frequencies_hz(orbit, si)}
     is_known = simulated.absolute and len(simulated.absolute[number])
     x = simulated.absolute[number][0::2] if is_known else None
     low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
@@ -161,11 +161,21 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x1_min": None if low is None else low[0],
         "x_max": high,
         "x_min": low,
+        **_from_base(simulated, orbit),
         "twin": twin,
     }
     for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
         impact["clearance"] = simulated.clearances[stop]
     return answer
+
+
+def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
+    """Extremes of the displacements from a base that moves, and its amplitude."""
+    if not simulated.base:
+        return {}
+    z = orbit.extremes[0::2] if len(orbit.extremes) else None
+    low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
+    return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
 
 
 def _by_state(values: Array) -> dict[str, Any]:
@@ -180,8 +190,17 @@ def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
     return {} if si is None else {"frequency_hz": si.hertz(omega)}
 
 
+def _frequencies_hz(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:
+    """The two frequencies of a quasi-periodic motion in Hz; nothing of any other motion, nor of a
+    dimensionless model."""
+    if si is None or not orbit.frequencies:
+        return {}
+    return {"frequencies_hz": [si.hertz(omega) for omega in orbit.frequencies]}
+
+
 def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
-    """An orbit in model units; with ``si`` also its extremes and impacts in SI units."""
+    """An orbit in model units; with ``si`` also its extremes and impacts in SI units. frequencies :
+    of a quasi-periodic motion the drive's ω and the second one."""
 
     is_known = len(orbit.extremes) > 0
     impacts = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
@@ -206,6 +225,7 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
         "multipliers": list(orbit.multipliers.astype(complex)),
         "lyapunov": orbit.lyapunov,
         "lyapunov_error": orbit.lyapunov_error,
+        "frequencies": list(orbit.frequencies) or None,
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
@@ -246,13 +266,13 @@ def _limit(circuit: Circuit) -> float:
     return circuit.output_limits().get(switches[0], circuit.saturation)
 
 
-def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
+def _dead_zone(design: Design) -> dict[str, Any] | None:
     if not design.circuit.stops:
         return None
     errors = design.errors
     slopes = [error for name, error in errors.errors.items() if "stop slope" in name]
     return {
-        "kind": modelfile.circuit.dead_zone,
+        "kind": "rectifier" if design.circuit.diodes else "saturation",
         "saturation": _limit(design.circuit),
         "threshold": errors.scales.threshold,
         "threshold_lower": errors.scales.threshold_lower,

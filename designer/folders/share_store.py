@@ -9,7 +9,8 @@ from typing import Any
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.parquet_entry import ParquetForm
+from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.record_check import checked_record
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares, SharePlan, Step
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders.work_files import WorkFiles
@@ -50,13 +51,14 @@ class ShareBlocks:
 
     def read(self, block: int) -> list[Step] | None:
         """The steps of a finished block of this very work, or None."""
-        rows = self.files.read(self.name(block), self._form, block=block)
-        if rows is None:
-            return None
-        steps: dict[float, list[AttractorShare]] = {}
-        for row in map(dict, rows):
-            steps.setdefault(row.pop(self.parameter), []).append(_read(row))
-        return [tuple(step) for step in steps.values()]
+
+        def steps(rows: Rows) -> list[Step]:
+            by_value: dict[float, list[AttractorShare]] = {}
+            for row in map(dict, rows):
+                by_value.setdefault(row.pop(self.parameter), []).append(_read(row))
+            return [tuple(step) for step in by_value.values()]
+
+        return self.files.read(self.name(block), self._form, steps, block=block)
 
     def write(self, block: int, values: Sequence[float], steps: Sequence[Step]) -> None:
         """Keep a finished block."""
@@ -76,7 +78,7 @@ def _read(row: dict[str, Any]) -> AttractorShare:
     row["status"] = OrbitStatus(row["status"])
     for key in ("more", "strobes"):
         row[key] = tuple(map(tuple, row[key]))
-    return AttractorShare(**row)
+    return checked_record(AttractorShare, row)
 
 
 def shares_csv(shares: BasinShares) -> str:

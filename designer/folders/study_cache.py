@@ -22,6 +22,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
+from designer.base.parquet_entry import MOST_BYTES
+from designer.base.record_check import checked_record
 from designer.base.seal import BLANK
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.deck import SolverSettings
@@ -108,10 +110,16 @@ class _Npz:
         return stream.getvalue()
 
     def decode(self, content: bytes) -> tuple[Mapping[str, Any], _Items]:
+        with ZipFile(io.BytesIO(content)) as packed:
+            if sum(member.file_size for member in packed.infolist()) > MOST_BYTES:
+                raise ValueError(f"more than {MOST_BYTES} bytes")
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            head = json.loads(str(archive[_ITEMS]))  # nan is a number here
-            items = {name: (key, _decoded(v, archive)) for name, (key, v) in head[_ITEMS].items()}
-            return head, items
+            arrays = dict(archive)  # each once, however often an item names it
+        head = json.loads(str(arrays[_ITEMS]))  # nan is a number here
+        items = {name: (key, _decoded(v, arrays)) for name, (key, v) in head[_ITEMS].items()}
+        if not all(isinstance(key, str) for key, _ in items.values()):
+            raise TypeError("a key that is no text")
+        return head, items
 
 
 def _plain(value: Any, arrays: list[Array]) -> Any:
@@ -133,7 +141,7 @@ def _plain(value: Any, arrays: list[Array]) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be stored")
 
 
-def _decoded(value: Any, archive: Mapping[str, Any]) -> Any:
+def _decoded(value: Any, arrays: Mapping[str, Any]) -> Any:
     """The value that ``_plain`` encoded."""
     if not isinstance(value, dict):
         return value
@@ -141,8 +149,10 @@ def _decoded(value: Any, archive: Mapping[str, Any]) -> Any:
     if kind == "word":
         return _WORDS[content[0]](content[1])
     if kind == "record":
-        named = {name: _decoded(v, archive) for name, v in content[1].items()}
-        return _RECORDS[content[0]](**named)
+        named = {name: _decoded(v, arrays) for name, v in content[1].items()}
+        return checked_record(_RECORDS[content[0]], named)
     if kind == "array":
-        return archive[f"array{content}"]
-    return tuple(_decoded(v, archive) for v in content)
+        return arrays[f"array{content}"]
+    if kind == "tuple":
+        return tuple(_decoded(v, arrays) for v in content)
+    raise ValueError(f"a value of kind {kind!r}")

@@ -13,9 +13,10 @@ import numpy as np
 import pyarrow as pa
 
 from designer.base.arrays import Array
-from designer.base.parquet_entry import ParquetForm
+from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.record_check import checked_record
 from designer.bifurcations.parameter_map import MapCell
-from designer.bifurcations.sweep import Sweep
+from designer.bifurcations.sweep import BLOCK, Sweep
 from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Steady
 from designer.folders.work_files import WorkFiles
@@ -65,12 +66,12 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
         for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
     ]
     files = WorkFiles(path.parent, work_hash(sweep.plan.as_dict()), provenance)
-    files.write(path.name, _sweep_form(parameter), rows)
+    files.write(path.name, _sweep_form(parameter, len(rows)), rows)
 
 
-def _sweep_form(parameter: str) -> ParquetForm:
+def _sweep_form(parameter: str, most: int) -> ParquetForm:
     schema = pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
-    return ParquetForm(schema, _FURTHER)
+    return ParquetForm(schema, _FURTHER, most)
 
 
 def _rows(
@@ -91,6 +92,13 @@ def _named(row: Mapping[str, Any]) -> dict[str, Any]:
     return {"status": OrbitStatus(row["status"]), "more": more}
 
 
+def _numbers(values: Sequence[float]) -> Array:
+    """An array of a list; TypeError where a value is missing."""
+    if None in values:
+        raise TypeError("a list with nothing in a place")
+    return np.array(values, dtype=float)
+
+
 @dataclass(frozen=True)
 class SweepStore:
     """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in a folder."""
@@ -107,23 +115,25 @@ class SweepStore:
 
     def read(self, track: str, block: int) -> list[Steady] | None:
         """The steps of a finished block of this very work, or None."""
-        form = _sweep_form(self.parameter)
-        rows = self.files.read(self.name(track, block), form, track=track, block=block)
-        if rows is None:
-            return None
+        form = _sweep_form(self.parameter, BLOCK)
+        name = self.name(track, block)
+        return self.files.read(name, form, self._steps, track=track, block=block)
+
+    def _steps(self, rows: Rows) -> list[Steady]:
         out = []
         for row in map(dict, rows):
             del row["track"], row[self.parameter]
             row.update(_named(row))
             for key in ("start", "end", "minima", "velocities"):
-                row[key] = np.array(row[key], dtype=float)
-            row["further"] = tuple(np.array(v, dtype=float) for v in row.get("further") or ())
-            out.append(Steady(**row))
+                row[key] = _numbers(row[key])
+            row["further"] = tuple(map(_numbers, row.get("further") or ()))
+            out.append(checked_record(Steady, row))
         return out
 
     def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
-        rows, form = _rows(self.parameter, track, values, steps), _sweep_form(self.parameter)
+        rows = _rows(self.parameter, track, values, steps)
+        form = _sweep_form(self.parameter, BLOCK)
         self.files.write(self.name(track, block), form, rows, track=track, block=block)
 
 
@@ -151,16 +161,19 @@ class GridStore:
 
     def read(self, row: int) -> list[MapCell] | None:
         """The cells of a finished row of this very work, or None."""
-        rows = self.files.read(self.name(self.kind, row), self._form, row=row)
-        if rows is None or len(rows) != len(self.xs):
-            return None
-        out = []
-        for each in map(dict, rows):
-            del each[self.x], each[self.y]
-            each.update(_named(each))
-            each["strobe"] = tuple(each["strobe"])
-            out.append(MapCell(**each))
-        return out
+
+        def cells(rows: Rows) -> list[MapCell]:
+            out = []
+            for each in map(dict, rows):
+                del each[self.x], each[self.y]
+                each.update(_named(each))
+                each["strobe"] = tuple(each["strobe"])
+                out.append(checked_record(MapCell, each))
+            if [(cell.i, cell.j) for cell in out] != [(row, j) for j in range(len(self.xs))]:
+                raise ValueError("cells of other places")
+            return out
+
+        return self.files.read(self.name(self.kind, row), self._form, cells, row=row)
 
     def write(self, row: int, cells: list[MapCell]) -> None:
         """Keep a finished row."""
@@ -182,4 +195,4 @@ class GridStore:
                 ("strobe", pa.list_(pa.float64())),
             ]
         )
-        return ParquetForm(schema, _MORE)
+        return ParquetForm(schema, _MORE, len(self.xs))

@@ -6,15 +6,16 @@ all, and one that was damaged since is not taken (``base.keyed_store``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
 from designer.base.parquet_entry import ParquetForm, Rows
 
 FORMAT = 1
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,12 @@ class WorkFiles:
     noted: set[str] = field(default_factory=set)
     """Names of blocks that ``note`` was told of."""
 
-    def read(self, name: str, form: ParquetForm, **place: str | int) -> Rows | None:
-        """The rows of a finished block of this very work, or None. place : of it in the work."""
-        return self._store(form).read(name, self._key(place))
+    def read(
+        self, name: str, form: ParquetForm, make: Callable[[Rows], Made], **place: str | int
+    ) -> Made | None:
+        """What ``make`` makes of the rows of a finished block of this very work (as of
+        ``KeyedStore.read_as``), or None. place : of the block in the work."""
+        return self._store(form).read_as(name, self._key(place), make)
 
     def write(self, name: str, form: ParquetForm, rows: Rows, **place: str | int) -> None:
         """Keep a finished block.

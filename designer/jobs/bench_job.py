@@ -30,6 +30,7 @@ from designer.workbench.free_decay import FreeDecay, recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.overlay import Overlay, overlaid
 from designer.workbench.prediction import BoardPrediction
+from designer.workbench.record import RecordedMotion
 from designer.workbench.record_formats import read_record
 from designer.workbench.spread_estimate import estimated_spread, measured_list
 
@@ -153,6 +154,8 @@ def bench(
     names = _names(files)
     lists = [LIST] if boards else []
     _check(path, files, place, (*names, *lists), overwrite)
+    if omega is not None and not 0.0 < omega < math.inf:
+        raise InputError(None, "--omega", omega, "a frequency above 0")
     if boards and len(files) > 1 and len({_board(file, True) for file in files}) == 1:
         found, expected = "all records in one folder", "a folder for each board, with its name"
         raise InputError(None, "--boards", found, f"{expected}; --fit takes them as of one board")
@@ -161,16 +164,21 @@ def bench(
     prediction = BoardPrediction(synthesis)
     scales = synthesis.design.errors.scales
     frequency = None if omega is None else scales.frequency(omega)
+    _check_decays(files, decays, boards)
+    read = [read_record(file) for file in files]
+    motions = [
+        recorded_motion(each, prediction, frequency=frequency, told=channels) for each in read
+    ]
+    free = _free_decays(decays, files, motions, prediction, boards)
     benched = []
-    for file in files:
+    for file, motion in zip(files, motions, strict=True):
         progress.stage(f"record {file.name}")
-        motion = recorded_motion(read_record(file), prediction, frequency=frequency, told=channels)
         name = named(motion, prediction)
-        setting = _setting(motion.frequency, prediction)
+        setting = _setting(name.motion.frequency, prediction)
         benched.append(BenchedRecord(file, name, overlaid(name, prediction), setting))
     fitted: dict[str, FittedBoard] = {}
     if fit or boards or decays:
-        fitted = _fitted(benched, decays, prediction, several=boards, progress=progress)
+        fitted = _fitted(benched, free, prediction, several=boards, progress=progress)
         benched = [replace(b, board=fitted[_board(b.path, boards)]) for b in benched]
     fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
     settings = {
@@ -247,23 +255,45 @@ def _fits(record: BenchedRecord) -> bool:
     return record.named.counts is not None
 
 
+def _check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:
+    """InputError for a record with the generator off of a board that has no other."""
+    known = {_board(file, several) for file in files}
+    for path in decays:
+        name = _board(path, several)
+        if name not in known:
+            raise InputError(path, "--decay", f"board {name} alone", "another --record of it")
+
+
+def _free_decays(
+    decays: Sequence[Path],
+    files: Sequence[Path],
+    motions: Sequence[RecordedMotion],
+    prediction: BoardPrediction,
+    several: bool,
+) -> dict[str, list[tuple[str, FreeDecay]]]:
+    """The records with the generator off by board, each with its file's name, on the channels of
+    its board's first record."""
+    free: dict[str, list[tuple[str, FreeDecay]]] = {}
+    for path in decays:
+        name = _board(path, several)
+        same = next(m for f, m in zip(files, motions, strict=True) if _board(f, several) == name)
+        decay = recorded_decay(read_record(path), same.channels, prediction)
+        free.setdefault(name, []).append((path.name, decay))
+    return free
+
+
 def _fitted(
     benched: Sequence[BenchedRecord],
-    decays: Sequence[Path],
+    free: Mapping[str, Sequence[tuple[str, FreeDecay]]],
     prediction: BoardPrediction,
     *,
     several: bool,
     progress: Progress,
 ) -> dict[str, FittedBoard]:
-    """The boards behind the records by name, each fitted to all of its own."""
-    free: dict[str, list[tuple[str, FreeDecay]]] = {}
-    for path in decays:
-        name = _board(path, several)
-        same = next((each for each in benched if _board(each.path, several) == name), None)
-        if same is None:
-            raise InputError(path, "--decay", f"board {name} alone", "another --record of it")
-        decay = recorded_decay(read_record(path), same.named.motion.channels, prediction)
-        free.setdefault(name, []).append((path.name, decay))
+    """The boards behind the records by name, each fitted to all of its own.
+
+    free : of each board its records with the generator off.
+    """
     own: dict[str, list[tuple[str, NamedMotion]]] = {}
     for each in benched:
         name = _board(each.path, several)
@@ -345,6 +375,7 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "periods": motion.periods,
         "channels": dict(motion.channels),
         "omega": 2.0 * math.pi * motion.frequency * seconds,
+        "frequency": motion.frequency,
         "frequency_hz": motion.frequency,
         "frequency_error_hz": motion.frequency_error,
         "amplitude_v_peak": motion.amplitude,
@@ -354,6 +385,10 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "others": list(name.others),
         "reason": name.reason,
         "would_tell": name.would_tell,
+        "clipped": [
+            _cut_json(net, motion.channels[net], low, high)
+            for net, (low, high) in name.clipped.items()
+        ],
         "symmetric": name.symmetric,
         "asymmetry": name.asymmetry,
         "asymmetry_error": name.asymmetry_error,
@@ -383,6 +418,18 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
         "fitted": None if benched.board is None else [f.as_dict() for f in benched.board.figures],
         "advice": None if benched.advice is None else benched.advice.as_dict(),
     }
+
+
+def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> dict[str, Any]:
+    """A channel that is cut off below or above a voltage [V]."""
+    ends = [
+        f"{side} {end:.3g} V" for side, end in (("below", low), ("above", high)) if end is not None
+    ]
+    words = (
+        f"{channel} ({net}) is cut off {' and '.join(ends)}: what is beyond is not seen. "
+        "Record it with a larger range."
+    )
+    return {"net": net, "channel": channel, "low": low, "high": high, "words": words}
 
 
 def _row(record: Mapping[str, Any]) -> dict[str, Any]:

@@ -178,7 +178,8 @@ def _answer(
         inputs["catalogue"] = load_catalog().hash
     kind = request.kind
     stages: Stages = {kind: (inputs, _names(kind, work))}
-    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
+    asked = {"model": modelfile.text, "work": work.decides}
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume, asked=asked)
     if todo:
         before = None if folder.manifest is None else folder.manifest.provenance
         with folder.working(stages, before or work.provenance):

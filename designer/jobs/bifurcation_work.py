@@ -52,13 +52,13 @@ class BifurcationWork:
                 more |= {"spread": self.spread.as_dict(), "seed": request.seed}
             self.shares = share_plan(request, plan, modelfile)
             more |= {} if self.shares is None else {"shares": self.shares.as_dict()}
-        decides = {"kind": request.kind, **plan.as_dict(), **more}
-        self.hash = work_hash(decides)
+        self.decides = {"kind": request.kind, **plan.as_dict(), **more}
+        self.hash = work_hash(self.decides)
         self.provenance = provenance(
             modelfile,
             load_catalog().hash,
             seed=self._seed,
-            settings={"bifurcation": decides},
+            settings={"bifurcation": self.decides},
         )
 
     @property
@@ -78,7 +78,7 @@ def with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
     """The row, and the values of the swept quantity in its SI unit too, if it has one."""
     if unit is None:
         return row
-    keys = [key for key in ("from", "to", "value") if key in row]
+    keys = [key for key in ("from", "to", "value") if row.get(key) is not None]
     return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
 
 

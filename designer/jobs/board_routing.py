@@ -61,7 +61,8 @@ def route_in_folder(
             raise InputError(None, "--layers", str(count), expected)
         text = with_layers(text, count)
     text = text if session is None else with_session(text, session)
-    routed = route_board(text, circuit, board_rules(circuit, synthesis.modelfile.rules))
+    rules = board_rules(circuit, synthesis.modelfile.rules)
+    routed = route_board(text, circuit, rules, folder / name)
     if ours:
         folder.rewrite(name, routed.text)
     else:

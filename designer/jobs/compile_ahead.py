@@ -8,13 +8,13 @@ comes first, and stores it where `base.jit` finds it.
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from designer.base import jit
+from designer.base.environment import python_command
 from designer.base.progress import doing
 from designer.catalog.catalog import load_catalog
 from designer.circuit.board_arrays import Boards
@@ -41,8 +41,7 @@ def compiling_ahead(jobs: int) -> Iterator[Callable[[], None]]:
         yield lambda: None
         return
     process = subprocess.Popen(
-        # -P: no file of the user's working directory is taken for a module.
-        [sys.executable, "-P", "-c", CALL],
+        python_command("-c", CALL),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,  # what goes wrong here goes wrong again where it is needed
@@ -72,3 +71,4 @@ def compile_circuits() -> None:
     drive, rest = Drive(1.0), np.zeros(len(circuit.states))
     Flow(boards.reduction(0).system(), drive).run(rest, 1)
     boards.settle([0], [drive], rest[None])
+    boards.swept(0, [(drive, 1)], rest[None])

@@ -26,6 +26,7 @@ from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules.kicad_program import KicadFailed, needed_version
+from designer.fabrication.board_facts import check_edge
 from designer.fabrication.fab import Fab, fabs
 from designer.fabrication.order import BoardOrder, order_files
 from designer.fabrication.order_refusal import (
@@ -270,12 +271,14 @@ def export_orders(
     stock = () if parts is None else stock_rows(parts, "--parts")
     runner, synthesis, _ = _design(modelfile, out, options, progress)
     folder, board = runner.folder, _board(runner, asked.board, progress)
+    check_edge(board)
     inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
     inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
     inputs["accepted"] = ", ".join(sorted(asked.accepted))
     inputs["fabs"] = _fabs_with_earlier(folder, inputs, names)
     # What stands in the way is known before any work.
-    if not folder.decide({ORDER_STAGE: (inputs, [])}, **_ways(options)):
+    wanted: Stages = {ORDER_STAGE: (inputs, [])}
+    if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
         return _ordered(runner, names, True)
     progress.stage("design rules")
     outcomes = checked(synthesis, board).outcomes
@@ -290,7 +293,7 @@ def export_orders(
     order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes), accepted)
     files = _order_texts(order, fabs(inputs["fabs"], runner.catalog.folders), runner)
     stages: Stages = {ORDER_STAGE: (inputs, list(files))}
-    folder.decide(stages, **_ways(options))
+    folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     with folder.working(stages, design_provenance(synthesis)):
         for path, content in files.items():
             folder.write(path, content)
@@ -308,10 +311,6 @@ def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardF
 
 def _path(named: Path | str | None) -> Path | None:
     return None if named is None else Path(named)
-
-
-def _ways(options: Options) -> dict[str, bool]:
-    return {"overwrite": options.overwrite, "resume": options.resume}
 
 
 def _fabs_with_earlier(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base import atomic_write
+from designer.base.atomic_write import NotWritten
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
@@ -17,8 +18,6 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
-from designer.board.board_parts import board_circuit
-from designer.board.component import components
 from designer.board.kicad_reader import BoardFile, check_belongs, read_board
 from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
@@ -82,7 +81,8 @@ def rules(
 ) -> RulesResult:
     """The verb ``rules``: check a design folder and write ``rules.json`` there.
 
-    An earlier ``rules.json`` is replaced, since a board changes while it is drawn.
+    An earlier ``rules.json`` is replaced, since a board changes while it is drawn. Where the folder
+    cannot be written the answer stands and says so.
     board : a .kicad_pcb of this design. junit : where to write a JUnit report.
 
     Raises
@@ -118,9 +118,13 @@ def rules(
     place = Folder(path)
     stages: Stages = {"rules": (inputs, [NAME])}
     place.decide(stages, overwrite=True, resume=False)  # refuses what is not ours
-    with place.working(stages):
-        place.write(NAME, dumps(answer))
-    renew_report(place, progress.note)
+    try:
+        with place.working(stages):
+            place.write(NAME, dumps(answer))
+        renew_report(place, progress.note)
+    except NotWritten as why:
+        progress.note(f"the answer is not stored: {why}")
+        answer["not_stored"] = str(why)
     if report is not None:
         text = rule_reports.junit(synthesis.modelfile.title, checks.outcomes)
         with atomic_write.appearing(report, "--junit") as partial:
@@ -137,12 +141,12 @@ def checked(synthesis: Synthesis, board: BoardFile | None = None) -> RulesAnswer
     """
     limits = synthesis.modelfile.rules
     with naming(synthesis.modelfile):
-        circuit, choice = board_circuit(synthesis)
-        listed = components(circuit, synthesis.catalog, choice)
-        custom = board_rules(circuit, limits)
+        subject = RuleSubject.of(synthesis)
+        custom = board_rules(subject.circuit, limits)
+    listed = subject.components
     if board is not None:
         check_belongs(board, listed)
-    on_circuit = run_rules.on_circuit(RuleSubject(synthesis, circuit, listed), limits)
+    on_circuit = run_rules.on_circuit(subject, limits)
     if board is None:
         return RulesAnswer((*on_circuit, *rule_board.without_board(custom, limits)), None)
     on_board = rule_board.checked(board, listed, custom, limits)

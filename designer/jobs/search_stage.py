@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN_FILES, MODEL, Folder
+from designer.base.design_folder import ASKED, DESIGN_FILES, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST
 from designer.base.plain_json import dumps
@@ -34,7 +34,7 @@ from designer.model.model_file import ModelFile
 from designer.spice.batch_backend import program_version
 from designer.spice.pool import SpicePool
 
-ASKED, CANDIDATES = "asked.toml", "candidates.jsonl"
+CANDIDATES = "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
 RULES = 6
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
@@ -70,6 +70,7 @@ def searched_into(
         {"search": (inputs, [*FILES, *DESIGN_FILES])},
         overwrite=options.overwrite,
         resume=options.resume,
+        asked={"model": modelfile.text},
     )
     if not todo:
         return model_file(out / MODEL)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import DRAWN_STARTS, SEED
+from designer.base.errors import InputError
 from designer.base.frames import frame
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
@@ -63,9 +65,9 @@ class SimulationResult:
 
 def simulate(
     model: Path | str | ModelFile,
-    omega: Sequence[float] = (),
+    omega: float | str | Iterable[float | str] = (),
     *,
-    frequency: Sequence[str] = (),
+    frequency: float | str | Iterable[float | str] = (),
     engine: Engine = "model",
     rung: Rung = "ideal",
     starts: int = DRAWN_STARTS,
@@ -78,8 +80,9 @@ def simulate(
     """The verb ``simulate``: the responses on one engine.
 
     model : a model file that was read, the path of one, or a design folder. omega, frequency : what
-    is reached from rest there, instead of the responses of the model file; a frequency is a text
-    such as "10 Hz". starts : initial states that are drawn. plots : a directory for pictures;
+    is reached from rest there, instead of the responses of the model file: one value or several. An
+    omega is a number in the model's units, a frequency a text such as "10 Hz" or a number in Hz.
+    starts : initial states that are drawn. plots : a directory for pictures;
     ``overwrite`` replaces those of the same names.
 
     Raises
@@ -98,8 +101,9 @@ def simulate(
     else:
         modelfile = model_file(Path(model))
     read = Reader(modelfile.model, modelfile.si)
-    omegas = tuple(read.omega("--omega", w) for w in omega)
-    omegas += tuple(read.frequency("--frequency", f) for f in frequency)
+    omegas = tuple(read.value("--omega", "omega", w) for w in _several("omega", omega, "0.85"))
+    frequencies = _several("frequency", frequency, "'10 Hz'")
+    omegas += tuple(read.frequency("--frequency", f) for f in frequencies)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
     names: tuple[str, ...] = ()
     if plots is not None:
@@ -129,3 +133,20 @@ def simulate(
         units = units_of(modelfile.si, modelfile.model)
         answer["files"] = simulate_plots.write(Path(plots), names, simulated, overwrite, units)
     return SimulationResult(plain(answer), simulated)
+
+
+def _several(name: str, given: object, example: str) -> list[float | str]:
+    """The values of an argument that is one number or text, or several of them.
+
+    Raises
+    ------
+    InputError : it is something else. example : a value, as it is written.
+    """
+    each = given if isinstance(given, Iterable) and not isinstance(given, str | bytes) else [given]
+    values = []
+    for value in each:
+        if isinstance(value, bool) or not isinstance(value, Real | str):
+            expected = f"one value or a list of them: {name}={example} or {name}=[{example}, …]"
+            raise InputError(None, name, repr(value), expected)
+        values.append(value if isinstance(value, str) else float(value))
+    return values

@@ -15,7 +15,7 @@ from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
-from designer.check import synthesis_result
+from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files
 from designer.folders.design_source import design_inputs, design_stage, standing_design
@@ -70,7 +70,8 @@ class StageRunner:
         """
         self.stages |= stages or {}
         overwrite, resume = self.options.overwrite, self.options.resume
-        self.todo = self.folder.decide(self.stages, overwrite=overwrite, resume=resume)
+        asked = {"model": self.modelfile.text}
+        self.todo = self.folder.decide(self.stages, overwrite=overwrite, resume=resume, asked=asked)
         if "design" in self.todo:
             design_files.check(self.modelfile, self.catalog)
         return bool(self.todo)
@@ -81,7 +82,9 @@ class StageRunner:
         if "design" in stages:
             self.progress.stage("responses of the model, parts")
             with compiling_ahead(self.options.jobs or cores()) as compiled:
-                synthesis = synthesis_result.synthesise(self.modelfile, self.catalog)
+                synthesis = stage_choice.synthesise(
+                    self.modelfile, self.catalog, jobs=self.options.workers
+                )
                 compiled()
                 write_design(self.folder, synthesis, stages, self.options, self.progress)
         else:
@@ -94,8 +97,9 @@ class StageRunner:
 def write_design(
     folder: Folder, synthesis: Synthesis, stages: Stages, options: Options, progress: Progress
 ) -> None:
-    """Write a design and its KiCad project. stages : that begin now, the design among them."""
-    progress.stage("start recipes, files of the design")
+    """Write a design and its KiCad project, what takes longest at the end: parts can be looked at
+    while start recipes are sought. stages : that begin now, the design among them."""
+    progress.stage("files of the design")
     with naming(synthesis.modelfile):
         files = design_files.texts(synthesis)
     inputs = stages["design"][0]
@@ -104,4 +108,6 @@ def write_design(
     design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
+    progress.stage("start recipes, design rules of the circuit")
+    design_files.write_last(folder, synthesis, options.workers)
     folder.finish("design")

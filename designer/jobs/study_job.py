@@ -14,7 +14,7 @@ from designer.base.errors import InputError
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.catalog.catalog import Catalog
-from designer.check import synthesis_result
+from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files
@@ -75,6 +75,7 @@ def run(
     ------
     InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
         something else.
+    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     EnvironmentMissing : there is work to do and no ngspice.
     """
     words = {"samples": samples, "seed": seed, "until": None, "blamed": blame}
@@ -191,7 +192,7 @@ def _in_memory(
         progress.stage("responses of the model, parts")
         synthesis = model
         if isinstance(synthesis, ModelFile):
-            synthesis = synthesis_result.synthesise(synthesis, catalog)
+            synthesis = stage_choice.synthesise(synthesis, catalog, jobs=options.workers)
         began = time.perf_counter()
         equations, checked = checks_in_memory(synthesis, help_.pool, progress)
         study = study_of(synthesis, options, help_, checked, progress=progress)

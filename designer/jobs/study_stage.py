@@ -22,6 +22,7 @@ from designer.base.progress import Progress
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files, study_json
+from designer.folders.design_source import design_answer
 from designer.folders.json_answers import run_json
 from designer.folders.origin import provenance
 from designer.folders.report_sections import later_sections
@@ -70,7 +71,7 @@ class Place:
 
     def answer(self, folder: Folder) -> dict[str, Any]:
         """The answer that stands there."""
-        return run_json(folder.json(DESIGN), folder.json(self.prefix + TOLERANCE))
+        return run_json(design_answer(folder), folder.json(self.prefix + TOLERANCE))
 
     def cache(self, folder: Folder, note: Note, name: str = CACHE) -> StudyCache:
         """The cache in the file of this name. note : called with a message where it is damaged."""
@@ -187,7 +188,7 @@ class StudyStage:
             if help_.pool is None:
                 return
             self.progress.note("yields of the exact circuit; ngspice is now asked about boards")
-            self.shown(run_json(folder.json(DESIGN), plain(result_json(result_of(study)))))
+            self.shown(run_json(design_answer(folder), plain(result_json(result_of(study)))))
 
         def standing(study: Study) -> None:
             guard()
@@ -225,7 +226,9 @@ class StudyStage:
         from designer.report.write import write_report  # matplotlib is not needed before this
 
         starts, board = design_files.starts(folder), kicad_files.own_board(folder)
-        data = ReportData(result, self.command, starts, board)
+        design = design_answer(folder)
+        found = design["warnings"], design["failed_rules"]
+        data = ReportData(result, self.command, starts, board, *map(tuple, found))
         html, text = (folder / f"{prefix}{name}" for name in REPORTS)
         write_report(data, html, text, () if prefix else later_sections(folder))
 

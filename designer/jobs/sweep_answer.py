@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.si_unit import Unit
 from designer.bifurcations import (
     basin_shares,
     border_curves,
@@ -20,15 +22,17 @@ from designer.bifurcations import (
 from designer.bifurcations.basin_shares import BasinShares
 from designer.bifurcations.border_curve import BorderCurve
 from designer.bifurcations.border_curves import CurvePlan
-from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.points import SIDES, Bifurcation
 from designer.bifurcations.response_region import ResponseRegion, SpreadBox
 from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders.curve_store import CurveBlocks, curves_csv
 from designer.folders.share_store import ShareBlocks, shares_csv
 from designer.folders.sweep_store import SweepStore
+from designer.folders.sweep_tables import points_csv, windows_csv
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
 from designer.plots import captions, point_captions, titles
 from designer.spread.spread import draw_many
@@ -37,6 +41,8 @@ SPREAD_BOARDS = 200
 """Boards that are drawn for the box of spread."""
 CURVE_FILES = ("curves.csv", "curves.png", "curves.svg")
 """Tables and pictures of bifurcation curves."""
+TABLES = ("windows.csv", "points.csv")
+"""Tables of the sweep itself."""
 
 
 def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
@@ -44,6 +50,7 @@ def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
     names = [
         SweepStore.name(track, k) for track in plan.tracks for k in range(len(plan.blocks(track)))
     ]
+    names += TABLES
     if work.shares is not None:
         names += [*ShareBlocks.names(work.shares), "shares.csv"]
     if work.curves is not None:
@@ -59,19 +66,20 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
         store = SweepStore(work.files(folder), name)
     blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
     swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
-    points = []
+    found = None
     if work.request.points:
         step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
-        points = window_ends.locate(swept, jobs, step)
+        found = window_ends.find(swept, jobs, step)
+    points = () if found is None else found.points
     si, unit = plan.subject.si.get(name), plan.subject.units.get(name, "")
     symbol = titles.NAMES.get(name, name)
-    body = {
+    body: dict[str, Any] = {
         "parameter": name,
         "unit": unit,
-        **({} if si is None else {"si_unit": si.name}),
+        **({} if si is None else {"si_unit": si.name, "si_scale": si.scale}),
         "tracks": list(plan.tracks),
         "steps": len(plan.values),
-        "windows": [with_si(w.as_dict(), si) for w in swept.windows],
+        "windows": _windows(swept, found, si),
         "points": [
             {
                 **with_si(p.as_dict(), si),
@@ -81,17 +89,29 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
             for p in points
         ],
     }
+    if found is not None:
+        missing = (
+            {**with_si(_missing(name, end), si), "caption": captions.missing(end, symbol, unit)}
+            for end in found.missing
+        )
+        body["points"] = sorted([*body["points"], *missing], key=lambda row: float(row["value"]))
     shares = _shares(work, folder)
-    pictures: list[Callable[[], Files]] = [lambda: _diagram(work, swept, points, shares)]
+    tables = (windows_csv(body["windows"]), points_csv(body["points"]))
+    pictures: list[Callable[[], Files]] = [
+        lambda: _diagram(work, swept, points, shares),
+        lambda: dict(zip(TABLES, tables, strict=True)),
+    ]
     if shares is not None:
         body["shares"] = shares.as_dict()
         pictures.append(lambda: {"shares.csv": shares_csv(shares)})
     if work.curves is not None:
         curves = _curves(work, work.curves, points, folder)
-        body["and"] = with_si(
-            {**work.curves.as_dict(), "at": work.curves.at},
-            plan.subject.si.get(work.curves.second),
-        )
+        second = plan.subject.si.get(work.curves.second)
+        body["and"] = {
+            **with_si({**work.curves.as_dict(), "at": work.curves.at}, second),
+            "unit": plan.subject.units.get(work.curves.second, ""),
+            **({} if second is None else {"si_unit": second.name, "si_scale": second.scale}),
+        }
         body["curves"] = [curve.as_dict() for curve in curves]
         region = _region(work, work.curves, swept)
         if region is not None:
@@ -102,6 +122,44 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
         return {name: content for each in pictures for name, content in each().items()}
 
     return body, {"periods": swept.periods}, files
+
+
+def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[dict[str, object]]:
+    """The windows of a sweep, and the ends of the periodic ones where these were looked for."""
+    out = []
+    for number, window in enumerate(swept.windows):
+        row = with_si(window.as_dict(), unit)
+        ends = None if found is None else found.ends[number]
+        if ends is not None:
+            keys = zip(("from_end", "to_end"), ends, strict=True)
+            row |= {key: with_si(end.as_dict(), unit) for key, end in keys}
+        out.append(row)
+    return out
+
+
+def _missing(parameter: str, end: SweptEnd) -> dict[str, Any]:
+    """A row among the points, by the keys of a point, for an end that was not located."""
+    response, symmetric = end.window.response, end.window.symmetric
+    return {
+        "parameter": parameter,
+        "kind": end.kind,
+        "value": end.value,
+        "error": end.error,
+        "before": response,
+        "after": "",
+        "stable_before": True,
+        "stable_after": None,
+        "direction": end.side,
+        "branch": None,
+        "response": response,
+        "symmetric": symmetric,
+        "stable_above": True if end.side < 0 else None,
+        "stable_below": True if end.side > 0 else None,
+        "side": SIDES[-end.side],
+        "born": None,
+        "reason": end.reason,
+        "changes": [],
+    }
 
 
 def _diagram(

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.defaults import SEED
-from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, DESIGN, Folder
+from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.catalog.catalog import Catalog
-from designer.check import synthesis_result
+from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
-from designer.folders.design_source import source
+from designer.folders.design_source import design_answer, source
 from designer.folders.json_answers import cost_of
 from designer.jobs import search_stage
 from designer.jobs.job_outcome import JobOutcome
@@ -56,6 +56,7 @@ def synthesise(
     ------
     InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
         something else.
+    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     """
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     options.check()
@@ -63,7 +64,7 @@ def synthesise(
     in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
     if out is None and in_memory:
         modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
-        return _in_memory(modelfile, catalog, compare, progress)
+        return _in_memory(modelfile, catalog, compare, options.workers, progress)
     modelfile, folder = source(model, out)
     modelfile = search_stage.design_file(modelfile, folder, options, progress)
     return synthesise_into(modelfile, folder, options, progress, compare=compare)
@@ -87,17 +88,17 @@ def synthesise_into(
         folder.write(COMPARISON, dumps(document))
         _draw(folder, document)
         folder.finish("comparison")
-    answer = folder.json(DESIGN)
+    answer = design_answer(folder)
     if compare:
         answer = _beside(answer, folder.json(COMPARISON))
     return JobOutcome(answer, _all_shown(answer), out, synthesis is None, synthesis)
 
 
 def _in_memory(
-    modelfile: ModelFile, catalog: Catalog | None, compare: bool, progress: Progress
+    modelfile: ModelFile, catalog: Catalog | None, compare: bool, jobs: int, progress: Progress
 ) -> JobOutcome:
     progress.stage("responses of the model, parts")
-    synthesis = synthesis_result.synthesise(modelfile, catalog)
+    synthesis = stage_choice.synthesise(modelfile, catalog, jobs=jobs)
     answer = plain(design_files.answer(synthesis))
     if compare:
         answer = _beside(answer, plain(_comparison(synthesis, progress)))

@@ -14,7 +14,7 @@ from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
-from designer.check import synthesis_result
+from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
@@ -240,7 +240,7 @@ def answer(
     need_responses(modelfile)
     if out is None:
         progress.stage("responses of the model, parts")
-        synthesis = synthesis_result.synthesise(modelfile)
+        synthesis = stage_choice.synthesise(modelfile, jobs=options.workers)
         return _document(synthesis, extent, TradePieces(), options, progress), False
     runner = StageRunner(modelfile, out, options, progress)
     folder = runner.folder

@@ -36,7 +36,9 @@ from .kernel_modal import (
 from .kernel_orbit import (
     CHAOS as CHAOS,
     CLOSING as CLOSING,
+    DONE as DONE,
     FOUND as FOUND,
+    LEFT as LEFT,
     NEAR as NEAR,
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     WORTH as WORTH,

@@ -18,6 +18,7 @@ from designer.kernels.kernel_orbit import (
     CURSOR,
     DONE,
     FOUND,
+    LEFT,
     NONE,
     SPENT,
     UNKNOWN_MODE,
@@ -35,12 +36,12 @@ IMPACTS = 512
 """Impacts of an orbit over two laps that there is room for."""
 STAGES = (20, 20, 100, 660)
 """Drive periods that are run between two looks for a period, as in ``dynamics.attractors``."""
-ASK, BUILD = 1, 2
+ASK, BUILD, NOWHERE = 1, 2, 3
 """Answers beside FOUND: nothing that the compiled code decides, the caller settles it; a mode that
-has to be built before the question is put again."""
+has to be built before the question is put again; no mode that has been built holds at the start."""
 CODE, BEGIN, MET, MISSING, COUNTED = 0, 1, 2, 3, 5
-"""Places in ``Answers.whole``: FOUND, ASK or BUILD; the mode at the start; impacts; the mode and
-the guard beyond which one is missing; then as ``counted`` of ``kernels.kernel_orbit``."""
+"""Places in ``Answers.whole``: FOUND, ASK, BUILD or NOWHERE; the mode at the start; impacts; the
+mode and the guard beyond which one is missing; then as ``counted`` of ``kernels.kernel_orbit``."""
 ASYMMETRY, UNDECIDED = range(2)
 """Places in ``Answers.facts``; the last is 1.0 where a tangency is undecided."""
 
@@ -150,11 +151,14 @@ _polish = polisher(_lap)
 
 @inlined
 def _respond(board: DrivenBoard, x: Float, stages: int, e: int, answers: Answers) -> int:
-    """``attractors.settle`` from x (n,) as long as the way is the usual one: FOUND or ASK."""
+    """``attractors.settle`` from x (n,) as long as the way is the usual one: FOUND, ASK or
+    NOWHERE."""
     n, columns = len(x), 2 * board.driven.modes.side.shape[1]
     cursor, counted = np.zeros(CURSOR, dtype=np.int64), answers.whole[e, COUNTED:]
     peak, point, monodromy = np.zeros(n), answers.start[e], answers.monodromy[e]
     end, nothing = x.copy(), np.zeros((0, 0))
+    if mode_at(board.driven, x, cursor) == LEFT:
+        return NOWHERE
     cursor[MODE], counted[SPENT] = -1, 0
     for stage in range(stages):
         length = STAGES[stage]
@@ -284,3 +288,55 @@ def respond_all(
         code = _respond(board, starts[e], stages, e, answers)
         answers.whole[e, CODE] = BUILD if missing[0] >= 0 else code
         answers.whole[e, MISSING], answers.whole[e, MISSING + 1] = missing[0], missing[1]
+
+
+@compiled
+def sweep_all(
+    modes: Modes,
+    board: int,
+    drives: Float,
+    periods: Int,
+    states: Float,
+    anchors: Anchors,
+    data: Float,
+    ints: Int,
+    width: int,
+    far: int,
+    unit: Unit,
+    codes: Int,
+    missing: Int,
+) -> None:
+    """One board from each of E states through drives that follow each other, without settling.
+
+    drives : (S, 4) as ``DrivenModes.drive``; periods : (S,) of each. states : (E, n) at drive phase
+    0; at the end of the last drive afterwards. data … unit : room for tables, which all states
+    share. codes : (E,) as of ``advance``, written. missing : as of ``DrivenBoard``; where a mode
+    is, nothing that was written counts.
+    """
+    n, columns = len(unit), 2 * modes.side.shape[1]
+    trail = RunTrail(
+        np.zeros((0, 2)),
+        np.zeros((modes.side.shape[1], 2)),
+        np.zeros(1),
+        np.zeros(0),
+        np.zeros((0, n)),
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+    )
+    cursor, nothing = np.zeros(CURSOR, dtype=np.int64), np.zeros((0, 0))
+    missing[0], codes[:] = -1, DONE
+    for s in range(len(drives)):
+        ints[:, FILLED] = 0
+        driven = DrivenModes(modes, board, drives[s], data, ints, width, far, False, unit)
+        driven_board = DrivenBoard(driven, 2.0 * np.pi / drives[s, 0], anchors, trail, missing)
+        strobes = np.zeros((periods[s] + 1, n))
+        impacts = np.zeros((periods[s], columns), dtype=np.int64)
+        for e in range(len(states)):
+            if codes[e] != DONE:
+                continue
+            cursor[MODE] = -1
+            codes[e] = _lap(driven_board, states[e], cursor, nothing, strobes, impacts)
+            if missing[0] >= 0:
+                return
+            for i in range(n):
+                states[e, i] = strobes[periods[s], i]

@@ -8,6 +8,7 @@ from .linear_terms import (
     ANY as ANY,
     Bounds as Bounds,
     LinearBlock as LinearBlock,
+    LinearQuestion as LinearQuestion,
     Shortfall as Shortfall,
     Targets as Targets,
 )
@@ -17,4 +18,7 @@ from .milp import (
     SOLVER as SOLVER,
     chosen_row as chosen_row,
     distinct_values as distinct_values,
+)
+from .solver_check import (
+    solver_words as solver_words,
 )

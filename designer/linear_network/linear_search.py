@@ -92,6 +92,24 @@ def best(
     return _linear_block(levels, question)
 
 
+def lower_bound(question: LinearQuestion, found: float, patience: int) -> tuple[float, str]:
+    """A level of error below which no choice keeps the conditions, and how that is known.
+
+    question : with every resistor and capacitor, ascending. found : an error that a choice has.
+    patience : steps, after which the last empty level stands.
+    """
+    low, high = question.bounds.signal
+    own = question.resistors
+    question = replace(question, resistors=np.sort(own[(own >= low) & (own <= high)]))
+    levels = _levels(question, patience, last=found)
+    if not levels.nothing:
+        return (levels.error if levels.whole else levels.empty), _proof(levels, question)
+    proof = f"{_scope(levels, question)}; the next level was not searched to its end"
+    if levels.whole:
+        proof = _scope(levels, question)
+    return levels.empty, f"{proof} ({levels.steps:.3g} steps)"
+
+
 def _search(question: LinearQuestion) -> LevelSearch:
     return PairSearch(question) if question.by_joins else TermSearch(question)
 
@@ -119,21 +137,23 @@ def _linear_block(levels: Levels, question: LinearQuestion) -> LinearBlock:
     )
 
 
-def _levels(question: LinearQuestion, patience: int, empty: float = 0.0) -> Levels:
+def _levels(
+    question: LinearQuestion, patience: int, empty: float = 0.0, last: float = LAST_LEVEL
+) -> Levels:
     """Search level by level until something is found, the levels or the steps end.
 
-    empty : a level at which there is nothing.
+    empty : a level at which there is nothing. last : the last one that is searched.
     """
     search = _search(question)
     level = max(empty, search.first)
     levels = Levels(np.inf, np.full(len(question.targets.parts), -1), empty, False, -1, 0, 0)
     while True:
-        level = min(level, LAST_LEVEL, levels.error)
+        level = min(level, last, levels.error)
         at = search.level(level, patience - levels.steps)
         best = at.error <= level + ROUNDING
         empty = level if at.whole and not best else levels.empty
         levels = replace(at.after(levels), empty=empty, whole=at.whole and (best or at.nothing))
-        if best or not at.whole or level >= LAST_LEVEL:
+        if best or not at.whole or level >= last:
             return levels
         level *= 1e3 if level < 1e-6 else search.growth
 
@@ -209,17 +229,10 @@ def _relaxations(
 
 def _proof(levels: Levels, question: LinearQuestion) -> str:
     """How the bound is known, in words."""
-    resistors, capacitors = len(question.resistors), len(question.capacitors)
     pair = question.by_joins
-    way, choice = ("joins", "joined choice") if pair else ("tree of choices", "choice")
+    choice = "joined choice" if pair else "choice"
     did, those = ("completed", "joined") if pair else ("looked at", "looked at")
-    scope = f"all {resistors} resistor and {capacitors} capacitor values"
-    empty = (
-        f"the {way} over {scope} leave{'' if pair else 's'} no choice with a linear error of "
-        f"{levels.empty:.3g} or less"
-        if levels.empty > 0.0
-        else f"over {scope} the first level of error that was searched has an answer"
-    )
+    empty = _scope(levels, question)
     after = "next level" if levels.empty > 0.0 else "first level"
     if levels.error <= EXACT and not levels.whole and not pair:
         return f"no error is below 0, and one up to {EXACT:g} counts as none"
@@ -229,3 +242,17 @@ def _proof(levels: Levels, question: LinearQuestion) -> str:
             f"was {did} and none is better ({levels.rows} {those} in all)"
         )
     return f"{empty}; the next level was not searched to its end ({levels.steps:.3g} steps)"
+
+
+def _scope(levels: Levels, question: LinearQuestion) -> str:
+    """Over which values there is nothing up to which level, in words."""
+    resistors, capacitors = len(question.resistors), len(question.capacitors)
+    pair = question.by_joins
+    way = "joins" if pair else "tree of choices"
+    scope = f"all {resistors} resistor and {capacitors} capacitor values"
+    if levels.empty > 0.0:
+        return (
+            f"the {way} over {scope} leave{'' if pair else 's'} no choice with a linear error of "
+            f"{levels.empty:.3g} or less"
+        )
+    return f"over {scope} the first level of error that was searched has an answer"

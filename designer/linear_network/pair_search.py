@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Index
-from designer.base.progress import doing
+from designer.base.progress import best_so_far, doing
 from designer.linear_network.kernel_completions import complete
 from designer.linear_network.kernel_linear import Rules, Values
 from designer.linear_network.linear_block import PARTS, catalogue, rules_of, slice_from
@@ -59,7 +59,9 @@ class PairSearch:
         start, whole, reached, rows, steps = 0, True, -1, 0, 0
         slices = len(values.deltas) * len(values.r)
         while start < slices:
-            doing(f"integrators with errors up to {level:.2g}: {start / slices:.0%} of the joins")
+            share = start / slices
+            tried = f": {share:.0%} of the joins" if share >= 0.01 else ""
+            doing(f"integrators with errors up to {level:.2g}{tried}")
             below = min(level, best)
             piece = slice_from(values, rules, below, start, patience - steps)
             left = patience - steps - piece.steps
@@ -69,6 +71,7 @@ class PairSearch:
             )
             if error < best:
                 best, parts = error, now
+                best_so_far(f"integrators with an error of {best:.2g}", step=True)
             whole = whole and full and not piece.cut
             reached = max(reached, far) if len(piece.rows) else reached
             rows, steps, start = (

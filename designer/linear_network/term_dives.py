@@ -15,7 +15,7 @@ from itertools import combinations, islice
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.base.progress import doing
+from designer.base.progress import best_so_far, doing
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.kernel_terms import CELL, TermRules, dives
 from designer.linear_network.linear_terms import Levels
@@ -130,3 +130,4 @@ class TermDives:
         error = self.search.error(parts)
         if error < self.error and self.search.allowed(parts):
             self.error, self.parts = error, parts
+            best_so_far(f"integrators with an error of {error:.2g}", step=True)

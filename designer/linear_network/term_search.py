@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
-from designer.base.progress import doing
+from designer.base.progress import best_so_far, doing
 from designer.circuit.coefficients import EXACT
 from designer.circuit.scale_fit import least_largest
 from designer.linear_network.kernel_terms import TermRules, choices
@@ -74,6 +74,7 @@ class TermSearch:
                 error = self.error(row)
                 if error < best and self.allowed(row):
                     best, parts = error, row
+                    best_so_far(f"integrators with an error of {best:.2g}", step=True)
         reached = 0 if known else -1
         return Levels(best, parts, 0.0, t == np.inf, reached, len(known), steps * self.candidate)
 
@@ -159,7 +160,8 @@ class TermSearch:
     def _tell(self, level: float, rules: TermRules, t: float) -> None:
         low, high = rules.seconds
         share = min(max(t - low, 0.0) / (high - low + TINY), 1.0)
-        doing(f"integrators with errors up to {level:.2g}: {share:.0%} of the time scales tried")
+        tried = f": {share:.0%} of the time scales tried" if share >= 0.01 else ""
+        doing(f"integrators with errors up to {level:.2g}{tried}")
 
     @cached_property
     def _conditions(self) -> TermConditions:

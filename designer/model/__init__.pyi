@@ -37,6 +37,7 @@ from .find_responses import (
     Reach as Reach,
     find as find,
     matches as matches,
+    need_found as need_found,
     peaks as peaks,
     scale_of as scale_of,
 )
@@ -82,8 +83,10 @@ from .model_file import (
 )
 from .relative_motion import (
     RelativeMotion as RelativeMotion,
+    companion_motions as companion_motions,
     different_motions as different_motions,
     ground_of as ground_of,
+    mass_motion as mass_motion,
     relative_motions as relative_motions,
     shown_stops as shown_stops,
     state_labels as state_labels,
@@ -91,6 +94,7 @@ from .relative_motion import (
 )
 from .response_table import (
     Response as Response,
+    placed as placed,
 )
 from .search_table import (
     SearchSpec as SearchSpec,
@@ -99,6 +103,7 @@ from .si_units import (
     MECHANICAL_UNITS as MECHANICAL_UNITS,
     NO_UNITS as NO_UNITS,
     Reader as Reader,
+    angular_frequency as angular_frequency,
     in_si as in_si,
     units_of as units_of,
 )

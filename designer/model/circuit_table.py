@@ -28,7 +28,7 @@ from designer.base.units import parse_quantity
 from designer.catalog.entries import FORBIDDEN
 
 DeadZone = Literal["saturation", "rectifier"]
-Objective = Literal["match", "yield"]
+Objective = Literal["margin", "match", "yield"]
 Names = bool | tuple[str, ...]
 """All of them, none, or those named."""
 
@@ -135,7 +135,7 @@ class CircuitSpec(FileTable):
     """Least and largest capacitance [F]."""
     frequency: Annotated[tuple[float, float], physical_span("Hz")] = (50.0, 1000.0)
     """Band for the frequency of ω = 1 [Hz]."""
-    dead_zone: Annotated[DeadZone, choice("saturation", "rectifier")] = "saturation"
+    dead_zone: Annotated[DeadZone | None, choice("saturation", "rectifier")] = None
     """Kind of the stage that makes the dead zone."""
     diode: Annotated[str, line("the name of a diode of the catalogue")] = "1N4148"
     """The rectifying dead zone's diode, by its name in the catalogue."""
@@ -143,7 +143,7 @@ class CircuitSpec(FileTable):
         "LM4040C50"
     )
     """The rectifying dead zone's reference, by its name in the catalogue."""
-    objective: Annotated[Objective, choice("match", "yield")] = "match"
+    objective: Annotated[Objective, choice("margin", "match", "yield")] = "margin"
     """What the choice of parts is to make best."""
     matched: Annotated[tuple[tuple[str, ...], ...], _matched()] = ()
     """Groups of parts with equal values."""
@@ -155,6 +155,10 @@ class CircuitSpec(FileTable):
         float, number("", "a number from 0 to 0.1", lambda value: 0.0 <= value <= 0.1)
     ] = 0.0
     """How much the error may exceed its least for fewer distinct values."""
+    max_error: Annotated[
+        float | None, number("", "a number above 0", lambda value: value > 0.0)
+    ] = None
+    """The largest coefficient error that is accepted; None for any."""
     composites: Annotated[Names, _flag_or('resistors such as ["R50", "R203"]', _RESISTORS)] = False
     """Resistors that may be two parts."""
     side_conditions: Annotated[

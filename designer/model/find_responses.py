@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.errors import InputError
+from designer.base.errors import InputError, ResponseNotFound
 from designer.base.progress import doing
+from designer.base.si_unit import value_text
 from designer.dynamics import harmonics
-from designer.dynamics.attractors import coexisting, settle, starts, twin
+from designer.dynamics.attractors import settle, starts, twin
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.model.driven import model_flow
 from designer.model.mechanics import Clearance, MechanicalModel, check_omega
-from designer.model.model import Dimensionless
+from designer.model.model import Dimensionless, SiScales
 from designer.model.response_table import Response
 
 STARTS = 16
@@ -81,6 +84,57 @@ def find(model: MechanicalModel, wanted: Sequence[Response]) -> tuple[ModelRespo
             doing(f"response {number} of {len(wanted)} on the model")
         out.append(_find_one(model.at(b), spec, b))
     return tuple(out)
+
+
+def need_found(
+    responses: Mapping[int, ModelResponse], si: SiScales | None = None, file: Path | None = None
+) -> None:
+    """Refuse to go on without a wanted response.
+
+    responses : by number in the file, from 1. si : adds frequencies in Hz. file : is named.
+
+    Raises
+    ------
+    ResponseNotFound : the model does not show one, or more; says what was found instead.
+    """
+    lost = {number: r for number, r in responses.items() if not r.found}
+    if not lost:
+        return
+    name = "" if file is None else f"{file}: "
+    lines = [f"{name}response[{number}]: {_not_found(r, si)}" for number, r in lost.items()]
+    more = (
+        "no parts are chosen for what the model does not show; without expect, what it shows is "
+        "taken; bifurcation MODEL --up --down shows which responses there are near this frequency"
+    )
+    rows = [
+        {
+            "omega": r.omega,
+            "expected": r.expected,
+            "found": r.found,
+            "model": r.orbit.response,
+            "circuit": None,
+            "ngspice": None,
+            "symmetric": r.orbit.symmetric,
+            "yield": None,
+            "others": [orbit.response for orbit in r.others],
+        }
+        for r in responses.values()
+    ]
+    raise ResponseNotFound("\n".join([*lines, more]), {"responses": rows})
+
+
+def _not_found(response: ModelResponse, si: SiScales | None) -> str:
+    """What was wanted, where, and what was found instead."""
+    spec = response.spec
+    hertz = "" if si is None else f" ({value_text(si.hertz(response.omega), 'Hz')})"
+    symmetry = {None: "", True: ", symmetric", False: ", asymmetric"}
+    wanted = f"{response.expected or 'a settled motion'}{symmetry[spec.symmetric]}"
+    seen = dict.fromkeys(
+        orbit.response + ("" if spec.symmetric is None else symmetry[orbit.symmetric])
+        for orbit in (response.orbit, *response.others)
+    )
+    at = f"at omega = {response.omega:.6g}{hertz}"
+    return f"{wanted} {at} was found from none of {STARTS} starts; found instead: {'; '.join(seen)}"
 
 
 def matches(orbit: Orbit, spec: Response) -> bool:
@@ -196,16 +250,25 @@ class Reach:
     """Largest displacement towards a side that has no stop; 0 with stops on both."""
     peak: float = 0.0
     """Largest displacement, either way."""
+    sides: tuple[float, float] | None = None
+    """The deepest penetration of the upper and of the lower stop; None where only the deeper of
+    both is known."""
+
+    def on(self, side: int) -> float:
+        """The deepest penetration of the stop on this side, 1 upper or -1 lower."""
+        return self.penetration if self.sides is None else self.sides[side < 0]
 
     def widened(self, stop: Clearance, scale: float, low: float, high: float) -> Reach:
         """With a motion from ``low`` to ``high`` too, in units of which ``scale`` counts."""
-        depth, excursion, sides = self.penetration, self.excursion, dict(stop.sides)
+        excursion, sides = self.excursion, dict(stop.sides)
+        depths = {1: self.on(1), -1: self.on(-1)}
         for side, reach in ((1, high), (-1, -low)):
             if side in sides:
-                depth = max(depth, scale * float(reach - sides[side].gap))
+                depths[side] = max(depths[side], scale * float(reach - sides[side].gap))
             else:
                 excursion = max(excursion, scale * float(reach))
-        return Reach(depth, excursion, max(self.peak, scale * high, -scale * low))
+        peak = max(self.peak, scale * high, -scale * low)
+        return Reach(max(depths.values()), excursion, peak, (depths[1], depths[-1]))
 
 
 @dataclass(frozen=True)
@@ -219,6 +282,10 @@ class Peaks:
     fastest: float = 0.0
     """Angular frequency of the highest harmonic that matters in the velocities
     (``harmonics.fastest``)."""
+
+    def reach(self, index: int) -> Reach:
+        """How far the displacement in the clearance with this index goes."""
+        return self.reaches[index] if index < len(self.reaches) else Reach()
 
     @property
     def penetration(self) -> float:

@@ -23,6 +23,7 @@ from designer.base.schema import (
     text,
     whole_number,
 )
+from designer.base.units import ACCELERATIONS, has_unit, parse_quantity
 from designer.model.hertz_law import HertzPieces, hertz_pieces
 from designer.model.mechanics import Side
 
@@ -150,14 +151,64 @@ class Force(FileTable):
     """Constant part, such as a weight or a preload."""
 
 
+BaseStops = Literal["base", "fixed"]
+
+
+def _base_amplitude() -> Accepts:
+    """(amplitude, unit) of ``MovingBase``; a number is a displacement."""
+    expected = 'a displacement > 0 in m, or an acceleration such as "0.5 g" or "5 m/s²"'
+
+    def check(value: object) -> tuple[float, str]:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError
+        unit = "m"
+        if isinstance(value, str):
+            unit = next((u for u in ACCELERATIONS if has_unit(value, u)), unit)
+        amplitude = parse_quantity(value, unit)
+        if not amplitude > 0.0:
+            raise ValueError
+        return amplitude, unit
+
+    return Accepts(expected, check, json={"type": ["number", "string"]})
+
+
 @dataclass(frozen=True)
-class MovingBase(FileTable):
+class MovingBase:
+    """The ground moves as y = Y sin ωt."""
+
+    amplitude: float
+    """Y, or the amplitude of the acceleration, Y ω²."""
+    stops: BaseStops = "base"
+    """Whether the stops between a mass and ground move with it or stay."""
+    unit: str = "m"
+    """Unit of ``amplitude``: one of ``ACCELERATIONS``, or that of a displacement."""
+
+    @property
+    def displacement(self) -> float:
+        """Y where that is given, else 0."""
+        return 0.0 if self.unit in ACCELERATIONS else self.amplitude
+
+    @property
+    def acceleration(self) -> float:
+        """Y ω² in m/s² where that is given, else 0."""
+        return ACCELERATIONS.get(self.unit, 0.0) * self.amplitude
+
+
+@dataclass(frozen=True)
+class BaseTable(FileTable):
     """The ground moves as amplitude · sin ωt."""
 
-    amplitude: Annotated[float, physical("m")]
-    """Amplitude of the displacement."""
-    stops: Annotated[Literal["base", "fixed"], choice("base", "fixed")] = "base"
+    amplitude: Annotated[tuple[float, str], _base_amplitude()]
+    """Amplitude of the displacement, or of the acceleration in g or m/s²; it is the same at every
+    drive frequency."""
+    stops: Annotated[BaseStops, choice("base", "fixed")] = "base"
     """Whether the stops between a mass and ground move with it or stay."""
+
+    @property
+    def motion(self) -> MovingBase:
+        """The motion that it stands for."""
+        amplitude, unit = self.amplitude
+        return MovingBase(amplitude, self.stops, unit)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,10 @@ UNITS = {
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
+NUMBERS = (1e-60, 1e60)
+"""Least and greatest size of a number that is not 0: the squares of ratios of such are still
+numbers."""
+
 _MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant")
 
 
@@ -76,7 +80,17 @@ class LumpedSystem(Elements):
 
     def __post_init__(self) -> None:
         check(self)
+        self._check_sizes()
         check_damped(self.second_order().state_matrix())
+
+    def _check_sizes(self) -> None:
+        low, high = NUMBERS
+        for name, (table, index, key) in self.places.items():
+            value = self.parameter(name)
+            if value != 0.0 and not low <= abs(value) <= high:
+                place = table if index is None else f"{table}[{index + 1}]"
+                expected = f"a number from {low:g} to {high:g}"
+                raise InputError(None, f"{place}.{key}", value, expected)
 
     def second_order(self) -> SecondOrderSystem:
         """The equations of motion."""
@@ -96,7 +110,8 @@ class LumpedSystem(Elements):
             force=force,
             clearances=tuple(self._clearance(gap) for gap in self.gaps),
             constant=constant,
-            base=0.0 if self.base is None else self.base.amplitude,
+            base=0.0 if self.base is None else self.base.displacement,
+            base_acceleration=0.0 if self.base is None else self.base.acceleration,
             fixed_stops=self.base is not None and self.base.stops == "fixed",
             names=self.names,
         )
@@ -119,8 +134,9 @@ class LumpedSystem(Elements):
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """SI unit of each of ``parameters`` but the factor ``b``."""
-        amplitudes = {"forces": "N", "base": "m"}
+        """SI unit of each of ``parameters`` but the factor ``b``; an acceleration of the ground may
+        be in g."""
+        amplitudes = {"forces": "N", "base": "m" if self.base is None else self.base.unit}
         return {
             name: amplitudes[group] if key == "amplitude" else UNITS[key]
             for name, (group, _, key) in self._places.items()
@@ -196,8 +212,11 @@ class LumpedSystem(Elements):
         return replace(self, **new) if new else self
 
     def as_dict(self) -> dict[str, object]:
-        """The elements by their lists."""
-        return asdict(self)
+        """The elements by their lists; the ground's unit where it is not that of a displacement."""
+        out = asdict(self)
+        if self.base is not None and self.base.unit == "m":
+            del out["base"]["unit"]
+        return out
 
     def at(self, b: float) -> LumpedSystem:
         """The model with every gap and constant force b times as large as in the file."""

@@ -3,9 +3,10 @@
     M z'' + C z' + K z + Σ stops = force(ω) · sin ωt + constant
 
 with any number of masses and clearances; Eq. (1)-(2) of the paper is the case of two masses and one
-two-sided clearance. Where the ground moves, by y = base · sin ωt, z = x - y is the displacement
-relative to it: the force is then that of the file and M base ω² (every spring and damper to ground
-stands on what moves). Stops that do not move with the ground watch z + y.
+two-sided clearance. Where the ground moves, by y = Y sin ωt, z = x - y is the displacement relative
+to it: the force is then that of the file and M Y ω² (every spring and damper to ground stands on
+what moves). Y or the acceleration Y ω² is given. Stops that do not move with the ground watch
+z + y.
 """
 
 from __future__ import annotations
@@ -129,7 +130,9 @@ class SecondOrderSystem:
     constant: Array = field(default_factory=lambda: np.zeros(0))
     """(n,) constant force on each mass; zero where it is not given."""
     base: float = 0.0
-    """Amplitude of the ground's displacement."""
+    """Amplitude of the ground's displacement, where that is the same at every frequency."""
+    base_acceleration: float = 0.0
+    """Amplitude of the ground's acceleration, where that is the same at every frequency."""
     fixed_stops: bool = False
     """Whether the stops between a mass and ground stay where they are while the ground moves."""
     names: tuple[str, ...] = ()
@@ -149,9 +152,21 @@ class SecondOrderSystem:
         """Of the first mass on its own springs, the others held, in rad per unit of time."""
         return float(np.sqrt(self.stiffness[0, 0] / self.mass[0]))
 
+    @property
+    def ground_moves(self) -> bool:
+        """Whether there is a motion of the ground."""
+        return bool(self.base or self.base_acceleration)
+
+    def ground(self, omega: float) -> float:
+        """Amplitude of the ground's displacement at a drive frequency."""
+        if not self.base_acceleration:
+            return self.base
+        return self.base + self.base_acceleration / (omega * omega)
+
     def drive_force(self, omega: float) -> Array:
         """(n,) amplitude of the force on each mass at a drive frequency, the ground's included."""
-        return np.asarray(self.force + self.mass * (self.base * omega * omega))
+        acceleration = self.base * omega * omega + self.base_acceleration
+        return np.asarray(self.force + self.mass * acceleration)
 
     def displacement(self, clearance: Clearance) -> Array:
         """(n,) row over the masses' displacements that gives the one in a clearance."""
@@ -200,10 +215,11 @@ class SecondOrderSystem:
         ------
         ValueError : a moving ground without ``omega``.
         """
-        if self.base and omega is None:
-            raise ValueError("the force of a moving ground depends on omega")
+        if self.ground_moves and omega is None:
+            raise ValueError("what a moving ground does depends on omega")
         n = self.size
-        contacts = [_Contact(self, stop) for stop in self.clearances]
+        ground = self.ground(1.0 if omega is None else omega)
+        contacts = [_Contact(self, stop, ground) for stop in self.clearances]
         A0 = self.state_matrix()
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
         B0[1::2] = self.drive_force(omega or 0.0) / self.mass
@@ -233,7 +249,7 @@ class SecondOrderSystem:
 class _Contact:
     """One clearance in the equations of first order."""
 
-    def __init__(self, system: SecondOrderSystem, clearance: Clearance) -> None:
+    def __init__(self, system: SecondOrderSystem, clearance: Clearance, ground: float) -> None:
         row = system.displacement(clearance)
         self.clearance = clearance
         self.row = np.zeros(2 * system.size)
@@ -243,7 +259,7 @@ class _Contact:
         self.push_back = np.zeros(2 * system.size)
         self.push_back[1::2] = row / system.mass
         fixed = system.fixed_stops and clearance.other is None
-        self.on_drive = system.base if fixed else 0.0
+        self.on_drive = ground if fixed else 0.0
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:
         """Add the force of the springs in contact to the equations.

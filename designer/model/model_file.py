@@ -27,20 +27,22 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import inside, parse_toml, read_text
+from designer.base.guarded_reading import inside, read_text
 from designer.base.json_schema import DIALECT, either, of_tables
 from designer.base.schema import FileTable, checked, line, such, whole_number
+from designer.base.toml_reader import parse_toml
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
-from designer.model.lumped_elements import Damper, Force, Gap, Mass, MovingBase, Spring
+from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.measured_values import MeasuredBoards, read_measured
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
+from designer.model.possible_counts import check_possible
 from designer.model.response_table import Response, ResponseTable
 from designer.model.rules_table import overrides
 from designer.model.search_table import SearchSpec
@@ -137,9 +139,8 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     """
     file = None if source is None else str(source)
     data = parse_toml(text, file)
-    model_limits.check(data, file)
-    second = data.get("format") == 2
-    table: type[_ModelFile | _SystemFile] = _SystemFile if second else _ModelFile
+    model_limits.check(data, FORMATS, file)
+    table: type[_ModelFile | _SystemFile] = FORMATS[int(data["format"]) - 1]
     try:
         tables = checked(table, data, file)
         model = tables.system
@@ -154,7 +155,7 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         )
     )
     for index, response in enumerate(responses, start=1):
-        _check_expected(response, index, model, file)
+        check_possible(response, index, model, file)
     circuit = tables.circuit
     if circuit.saturation is not None and circuit.saturation > circuit.supply:
         raise InputError(
@@ -179,20 +180,6 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         rules=overrides(tables.rules, file),
         search=tables.search,
     )
-
-
-def _check_expected(
-    response: Response, index: int, model: MechanicalModel, file: str | None
-) -> None:
-    """InputError unless n-p-q has p-q for each clearance."""
-    stops = model.second_order().clearances
-    expect, count = response.expect, max(len(stops), 1)
-    if expect is None or len(expect.impacts) == count:
-        return
-    shape = "1-" + ";".join(["p-q"] * count)
-    named = f", for the clearances {', '.join(stop.name for stop in stops)}" if count > 1 else ""
-    field = f"response[{index}].expect"
-    raise InputError(file, field, str(expect), f"p-q for each clearance, as in {shape}{named}")
 
 
 _FORMAT = whole_number(
@@ -268,16 +255,15 @@ class _SystemFile(_Tables):
     """Gaps to stops, in the order in which n-p-q names them."""
     force: tuple[Force, ...] = ()
     """Forces on masses."""
-    base: MovingBase | None = None
+    base: BaseTable | None = None
     """How the ground moves; without it the ground rests."""
     mechanical: ClassVar[None] = None
 
     @property
     def system(self) -> LumpedSystem:
         """What is computed with."""
-        return LumpedSystem(
-            self.mass, self.spring, self.damper, self.clearance, self.force, self.base
-        )
+        base = None if self.base is None else self.base.motion
+        return LumpedSystem(self.mass, self.spring, self.damper, self.clearance, self.force, base)
 
     def scales(self, data: Mapping[str, Any]) -> SiScales | None:
         """The file is in SI where a value of its elements is a text with a unit."""
@@ -294,10 +280,14 @@ class _SystemFile(_Tables):
         return SiScales() if any(texts) else None
 
 
+FORMATS: tuple[type[_ModelFile], type[_SystemFile]] = (_ModelFile, _SystemFile)
+"""The top level of each format, from 1 on."""
+
+
 def json_schema() -> dict[str, Any]:
     """JSON Schema of a model file, for editors: the keys of each table and what they accept."""
     formats, shared = list[dict[str, Any]](), dict[str, Any]()
-    for number, table in enumerate((_ModelFile, _SystemFile), start=1):
+    for number, table in enumerate(FORMATS, start=1):
         schema = of_tables(table)
         shared |= schema.pop("$defs")
         schema["properties"]["format"] |= {"const": number}

@@ -1,77 +1,370 @@
-"""What a model file of format 1 cannot say: more than two masses in a chain, stops on the first.
+"""What a model file cannot say: why, and what comes nearest, from one table (`LIMITS`).
 
-Keys of such systems are named before anything else is checked, so that nobody looks for a misspelt
-key where only another format has one. The limits stand in docs/model-file.md.
+A key that the format does not know, or a value that its key does not accept, is looked up here
+before anything else is checked, so that nobody looks for a misspelt key where there is none. A key
+or a value that is read is never refused, whatever stands here. docs/model-file.md prints the table.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 
-from designer.base.errors import InputError
-from designer.model.model import Dimensionless, Mechanical
-
-KNOWN = (
-    "format 1 knows two masses in a chain with stops on the first, at one distance, and forces "
-    "of one frequency on the masses; format = 2 knows any masses, springs, dampers, clearances, "
-    "forces and a moving base"
+from designer.base.errors import MISSING, InputError
+from designer.base.schema import (
+    FileTable,
+    accepts_value,
+    expected_of,
+    keys_of,
+    literal,
+    nested_table,
 )
-WHERE = "docs/model-file.md, Limits"
-TABLES = {
-    "mass": "a list of masses",
-    "masses": "a list of masses",
-    "spring": "a list of springs",
-    "springs": "a list of springs",
-    "damper": "a list of dampers",
-    "dampers": "a list of dampers",
-    "clearance": "a list of clearances",
-    "clearances": "a list of clearances",
-    "stop": "a list of stops",
-    "stops": "a list of stops",
-    "force": "a list of forces",
-    "forces": "a list of forces",
-    "base": "base motion",
-    "friction": "friction",
-}
-"""Top-level keys of other systems, and what each would be."""
-OF_A_MODEL = (
-    (r"[A-Za-z]+_?([3-9]|[1-9]\d+)", "a third mass"),
-    (r"[Bb]_?[12]|[Bb]_?(upper|lower)|gap\w*|clearances?", "a second clearance"),
-    (r"[Kk]_?0_?([12]|upper|lower)", "a second clearance"),
-    (r"base\w*|[YZ]0?|[xy]_?base|[xy]_?g(round)?", "base motion"),
-    (r"friction\w*|mu", "friction"),
-    (r"[Cc]_?0", "damping in the stops"),
-    (r"cubic\w*|law|alpha|beta|gamma", "a nonlinear spring"),
-    (r"[Ff]_?0|preload\w*|constant|gravity|g", "a constant force"),
-)
-"""Patterns of keys of ``[model]`` and ``[mechanical]``, and what each would be."""
-MODELS = {"model": Dimensionless, "mechanical": Mechanical}
-"""The two tables that a model may be given in."""
+
+WHERE = "docs/model-file.md#limits"
+MODELS = ("model", "mechanical")
+"""The two tables that a model of format 1 may be given in."""
+ELEMENTS = ("mass", "spring", "damper", "clearance", "force", "base")
+"""Tables of the elements of format 2."""
+_REWRITTEN = "designer new FILE --from OLD rewrites a file in it"
 
 
-def check(data: Mapping[str, object], file: str | None) -> None:
-    """Refuse a model file of format 1 that describes a system that format 1 does not know.
+@dataclass(frozen=True)
+class ModelLimit:
+    """One thing that is not modelled."""
+
+    feature: str
+    """What it is."""
+    example: str
+    """Keys or values by which a file asks for it, in Markdown."""
+    nearest: str
+    """What to write in its place, or why there is nothing."""
+    formats: tuple[int, ...] = (1, 2)
+    """Formats that do not know it."""
+    tables: str = ""
+    """Pattern of names at the top level of a file that are not read."""
+    keys: str = ""
+    """Pattern of keys of the model that are not read; with ``value`` of those that are."""
+    of: tuple[str, ...] = (*MODELS, *ELEMENTS)
+    """Tables in which ``keys`` count."""
+    value: Callable[[object], bool] | None = None
+    """Values of ``keys`` that are meant; None: any."""
+
+    def refusal(self, number: int, accepted: str) -> str:
+        """What a file of this format is told. accepted : in the place of what was found."""
+        where = "" if len(self.formats) > 1 else f" in format {number}"
+        told = f"not modelled{where}: {self.feature}; nearest: {self.nearest} ({WHERE})"
+        return f"{accepted}; {told}"
+
+
+def _is_negative(value: object) -> bool:
+    if isinstance(value, str):
+        return value.lstrip().startswith("-")
+    return isinstance(value, int | float) and value < 0
+
+
+def _is_acceleration(value: object) -> bool:
+    unit = r"[-+\d.e]+\s*[mk]?\s*(g|gn|g_n|g0|m/s2|m/s\^2|m/s\*\*2|m/s²)\s*"
+    return isinstance(value, str) and re.fullmatch(unit, value[:100].lstrip()) is not None
+
+
+def _is_matrix(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, list) for row in value)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list)
+
+
+LIMITS = (
+    ModelLimit(
+        "elements in lists, for any number of masses",
+        "`[[mass]]`, `[[spring]]`, `[[clearance]]`",
+        f"format = 2, which has [[mass]], [[spring]], [[damper]], [[clearance]] and [[force]]; "
+        f"{_REWRITTEN}",
+        (1,),
+        tables=r"mass(es)?|springs?|dampers?|clearances?|stops?|forces?",
+    ),
+    ModelLimit(
+        "a third mass",
+        "`M3`, `K3`, `C3`, `P3`",
+        f"format = 2, a [[mass]] for each; {_REWRITTEN}",
+        (1,),
+        keys=r"[A-Za-z]+_?([3-9]|[1-9]\d+)",
+    ),
+    ModelLimit(
+        "a second clearance, or stops at unequal distances",
+        "`B2`, `B_upper`, `K02`",
+        f"format = 2, a [[clearance]] for each, with upper and lower; {_REWRITTEN}",
+        (1,),
+        keys=r"[Bb]_?[12]|[Bb]_?(upper|lower)|gap\w*|clearances?|[Kk]_?0_?([12]|upper|lower)",
+    ),
+    ModelLimit(
+        "base motion",
+        "`[base]`, `Y`, `base_amplitude`",
+        f"format = 2, [base] with an amplitude; {_REWRITTEN}",
+        (1,),
+        tables="base",
+        keys=r"base\w*|[YZ]0?|[xy]_?base|[xy]_?g(round)?",
+    ),
+    ModelLimit(
+        "damping in the stops",
+        "`C0`",
+        f"format = 2, damping of a [[clearance]], which no circuit makes; {_REWRITTEN}",
+        (1,),
+        keys=r"[Cc]_?0",
+    ),
+    ModelLimit(
+        "a constant force, a weight or a preload",
+        "`preload`, `constant`, `gravity`",
+        "format = 2, constant of a [[force]], or preload or a negative gap of a [[clearance]]; "
+        f"{_REWRITTEN}",
+        (1,),
+        tables=r"gravity|preloads?",
+        keys=r"[Ff]_?0|preload\w*|constant|gravity|weight|g",
+    ),
+    ModelLimit(
+        "a weight by its own key, or a preload of anything but a stop",
+        "`[gravity]`, `[[mass]] weight`, `[[spring]] preload`",
+        "constant of a [[force]] on the mass (a weight is 9.81 m/s² times the mass), or preload or "
+        "a negative gap of a [[clearance]]",
+        (2,),
+        tables=r"gravity|preloads?",
+        keys=r"gravity|weight|g|preload\w*|free_length|rest_length",
+    ),
+    ModelLimit(
+        "the tables of format 1",
+        "`[model]`, `[mechanical]`",
+        f"format = 1, or elements; {_REWRITTEN}",
+        (2,),
+        tables="|".join(MODELS),
+    ),
+    ModelLimit(
+        "friction",
+        "`[[friction]]`, `friction`, `mu`",
+        "a linear damper that takes the same energy from a period, 4 F/(π ω X) for the friction "
+        "force F at amplitude X: right at that amplitude alone, and without sticking",
+        tables=r"frictions?|coulomb|stribeck|dry_friction",
+        keys=r"\w*friction\w*|mu|mu_\w+|coulomb\w*|stribeck\w*|stick\w*",
+    ),
+    ModelLimit(
+        "a coefficient of restitution",
+        "`restitution`",
+        "stiff stops; damping of a [[clearance]] of format 2, with "
+        "restitution = exp(-π ζ/√(1 - ζ²)), ζ = damping/(2 √(stiffness · mass)), which no circuit "
+        "makes",
+        tables=r"restitution|impacts?",
+        keys=r"\w*restitution\w*|cor|e|rigid",
+    ),
+    ModelLimit(
+        "a spring that is not linear",
+        "`cubic`, `k3`, `[[cubic_spring]]`, `[[law]]`",
+        "steps of stiffness: a [[clearance]] of format 2 for each, at rising gaps; n-p-q counts "
+        "the entries into each",
+        tables=r"laws?|cubic\w*|nonlinear\w*|duffing\w*|characteristics?",
+        keys=r"cubic\w*|\w*_cubic|[Kk]_?3|[Kk]_?nl|nonlinear\w*|alpha|beta|gamma|duffing\w*|law|"
+        r"exponent|power|points|curve|stiffness_?[2-9]",
+    ),
+    ModelLimit(
+        "a damper that is not linear",
+        "`drag`, `quadratic`",
+        "a linear damper that takes the same energy from a period, 8 d ω X/(3π) for the force d v² "
+        "at amplitude X",
+        tables=r"drags?",
+        keys=r"drag\w*|quadratic\w*|damping_?[2-9]",
+    ),
+    ModelLimit(
+        "a force or a base of another phase",
+        "`phase`",
+        "in phase, or in antiphase by a negative amplitude of a [[force]] of format 2",
+        keys=r"\w*phase\w*|phi\w?|angle|lag|lead",
+    ),
+    ModelLimit(
+        "more than one drive frequency",
+        '`[[force]] frequency`, `[[response]] frequency = ["20 Hz", "30 Hz"]`',
+        "one frequency for all forces, that of a [[response]]; a [[response]] for each frequency "
+        "asks for them one by one",
+        tables=r"frequenc(y|ies)|omega|Omega",
+        keys=r"frequenc\w*|freq|omega\w*|Omega\w*|hz|Hz|period",
+    ),
+    ModelLimit(
+        "more than one drive frequency",
+        "",
+        "one frequency; a [[response]] for each frequency asks for them one by one",
+        keys=r"(frequency|omega|Omega)_?(\d+|second)|second_\w+|frequencies|omegas",
+        of=("response",),
+    ),
+    ModelLimit(
+        "more than one drive frequency",
+        "",
+        "one frequency; a [[response]] for each frequency asks for them one by one",
+        keys="frequency|omega|Omega",
+        of=("response",),
+        value=_is_list,
+    ),
+    ModelLimit(
+        "a drive that is no sine",
+        "`waveform`, `harmonics`, `[[waveform]]`",
+        "its first harmonic, as an amplitude",
+        tables=r"waveforms?|harmonics?|drives?|signals?|sweep|chirp|noise",
+        keys=r"waveform\w*|harmonics?|shape|square|triangle|sawtooth|pulse\w*|terms|noise|"
+        r"random\w*|signal|chirp|sweep",
+    ),
+    ModelLimit(
+        "a delay",
+        "`delay`, `tau`",
+        "at one frequency, and where both are positive, a spring and a damper: the force of a "
+        "spring k after a delay τ is that of k cos ωτ and -(k/ω) sin ωτ",
+        tables=r"delays?",
+        keys=r"\w*delay\w*|tau\w?",
+    ),
+    ModelLimit(
+        "a system by its matrices",
+        "`[matrices]`, `mass = [[…], […]]`, `stiffness_matrix`",
+        "elements of format 2: of a stiffness matrix K a [[spring]] of -Kᵢⱼ between each two "
+        "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
+        tables=r"matri(x|ces)|\w+_matrix|[MCK]",
+        keys=r"matri(x|ces)|\w+_matrix",
+    ),
+    ModelLimit(
+        "a system by its matrices",
+        "",
+        "elements of format 2: of a stiffness matrix K a [[spring]] of -Kᵢⱼ between each two "
+        "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
+        tables=r"\w+",
+        keys=r"\w+",
+        value=_is_matrix,
+    ),
+    ModelLimit(
+        "rotation, or motion in more than one direction",
+        "`inertia`, `torque`, `[[rotor]]`",
+        "masses along one line: an inertia J with a moment M at the radius r is a mass J/r² with a "
+        "force M/r; a beam is the mass and the stiffness of its mode",
+        tables=r"inertias?|torques?|rotors?|gears?|beams?|levers?|joints?|bod(y|ies)",
+        keys=r"inertia\w*|J\w?|torque\w*|moment\w*|radius|direction|axis|position|[xyz]",
+    ),
+    ModelLimit(
+        "parameters that change with time",
+        "`parametric`, `modulation`",
+        "none: masses, springs and dampers are constant",
+        tables=r"parametric\w*|modulations?",
+        keys=r"parametric\w*|modulation\w*|time_?var\w*|stiffness_amplitude",
+    ),
+    ModelLimit(
+        "initial conditions",
+        "`[initial]`, `x0`, `v0`",
+        "none: a response is what a motion settles on; simulate --starts N asks N starts",
+        tables=r"initial\w*|start|state",
+        keys=r"initial\w*|[xv]_?0|start",
+    ),
+    ModelLimit(
+        "negative stiffness",
+        '`stiffness = "-5 kN/m"`',
+        "a softer spring; where a stop that is in contact at rest (a negative gap) is left, the "
+        "stiffness falls, but never below that of the springs",
+        keys=r"\w*stiffness|[Kk][0-2]?|constant",
+        of=(*MODELS, "spring", "clearance"),
+        value=_is_negative,
+    ),
+    ModelLimit(
+        "negative damping",
+        "`damping = -1.0`",
+        "none: a motion that is not damped reaches no steady response",
+        keys=r"damping|[Cc][12]?|zeta",
+        of=(*MODELS, "damper", "clearance"),
+        value=_is_negative,
+    ),
+    ModelLimit(
+        "an acceleration, in g or m/s², in the place of a force or a length",
+        '`[[force]] amplitude = "0.5 g"`',
+        "of a force, the mass times it (9.80665 m/s² is 1 g), in N; the amplitude of a [base] may "
+        "be an acceleration",
+        keys=r"\w+",
+        of=tuple(name for name in (*MODELS, *ELEMENTS) if name != "base"),
+        value=_is_acceleration,
+    ),
+)  # fmt: skip
+"""What is not modelled, by what a file would say of it; the first that fits is told."""
+
+
+def check(data: Mapping[str, object], formats: Sequence[type[FileTable]], file: str | None) -> None:
+    """Refuse a model file of an unknown format, or one that asks for what is not modelled.
+
+    formats : the top level of each format, the first for format 1.
 
     Raises
     ------
-    InputError : it has such a key; names what format 1 knows, and the page with its limits.
+    InputError : says what is not modelled, what comes nearest, and the page with the limits.
     """
-    if data.get("format") == 2:
-        return
-    for key, feature in TABLES.items():
-        if key in data:
-            raise InputError(file, key, f"a table {key!r}", _unknown(key, feature))
-    for table, record in MODELS.items():
-        content = data.get(table)
-        keys = {field.name for field in fields(record)}
-        for key in content if isinstance(content, Mapping) else ():
-            for pattern, feature in OF_A_MODEL:
-                if key not in keys and re.fullmatch(pattern, key, re.ASCII):
-                    text = f"unknown key {key!r}"
-                    raise InputError(file, f"{table}.{key}", text, _unknown(key, feature))
+    number = data.get("format", MISSING)
+    if type(number) is not int or not 1 <= number <= len(formats):
+        raise InputError(
+            file,
+            "format",
+            number if number is MISSING else literal(number),
+            "1 or 2, the formats that this version reads; a newer version of designer may know "
+            f"more; {_meant(data, formats)} ({WHERE})",
+        )
+    top = formats[number - 1]
+    for place, table, record, key, value in _entries(data, top):
+        known = keys_of(record)
+        for limit in LIMITS:
+            pattern = limit.keys if table else limit.tables
+            if number not in limit.formats or (table and table not in limit.of):
+                continue
+            if not pattern or not _compiled(pattern).fullmatch(key):
+                continue
+            if limit.value is not None and not limit.value(value):
+                continue
+            if key in known and (limit.value is None or accepts_value(record, key, value)):
+                continue
+            found, accepted = f"unknown key {key!r}", "no such key"
+            if key in known:
+                found, accepted = literal(value), expected_of(record, (key,))
+            raise InputError(file, f"{place}{key[:60]}", found, limit.refusal(number, accepted))
 
 
-def _unknown(key: str, feature: str) -> str:
-    return f"a model without {feature}: {KNOWN}; {key} is not known ({WHERE})"
+@cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """Compiled once: a file may have 100,000 keys."""
+    return re.compile(pattern, re.ASCII)
+
+
+def _entries(
+    data: Mapping[str, object], top: type[FileTable]
+) -> Iterator[tuple[str, str, type[FileTable], str, object]]:
+    """Each key of the top level and of the tables of a model: its place, the table ("" of the top
+    level) with its record, the key and its value."""
+    for key, value in data.items():
+        yield "", "", top, key, value
+    for table in (*MODELS, *ELEMENTS, "response"):
+        content, annotation = data.get(table), keys_of(top).get(table)
+        record = nested_table(annotation)
+        if record is None:
+            continue
+        listed = isinstance(content, list)
+        for index, each in enumerate(content if isinstance(content, list) else [content], start=1):
+            place = f"{table}[{index}]." if listed else f"{table}."
+            for key, value in each.items() if isinstance(each, Mapping) else ():
+                yield place, table, record, key, value
+
+
+def _meant(data: Mapping[str, object], formats: Sequence[type[FileTable]]) -> str:
+    """Which format the tables of a file are of."""
+    own = {key for key in data if key in MODELS or key in ELEMENTS}
+    fits = [n for n, top in enumerate(formats, start=1) if own and own <= keys_of(top).keys()]
+    if fits:
+        listed = ", ".join(f"[{key}]" for key in data if key in own)
+        return f"with {listed} it is format = {fits[0]}"
+    return "format = 1 has [model] or [mechanical], format = 2 any [[mass]] and what joins them"
+
+
+def limits_table() -> list[str]:
+    """The rows of the table in docs/model-file.md."""
+    rows = []
+    for limit in LIMITS:
+        if limit.example:
+            formats = " and ".join(map(str, limit.formats))
+            rows.append(f"| {limit.feature} | {formats} | {limit.example} | {limit.nearest} |")
+    return rows

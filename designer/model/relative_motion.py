@@ -29,7 +29,7 @@ class RelativeMotion:
     row: Array
     """(masses,) coefficients of the displacements relative to the base."""
     base: float
-    """Amplitude of the base's motion in it."""
+    """Amplitude of the base's motion in it, where that is the same at every frequency."""
     stops: tuple[tuple[int, float], ...]
     """(side, displacement) where contact begins, 1 upper and -1 lower."""
     clearances: tuple[int, ...] = ()
@@ -38,6 +38,8 @@ class RelativeMotion:
     """How many of the units that values are shown in are one unit of the model."""
     unit: str = ""
     """Unit that displacements are shown in, such as "mm"; "" for the model's own without a name."""
+    base_acceleration: float = 0.0
+    """Amplitude of the base's acceleration in it, where that is the same at every frequency."""
 
     def in_unit(self, scale: float, unit: str) -> RelativeMotion:
         """The same motion of a model in metres in another unit, of which ``scale`` are a metre."""
@@ -45,6 +47,7 @@ class RelativeMotion:
             self,
             row=scale * self.row,
             base=scale * self.base,
+            base_acceleration=scale * self.base_acceleration,
             stops=tuple((side, scale * place) for side, place in self.stops),
             scale=scale,
             unit=unit,
@@ -81,7 +84,8 @@ class RelativeMotion:
     def of(self, time: Array, states: Array, omega: float) -> Array:
         """(k, 2) displacement and velocity along a trace: time (k,), states (k, 2 masses)."""
         phase = omega * time
-        base = self.base * np.stack([np.sin(phase), omega * np.cos(phase)], axis=1)
+        amplitude = self.base + self.base_acceleration / (omega * omega)
+        base = amplitude * np.stack([np.sin(phase), omega * np.cos(phase)], axis=1)
         return np.stack([states[:, 0::2] @ self.row, states[:, 1::2] @ self.row], axis=1) + base
 
 
@@ -89,16 +93,47 @@ def relative_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
     """One for each clearance in their order; that of the first mass where there is none."""
     if system.clearances:
         return tuple(_of(system, k) for k in range(len(system.clearances)))
-    row = np.eye(1, system.size)[0]
-    return (RelativeMotion("x₁", _names(system, [0]), row, system.base, ()),)
+    return (mass_motion(system, 0),)
+
+
+def mass_motion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
+    """The absolute displacement of a mass, without stops."""
+    return RelativeMotion(
+        subscripted(f"x{mass + 1}"),
+        _names(system, [mass]),
+        np.eye(system.size)[mass],
+        system.base,
+        (),
+        base_acceleration=system.base_acceleration,
+    )
+
+
+def companion_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
+    """Where the ground moves, the other displacement of each mass that has a clearance to it: the
+    absolute one where the stops move with the ground, the one from the ground where they stay."""
+    if not system.ground_moves:
+        return ()
+    masses = dict.fromkeys(stop.mass for stop in system.clearances if stop.other is None)
+    return tuple(_companion(system, mass) for mass in masses)
+
+
+def _companion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
+    motion = mass_motion(system, mass)
+    names = f"{motion.names}, " if motion.names else ""
+    if not system.fixed_stops:
+        return replace(motion, names=f"{names}absolute")
+    symbol = f"{motion.symbol} − y"
+    return replace(
+        motion, symbol=symbol, names=f"{names}from the base", base=0.0, base_acceleration=0.0
+    )
 
 
 def different_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
     """Those of ``relative_motions`` that differ: clearances in which the same displacement is seen
     have one, with the stops of all of them."""
-    different: dict[tuple[str, float], RelativeMotion] = {}
+    different: dict[tuple[str, float, float], RelativeMotion] = {}
     for motion in relative_motions(system):
-        key = (motion.symbol, motion.base)
+        key = (motion.symbol, motion.base, motion.base_acceleration)
         known = different.get(key)
         different[key] = (
             motion
@@ -122,11 +157,12 @@ def shown_stops(system: SecondOrderSystem) -> tuple[tuple[int, int], ...]:
     return tuple((k, side) for k, stop in enumerate(stops) for side in stop.positions)
 
 
-def ground_of(model: MechanicalModel) -> Array:
-    """(states,) amplitude of the ground's displacement in each state: x = z + ground · sin ωt."""
+def ground_of(model: MechanicalModel, omega: float) -> Array:
+    """(states,) amplitude of the ground's displacement in each state at a drive frequency:
+    x = z + ground · sin ωt."""
     system = model.second_order()
     ground = np.zeros(2 * system.size)
-    ground[0::2] = system.base
+    ground[0::2] = system.ground(omega)
     return ground
 
 
@@ -135,7 +171,7 @@ def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
     masses = [stop.mass] if stop.other is None else [stop.mass, stop.other]
     fixed = system.fixed_stops and stop.other is None
     symbols = [subscripted(f"x{mass + 1}") for mass in masses]
-    if stop.other is None and system.base and not fixed:
+    if stop.other is None and system.ground_moves and not fixed:
         symbols.append("y")
     stops = tuple((side, side * spring.gap) for side, spring in stop.sides)
     return RelativeMotion(
@@ -145,6 +181,7 @@ def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
         system.base if fixed else 0.0,
         stops,
         (number,) * len(stops),
+        base_acceleration=system.base_acceleration if fixed else 0.0,
     )
 
 
@@ -158,7 +195,8 @@ def state_labels(system: SecondOrderSystem) -> list[str]:
     labels = []
     for mass, name in enumerate(system.names or [""] * system.size):
         for prime in ("", "′"):
-            symbol = subscripted(f"x{mass + 1}") + prime + (f" − y{prime}" if system.base else "")
+            symbol = subscripted(f"x{mass + 1}") + prime
+            symbol += f" − y{prime}" if system.ground_moves else ""
             labels.append(f"{symbol} ({name})" if name else symbol)
     return labels
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Any, ClassVar, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
 from designer.base.json_schema import either
 from designer.base.schema import Accepts, FileTable, choice, flag, literal, number, physical, span
+from designer.base.si_unit import DIGITS, drive_text
 from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
 from designer.dynamics.orbit import Orbit
 from designer.model.model import SiScales
@@ -88,6 +89,16 @@ class Response(FileTable):
     """Clearance at which this response is wanted: a value, a range to choose from, or None for the
     model's own."""
 
+    in_hertz: ClassVar[bool] = False
+    """Whether people read ω in hertz, since it is in rad/s."""
+
+    def place_text(self, digits: int = DIGITS) -> str:
+        """Its drive frequency for people: "36 Hz" or "ω = 0.85"."""
+        assert self.omega is not None
+        return drive_text(
+            self.omega, self.omega / (2.0 * math.pi) if self.in_hertz else None, digits
+        )
+
     def completed(self, nominal: Orbit) -> Response:
         """The same; where no n-p-q is expected, the nominal orbit's or its twin is wanted."""
         if self.expect is not None:
@@ -117,6 +128,13 @@ class Response(FileTable):
         if self.symmetric and not orbit.symmetric:
             return f"asymmetric by {orbit.asymmetry:.2g} of the peak"
         return ""
+
+
+@dataclass(frozen=True)
+class HertzResponse(Response):
+    """A response of a model in SI units."""
+
+    in_hertz: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -166,4 +184,25 @@ class ResponseTable(Response):
                 refuse(key, angular, "a frequency within the range of numbers")
         if self.twin == "exact" and self.expect is None:
             refuse("twin", literal(self.twin), "an expect that it can apply to")
-        return Response(omega, self.expect, self.twin, self.symmetric, self.b)
+        kind = HertzResponse if si == SiScales() else Response
+        return kind(omega, self.expect, self.twin, self.symmetric, self.b)
+
+
+def placed(
+    table: Mapping[str, Any], omega: float | None, b: float | None, si: SiScales | None
+) -> dict[str, Any]:
+    """A table of a file with its response at another place; every other key stays as it is.
+
+    omega : in the model's units; it is written by the key that the table gives its frequency by, in
+    the unit of that key. b : the clearance. None : as the table has it. si : of the file.
+    """
+    other: dict[str, Any] = {} if b is None else {"b": b}
+    if omega is None:
+        return {**table, **other}
+    key = next((key for key in _FREQUENCY if key in table), "omega")
+    if key == "omega":
+        return {**table, key: omega, **other}
+    assert si is not None  # no file without SI values is read with such a key
+    hertz = si.hertz(omega)
+    text = f"{hertz!r} Hz" if key == "frequency" else 2.0 * math.pi * hertz
+    return {**table, key: text, **other}

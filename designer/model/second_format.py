@@ -19,7 +19,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.guarded_reading import parse_toml
+from designer.base.toml_reader import parse_toml
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.si_units import MECHANICAL_UNITS

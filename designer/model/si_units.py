@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from designer.base.errors import InputError
 from designer.base.si_unit import Unit, value_text
-from designer.base.units import parse_quantity
+from designer.base.units import ACCELERATIONS, has_unit, parse_quantity
 from designer.model.mechanics import MechanicalModel, state_names
 from designer.model.model import SiScales
 
@@ -82,8 +82,8 @@ class Reader:
     units: Mapping[str, str] = field(default_factory=dict)
     """Units that plain numbers of a board have, by parameter."""
 
-    def frequency(self, option: str, text: str) -> float:
-        """The dimensionless frequency of a text such as "10 Hz".
+    def frequency(self, option: str, text: str | float) -> float:
+        """The model's frequency of a text such as "10 Hz", or of a number in Hz.
 
         Raises
         ------
@@ -144,11 +144,15 @@ class Reader:
         unit = None if self.units else unit_names(self.model).get(name)
         if unit is None:
             raise InputError(None, option, text, f"a number: {name} has no unit")
-        quantity = _quantity(option, text, unit)
+        quantity = (
+            _acceleration(option, text, unit)
+            if unit in ACCELERATIONS
+            else _quantity(option, text, unit)
+        )
         units = units_of(self._scales(option, text), self.model)
         return quantity / units[name].scale if name in units else quantity
 
-    def _scales(self, option: str, text: str) -> SiScales:
+    def _scales(self, option: str, text: str | float) -> SiScales:
         if self.si is None:
             raise InputError(
                 None,
@@ -167,10 +171,19 @@ def natural_frequencies(model: MechanicalModel) -> tuple[float, float]:
     return float(system.natural_frequencies()[0]), float(closed[-1])
 
 
+def _acceleration(option: str, text: str, unit: str) -> float:
+    """One in ``unit`` of a text in any of ``ACCELERATIONS``."""
+    for own, size in ACCELERATIONS.items():
+        if has_unit(text, own):
+            value = parse_quantity(text, own)
+            return value if own == unit else value * size / ACCELERATIONS[unit]
+    raise InputError(None, option, text, f"a number in {unit}, or a text in g or m/s²")
+
+
 def _quantity(option: str, text: str, unit: str) -> float:
-    """A text that ends in the unit."""
+    """A text that ends in the unit; a mass may be in g."""
     try:
-        if not text.rstrip().endswith(unit):
+        if not text.rstrip().endswith("g" if unit == "kg" else unit):
             raise ValueError
         return parse_quantity(text, unit)
     except ValueError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from designer.base.units import format_quantity
+from designer.base.si_unit import quantity_text
 from designer.model.lumped_elements import GROUND, Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
@@ -34,7 +34,10 @@ def equations_of(model: LumpedSystem, naming: Naming = symbol_of) -> tuple[str, 
     lines = [_line(model, i, naming) for i in range(len(model.masses))]
     lines += [_law(model, gap, naming) for gap in model.gaps]
     if model.base is not None:
-        lines.append(f"y = {naming('Y', model.base.amplitude)} {MOTION}")
+        if model.base.acceleration:
+            lines.append(f"y = {naming('a', model.base.acceleration)}/ω² {MOTION}")
+        else:
+            lines.append(f"y = {naming('Y', model.base.amplitude)} {MOTION}")
     return tuple(lines)
 
 
@@ -82,8 +85,9 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
             yield subscripted(f"G{i}"), force.constant, "N", f"constant force on {force.on}"
     if model.base is not None:
         stops = "with" if model.base.stops == "base" else "without"
-        text = f"amplitude of the ground's motion, {stops} the stops"
-        yield "Y", model.base.amplitude, "m", text
+        symbol, motion = ("a", "acceleration") if model.base.acceleration else ("Y", "motion")
+        text = f"amplitude of the ground's {motion}, {stops} the stops"
+        yield symbol, model.base.amplitude, model.base.unit, text
 
 
 def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
@@ -109,12 +113,9 @@ def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
 
 
 def _value(value: float, unit: str) -> str:
-    if unit in ("", "kg"):
-        return f"{value:.6g} {unit}".rstrip()
-    sign = "-" if value < 0.0 else ""
-    text = format_quantity(abs(value), unit, 6).removesuffix(unit)
-    figure = text.rstrip("fpnµmkMGT")
-    return f"{sign}{figure} {text[len(figure) :]}{unit}"
+    if not unit:
+        return f"{value:.6g}"
+    return quantity_text(value, unit, 6)
 
 
 def _line(model: LumpedSystem, mass: int, naming: Naming) -> str:

@@ -29,16 +29,17 @@ capacitor_grade = 0.01
 resistor_range = ["1k", "1M"]
 capacitor_range = ["1nF", "1µF"]
 frequency = [50, 1000]          # Hz, where omega = 1 may lie
-dead_zone = "saturation"        # the stage that makes the clearance; or "rectifier"
+# dead_zone = "rectifier"       # or "saturation"; without it the one whose boards do better
 # diode = "1N4148"              # of the rectifier
 # reference = "LM4040C50"       # of the rectifier
-objective = "match"
+objective = "margin"            # or "match": the least error; or "yield": a search
 composites = false              # true or ["R50", …]: resistors of two parts, where that helps
 side_conditions = true          # false: the match alone; or a list of those to keep:
 # side_conditions = ["swing", "level", "load", "noise_gain", "bandwidth", "resistors", "generator"]
 # matched = [["R1", "R7"]]      # groups of parts with equal values
 # preferred = ["10k", "10n"]    # values that do not count among the distinct ones
 # most_values = 12              # at most so many distinct values
+# max_error = 0.01              # a design with a larger coefficient error is refused
 # slack = 1e-4                  # how much the error may exceed its least for fewer distinct values
 
 # How the boards of a tolerance study differ; without it as the reference spread says. More keys:
@@ -169,7 +170,7 @@ amplitude = "80 N"              # negative: in antiphase
 
 # The ground moves by amplitude * sin(omega t).
 # [base]
-# amplitude = "0.1 mm"
+# amplitude = "0.1 mm"          # or its acceleration: "0.5 g", "5 m/s²"
 # stops = "base"                # stops to ground move with it; "fixed": they stay
 
 # The responses that the board shall show: n-p-q, with n periods of the force, p impacts on the

@@ -28,7 +28,8 @@ from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.windows import all_windows, outside
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
-from designer.dynamics.attractors import coexisting, settle, starts, twin
+from designer.dynamics.attractors import settle, starts, twin
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.orbit import Orbit
 from designer.folders import origin
 from designer.folders.sweep_store import write_sweep

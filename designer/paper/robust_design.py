@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -25,6 +24,7 @@ from designer.base.manifest import read_json
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
+from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
@@ -131,7 +131,7 @@ def report(
 
 def at_model_clearance(file: ModelFile) -> str:
     """The text of the model file with every response at the model's own clearance."""
-    data = tomllib.loads(file.text)
+    data = parse_toml(file.text, None)
     for response in data["response"]:
         response.pop("b", None)
     data["title"] = f"{file.title}, nominal b"

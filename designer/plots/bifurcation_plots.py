@@ -20,26 +20,26 @@ from designer.bifurcations.basin_shares import BasinShares
 from designer.bifurcations.basins import BasinPlan, Basins
 from designer.bifurcations.parameter_map import MapPlan, ParameterMap
 from designer.bifurcations.points import Bifurcation
-from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 from designer.plots.response_colours import (
     BLACK,
-    CHAOS,
     DOTS,
     MARKS,
     OPEN,
     OTHERS,
     RED,
     SHADES,
+    TORUS,
+    WITHOUT_N,
     palette_legend,
     response_palette,
 )
 from designer.plots.share_band import share_band
-from designer.plots.si_axes import si_x, si_y
-from designer.plots.titles import NAMES, title
+from designer.plots.si_axes import parameter_x, parameter_y, si_y
+from designer.plots.titles import title
 
 WIDE = 0.012
 """Of the sweep: narrower windows get no label."""
@@ -144,8 +144,7 @@ def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
     """The axis of the swept parameter, below the lowest panel."""
     span = float(plan.values[-1] - plan.values[0])
     lowest.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
-    lowest.set_xlabel(_axis(plan.subject, plan.parameter))
-    si_x(lowest, plan.subject.si.get(plan.parameter), below=SECOND_AXIS)
+    parameter_x(lowest, plan.subject, plan.parameter, below=SECOND_AXIS)
 
 
 def _met(step: Steady, stop: int) -> Array:
@@ -222,10 +221,8 @@ def _plane(width: float, height: float, text: str) -> tuple[Figure, Axes]:
 
 
 def _plane_axes(axes: Axes, plan: MapPlan | BasinPlan, ending: str = "") -> None:
-    axes.set_xlabel(_axis(plan.subject, plan.x) + ending)
-    axes.set_ylabel(_axis(plan.subject, plan.y) + ending)
-    si_x(axes, plan.subject.si.get(plan.x))
-    si_y(axes, plan.subject.si.get(plan.y))
+    parameter_x(axes, plan.subject, plan.x, ending)
+    parameter_y(axes, plan.subject, plan.y, ending)
 
 
 def _patch(colour: str, text: str, share: float) -> Patch:
@@ -311,7 +308,8 @@ def _cloud(axes: Axes, values: Array, clouds: Sequence[Array], ink: Mapping[str,
 
 
 def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> None:
-    """Windows as bars with their names: symmetric or not by colour, aperiodic stretches dark."""
+    """Windows as bars with their names: symmetric or not by colour, aperiodic and quasi-periodic
+    stretches dark."""
     span = float(values[-1] - values[0])
     half = 0.5 * span / (len(values) - 1)
     axes.set_ylim(0.0, 1.0)
@@ -322,11 +320,11 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
     if name:
         axes.set_ylabel(STRIPS.get(name, name), rotation=0, ha="right", va="center")
     for window in windows:
-        if window.response == OrbitStatus.APERIODIC:
+        if window.response in WITHOUT_N:
             # Beside what coexists with it, where several starts share the strip.
             top = 1.0 if window.track in (DOWN, UP) else 0.3
             ends = (window.low - half, window.high + half)
-            axes.axvspan(*ends, ymax=top, color=CHAOS, lw=0, zorder=1.5)
+            axes.axvspan(*ends, ymax=top, color=WITHOUT_N[window.response], lw=0, zorder=1.5)
     named = sorted((w for w in windows if read_counts(w.response)), key=lambda w: w.low)
     last = -np.inf
     for window in named:
@@ -376,8 +374,8 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
     shown = {bool(w.symmetric) for w in sweep.windows if read_counts(w.response)}
     words = {True: "symmetric", False: "not symmetric"}
     handles += [Patch(fc=SHADES[s], label=text) for s, text in words.items() if s in shown]
-    if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
-        handles.append(Patch(fc=CHAOS, label="aperiodic"))
+    met = {w.response for w in sweep.windows}
+    handles += [Patch(fc=colour, label=name) for name, colour in WITHOUT_N.items() if name in met]
     return handles
 
 
@@ -407,14 +405,11 @@ def _attractor_colours(result: Basins) -> list[str]:
             out.append(RED)
         elif a.response == OrbitStatus.APERIODIC:
             out.append("#8c8c8c")
+        elif a.response == OrbitStatus.QUASI_PERIODIC:
+            out.append(TORUS)
         else:
             out.append(OPEN if a.response == OrbitStatus.NOT_SETTLED else next(free))
     return out
-
-
-def _axis(subject: Subject, name: str) -> str:
-    text = subject.labels.get(name) or NAMES.get(name, name)
-    return _label(text, subject.units.get(name, ""))
 
 
 def _label(text: str, unit: str) -> str:

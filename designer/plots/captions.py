@@ -12,6 +12,7 @@ import numpy as np
 
 from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.bifurcations.sweep import DOWN, Sweep
+from designer.bifurcations.window_ends import SweptEnd
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
@@ -57,6 +58,18 @@ def changes(sweep: Sweep, point: Bifurcation) -> list[TrackChange]:
         if not sweep.plan.followed:
             break
     return out or [_of_branch(point)]
+
+
+def missing(end: SweptEnd, parameter: str, unit: str = "") -> str:
+    """Of an end that was not located, such as "lower end of 1-1-0 not located; 1-1-0 is known down
+    to ω = 0.9: its branch was followed to here and lost".
+
+    parameter : how it is written. unit : of it.
+    """
+    whose = label(end.window.response, end.window.symmetric)
+    which, way = ("upper", "up") if end.side > 0 else ("lower", "down")
+    place = f"{parameter} = {end.value:.9g}{' ' + unit if unit else ''}"
+    return f"{which} end of {whose} {end.kind}, known {way} to {place}: {end.reason}"
 
 
 def family(response: str) -> str:

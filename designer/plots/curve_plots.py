@@ -11,15 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.bifurcations.border_curve import BorderCurve
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.response_region import EDGE, ResponseRegion
 from designer.plots.response_colours import MARKS, OTHERS, SHADES
-from designer.plots.si_axes import si_x, si_y
-from designer.plots.titles import NAMES, curves_title
+from designer.plots.si_axes import parameter_x, parameter_y
+from designer.plots.titles import curves_title, parameter_name, parameter_text
 
 MEETINGS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "*", "h", "p")
 """Marks of points of codimension two, by name."""
@@ -75,11 +75,10 @@ def curves(
     if any(c.begun_at is not None for c in lines):
         handles.append(Line2D([], [], color=MUTED, lw=1.6, ls=SWITCHED, label="begun at a meeting"))
     handles += _meetings(axes, lines)
-    second = NAMES.get(plan.second, plan.second)
+    second = parameter_name(plan.subject, plan.second)
+    at = parameter_text(plan.subject, plan.second, plan.at)
     axes.axhline(plan.at, color=MUTED, lw=0.8, ls=(0, (5, 4)), zorder=1)
-    handles.append(
-        Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label=f"{second} = {plan.at:.6g}")
-    )
+    handles.append(Line2D([], [], color=MUTED, lw=0.8, ls=(0, (5, 4)), label=f"{second} = {at}"))
     if region is not None:
         handles += _region(axes, region, {curve.kind for curve in lines})
         labels = [label for label in labels if not label[1] <= region.at[0] <= label[2]]
@@ -87,9 +86,12 @@ def curves(
         axes.set_xscale("log")
     _axes(axes, plan)
     if log:
-        axes.xaxis.set_major_locator(FixedLocator(_round_values(low, high)))
+        si = plan.subject.si.get(plan.first)
+        scale = si.scale if si is not None and si.own_si else 1.0
+        ticks = np.array(_round_values(scale * low, scale * high)) / scale
+        axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_major_formatter(lambda value, _: f"{scale * value:g}")
     _named(axes, plan, labels)
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return figure
@@ -167,12 +169,8 @@ def _axes(axes: Axes, plan: CurvePlan) -> None:
     axes.set_xlim(*window.first)
     axes.set_ylim(*window.second)
     axes.grid(True, color=GRID, lw=0.5)
-    for set_label, parameter in ((axes.set_xlabel, plan.first), (axes.set_ylabel, plan.second)):
-        text = subject.labels.get(parameter) or NAMES.get(parameter, parameter)
-        unit = subject.units.get(parameter, "")
-        set_label(f"{text} [{unit}]" if unit else text)
-    si_x(axes, subject.si.get(plan.first))
-    si_y(axes, subject.si.get(plan.second))
+    parameter_x(axes, subject, plan.first)
+    parameter_y(axes, subject, plan.second)
 
 
 def _named(axes: Axes, plan: CurvePlan, labels: Sequence[Label]) -> None:

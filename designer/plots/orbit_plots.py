@@ -195,7 +195,7 @@ def _portrait(
     wanted = f", wanted {checked.model.expected}" if checked.model.expected else ""
     pad = 17.0 + 11.0 * text.count("\n")
     axes.set_title(
-        f"ω = {checked.model.omega:.4g}{wanted}", loc="left", weight="bold", color=INK, pad=pad
+        f"{checked.model.spec.place_text()}{wanted}", loc="left", weight="bold", color=INK, pad=pad
     )
     axes.annotate(
         text, (0.0, 1.0), (0, 6), xycoords="axes fraction", textcoords="offset points",

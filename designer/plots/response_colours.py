@@ -14,8 +14,11 @@ OTHERS = (
 )  # fmt: skip
 DOTS = tuple(c for c in OTHERS if c not in ("#f0e442", "#b3de69", "#c5b0d5", "#ff9896"))
 """Those that are dark enough for small dots."""
-CHAOS, REST, OPEN = "#3a3a3a", "#c9c9c9", "#ffffff"
-"""Of aperiodic motions, of responses too rare for a colour, and of what is not settled."""
+CHAOS, TORUS, REST, OPEN = "#3a3a3a", "#6b7a99", "#c9c9c9", "#ffffff"
+"""Of aperiodic and of quasi-periodic motions, of responses too rare for a colour, and of what is
+not settled."""
+WITHOUT_N: dict[str, str] = {OrbitStatus.APERIODIC: CHAOS, OrbitStatus.QUASI_PERIODIC: TORUS}
+"""Colour of what has settled without a period, by its status."""
 SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
 """Of windows of symmetric responses and of others."""
 MARKS = {
@@ -40,7 +43,7 @@ def response_palette(counts: Mapping[str, int]) -> dict[str, str]:
     looks = dict(zip(sorted(periodic[:NAMED], key=Counts.parse), OTHERS, strict=False))
     others = {response: REST for response in periodic if response not in looks}
     plain = [response for response in frequent if response not in periodic]
-    return looks | others | {r: CHAOS if r == OrbitStatus.APERIODIC else OPEN for r in plain}
+    return looks | others | {r: WITHOUT_N.get(r, OPEN) for r in plain}
 
 
 def palette_legend(

@@ -89,6 +89,7 @@ def spectrum_figure(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -
     for axes, motion, spectrum in zip(panels, response.motions, spectra, strict=True):
         _spectrum_panel(axes, spectrum)
         axes.set_ylabel(f"{'amplitude' if spectrum.lines else 'power density'} of\n{motion.label}")
+        si_y(axes, units.get("x1"), power=1 if spectrum.lines else 2)
     panels[-1].set_xlabel("frequency / drive frequency")
     panels[-1].set_xlim(0.0, max(_highest(spectrum) for spectrum in spectra))
     panels[-1].xaxis.set_major_locator(MaxNLocator(10, integer=True))
@@ -156,8 +157,17 @@ def _spectra(response: Simulated) -> Iterator[PowerSpectrum]:
         yield power_spectrum(trace.time, values, response.omega, periodic=periodic)
 
 
+def place_title(omega: float, units: Mapping[str, Unit]) -> str:
+    """The drive frequency of a response; in hertz alone where ω is in rad/s. units : SI units of
+    the model's quantities."""
+    plain = f"ω = {omega:.6g}"
+    if "omega" not in units:
+        return plain
+    unit = units["omega"]
+    return unit.text(omega, 6) if unit.own_si else f"{plain} ({unit.text(omega)})"
+
+
 def _title(figure: Figure, response: Simulated, text: str, units: Mapping[str, Unit]) -> None:
-    hertz = f" ({units['omega'].text(response.omega)})" if "omega" in units else ""
-    heading = f"ω = {response.omega:.6g}{hertz}: {response.orbit.response}\n{text}"
+    heading = f"{place_title(response.omega, units)}: {response.orbit.response}\n{text}"
     look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 9, "color": INK}
     figure.suptitle(heading, **look)

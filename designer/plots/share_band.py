@@ -13,7 +13,7 @@ from designer.base.arrays import Array
 from designer.base.figure_style import MUTED, ON_DARK, ON_LIGHT
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares
 from designer.dynamics.orbit import OrbitStatus
-from designer.plots.response_colours import CHAOS, OPEN, OTHERS, REST
+from designer.plots.response_colours import OPEN, OTHERS, REST, WITHOUT_N
 
 PALE = 0.45
 """How far the colour of a mirror twin is from that of the other twin towards white."""
@@ -85,7 +85,7 @@ def _colours(shares: BasinShares) -> dict[int, str]:
             colour = base.get(pairs[number], REST)
             out[number] = colour if pairs[number] == number else _pale(colour)
         else:
-            out[number] = CHAOS if met[0][1].status is OrbitStatus.APERIODIC else OPEN
+            out[number] = WITHOUT_N.get(met[0][1].status, OPEN)
     return out
 
 

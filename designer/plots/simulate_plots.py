@@ -41,6 +41,7 @@ from designer.model.relative_motion import RelativeMotion
 from designer.model.si_units import NO_UNITS
 from designer.plots.response_colours import BLACK, RED
 from designer.plots.section_plots import (
+    place_title,
     section_csv,
     section_figure,
     spectrum_csv,
@@ -175,21 +176,23 @@ def _at_stop(orbit: Orbit, clearance: int, side: int) -> Any:
 
 @styled
 def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
-    """x1 over drive periods, orbit and twin, and likewise in each further clearance; triangles
-    where an impact begins."""
-    count = len(response.motions)
-    figure = new_figure(6.4, 3.0 + 2.0 * (count - 1))
-    panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
-    for number, axes in enumerate(panels):
-        _time_panel(axes, response, number, units)
+    """x1 over drive periods, orbit and twin, and likewise in each further clearance, then what
+    masses over a moving base do beside it; triangles where an impact begins."""
+    motions = (*response.motions, *response.companions)
+    figure = new_figure(6.4, 3.0 + 2.0 * (len(motions) - 1))
+    panels = figure.subplots(len(motions), 1, squeeze=False, sharex=True)[:, 0]
+    for number, (axes, motion) in enumerate(zip(panels, motions, strict=True)):
+        _time_panel(axes, response, (number, motion), units)
     panels[-1].set_xlabel("drive periods t / T")
     _finish(figure, panels[0], response, units)
     return figure
 
 
-def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str, Unit]) -> None:
-    """The displacement in one clearance over time."""
-    motion = response.motions[number]
+def _time_panel(
+    axes: Axes, response: Simulated, shown: tuple[int, RelativeMotion], units: Mapping[str, Unit]
+) -> None:
+    """One displacement over time. shown : of clearances their number, and the motion."""
+    number, motion = shown
     period = 2.0 * np.pi / response.omega
     n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
     span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
@@ -267,9 +270,8 @@ def _impacts(axes: Axes, x: Any, y: Any, side: int, look: dict[str, Any]) -> Non
 def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str, Unit]) -> None:
     """Title and key."""
     wanted = f", wanted {response.expected}" if response.expected and not response.found else ""
-    hertz = f" ({units['omega'].text(response.omega)})" if "omega" in units else ""
     axes.set_title(
-        f"ω = {response.omega:.6g}{hertz}: {response.orbit.response}{wanted}",
+        f"{place_title(response.omega, units)}: {response.orbit.response}{wanted}",
         loc="left",
         weight="bold",
         color=INK,

@@ -109,7 +109,8 @@ class _Page(MechanicalSheet):
             return
         self.arrow(_WALL - 0.1, _WALL + 1.2, self.floor - 0.35)
         stay = ", the stops stay" if base.stops == "fixed" and self.model.gaps else ""
-        self.text(_WALL - 0.4, self.floor - 0.95, f"y = {self.values['Y']} sin ωt{stay}", "left")
+        amplitude = f"{self.values['a']}/ω²" if base.acceleration else self.values["Y"]
+        self.text(_WALL - 0.4, self.floor - 0.95, f"y = {amplitude} sin ωt{stay}", "left")
 
     def _mass(self, place: int) -> None:
         left, name = self._left(place), self.row[place]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping
 
+from designer.base.si_unit import quantity_text
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan
@@ -37,15 +38,16 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
     """
     whose = plan.subject.whose
     if isinstance(plan, SweepPlan):
-        heading = f"bifurcation diagram of the {whose} over {_name(plan.parameter)}, {_way(plan)}"
+        over = parameter_name(plan.subject, plan.parameter)
+        heading = f"bifurcation diagram of the {whose} over {over}, {_way(plan)}"
         changed: Mapping[str, float | None] = {plan.parameter: None}
     elif isinstance(plan, MapPlan):
-        over = f"{_name(plan.x)} and {_name(plan.y)}"
+        over = _both(plan.subject, plan.x, plan.y)
         heading = f"responses n-p-q of the {whose} over {over}, from rest"
         changed = {plan.x: None, plan.y: None}
     else:
-        heading = f"basins of attraction of the {whose}, by the initial {_name(plan.x)} and "
-        heading += f"{_name(plan.y)}, other states 0"
+        heading = f"basins of attraction of the {whose}, by the initial "
+        heading += f"{_both(plan.subject, plan.x, plan.y)}, other states 0"
         changed = plan.changes
     lines = [name, heading, "held: " + ", ".join(_fixed(plan.subject, changed))]
     return "\n".join(
@@ -55,13 +57,17 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
 def curves_title(name: str, plan: CurvePlan, width: int = 100) -> str:
     """The same of bifurcation curves over two parameters."""
-    over = f"{_name(plan.first)} and {_name(plan.second)}"
+    over = _both(plan.subject, plan.first, plan.second)
     heading = f"bifurcation curves of the {plan.subject.whose} over {over}"
     held = _fixed(plan.subject, {plan.first: None, plan.second: None})
     lines = [name, heading, "held: " + ", ".join(held)]
     return "\n".join(
         part for line in lines for part in textwrap.wrap(line, width, break_on_hyphens=False)
     )
+
+
+def _both(subject: Subject, first: str, second: str) -> str:
+    return f"{parameter_name(subject, first)} and {parameter_name(subject, second)}"
 
 
 def _way(plan: SweepPlan) -> str:
@@ -78,10 +84,27 @@ def _fixed(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[st
     yield from subject.remarks()
     for name, value in {**subject.fixed(changed), **changed}.items():
         if value is not None:
-            unit = subject.units.get(name, "")
-            si = f" ({subject.si[name].text(value)})" if name in subject.si else ""
-            yield f"{_name(name)} = {value:.6g}" + (f" {unit}" if unit else "") + si
+            yield f"{parameter_name(subject, name)} = {parameter_text(subject, name, value)}"
 
 
-def _name(name: str) -> str:
+def in_si_values(subject: Subject) -> bool:
+    """Whether the plain numbers of a subject are SI values of a mechanism, ω in rad/s."""
+    return subject.units.get("omega") == "rad/s"
+
+
+def parameter_name(subject: Subject, name: str) -> str:
+    """What people read: ω by its symbol, where it is shown in hertz in words."""
+    if name == "omega" and in_si_values(subject):
+        return "drive frequency"
     return NAMES.get(name, name)
+
+
+def parameter_text(subject: Subject, name: str, value: float) -> str:
+    """A value of it with its unit."""
+    unit, si = subject.units.get(name, ""), subject.si.get(name)
+    if si is not None and si.own_si:
+        return si.text(value, 6)
+    if unit and in_si_values(subject):
+        return quantity_text(value, unit, 6)
+    plain = f"{value:.6g}" + (f" {unit}" if unit else "")
+    return plain + (f" ({si.text(value)})" if si is not None else "")

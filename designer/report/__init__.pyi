@@ -3,6 +3,7 @@ from . import (
     compare_table as compare_table,
     comparison as comparison,
     measured_table as measured_table,
+    words as words,
 )
 from .comparison import (
     compare as compare,
@@ -12,6 +13,9 @@ from .comparison import (
 )
 from .data import (
     ReportData as ReportData,
+)
+from .design_tables import (
+    spring_of as spring_of,
 )
 from .inserted import (
     inserted_html as inserted_html,

@@ -22,7 +22,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
-from designer.model.relative_motion import RelativeMotion, different_motions
+from designer.model.relative_motion import RelativeMotion, companion_motions, different_motions
 from designer.model.si_units import in_si
 from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
@@ -48,6 +48,10 @@ class ReportData:
     """How to start each response, from ``setup.csv``; empty where there is none."""
     board_file: BoardFile | None = None
     """The board as the tool has written it beside the report; None where there is none."""
+    warnings: tuple[str, ...] = ()
+    """What is not good enough about the design, in sentences."""
+    failed_rules: tuple[Mapping[str, str], ...] = ()
+    """The design rules that fail on its circuit: ``id``, ``found``, ``limit`` and ``do``."""
 
     @property
     def design(self) -> Design:
@@ -112,6 +116,13 @@ class ReportData:
         moved = checked.orbit.extremes[0::2] if len(checked.orbit.extremes) else np.zeros(0)
         metres, unit = prefixed(max([*places, *np.abs(moved).ravel().tolist()], default=1.0), "m")
         return tuple(motion.in_unit(1.0 / metres, unit) for motion in motions)
+
+    def companions(self, response: int, motion: RelativeMotion) -> tuple[RelativeMotion, ...]:
+        """Over a base that moves: the absolute displacement of what a motion counts from the base,
+        or the other way round, in its unit."""
+        system = self.design.model.at(self.checked[response].model.b).second_order()
+        each = (m.in_unit(motion.scale, motion.unit) for m in companion_motions(system))
+        return tuple(m for m in each if np.array_equal(m.row, motion.row))
 
     @cached_property
     def stops(self) -> tuple[PredictedStop, ...]:

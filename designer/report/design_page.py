@@ -19,6 +19,8 @@ from designer.base.page import (
     Table,
     Verbatim,
     Widget,
+    bullets,
+    table,
 )
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
@@ -84,6 +86,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
     """The page of a run. pictures : those of ``pictures.pictures``; none for Markdown."""
     head: list[Block] = [_purpose(data)]
     sections = [
+        _not_good_enough(data),
         answers(data),
         PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
         _responses(data),
@@ -117,6 +120,18 @@ def _purpose(data: ReportData) -> str:
     if not number:
         return f"{purpose}; no response is named."
     return f"{purpose} and shows {words.plural(number, 'response')} of it."
+
+
+def _not_good_enough(data: ReportData) -> PageSection:
+    """What stands before everything else, where there is something."""
+    heads = ("rule", "found", "limit", "what to do")
+    rows = ([rule[key] for key in ("id", "found", "limit", "do")] for rule in data.failed_rules)
+    failing = table(heads, rows)
+    blocks: list[Block] = [
+        bullets(data.warnings) if data.warnings else None,
+        None if failing is None else PageSection("Design rules that fail", [failing]),
+    ]
+    return PageSection("What is not good enough", blocks, "warnings")
 
 
 def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:

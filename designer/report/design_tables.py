@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from designer.base.page import Table, table
+from designer.base.si_unit import drive_text
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
@@ -47,6 +48,7 @@ _CONDITIONS = {
     "frequency_low_hz": ("frequency at ω = 1, at least", "Hz"),
     "frequency_high_hz": ("frequency at ω = 1, at most", "Hz"),
     "swing_v": ("peak of any state, at most", "V"),
+    "guaranteed_swing_v": ("peak of an output at the current that it gives, at most", "V"),
     "rectifier_fv_v": ("rectifier's output, so that the idle half stays off, at most", "V"),
     "generator_peak_v": ("generator amplitude (peak), at most", "V"),
     "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
@@ -191,10 +193,11 @@ def moved_nets(stop: PredictedStop) -> str:
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:
     scales, unit_omega = design.errors.scales, design.model.second_order().own_frequency
+    hertz = None if si is None else si.hertz(unit_omega)
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
         (
-            f"generator frequency at ω = {words.number(unit_omega)}",
+            f"generator frequency at {drive_text(unit_omega, hertz)}",
             words.quantity(scales.frequency(unit_omega), "Hz"),
         ),
     ]

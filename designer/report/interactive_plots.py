@@ -157,7 +157,7 @@ def _orbit(c: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMoti
 
 def _title(c: CheckedResponse) -> str:
     wanted = f", wanted {c.model.expected}" if c.model.expected else ""
-    return f"ω = {words.number(c.model.omega)}{wanted}"
+    return f"{c.model.spec.place_text()}{wanted}"
 
 
 def _thinned(curve: Array) -> Array:

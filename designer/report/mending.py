@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from designer.base.si_unit import value_text
 from designer.check.checked_design import CheckedResponse
 from designer.report import words
 from designer.report.data import ReportData
@@ -33,8 +34,17 @@ class Remedy:
 
 def remedies(data: ReportData) -> list[Remedy]:
     """What is to be mended, the most important first; nothing where all is well."""
-    parts = (_responses, _netlist, _low_yields, _study, _board)
+    parts = (_design, _responses, _netlist, _low_yields, _study, _board)
     return [remedy for part in parts for remedy in part(data)]
+
+
+def _design(data: ReportData) -> Iterator[Remedy]:
+    """Design rules that fail, or what else stands first on the page."""
+    if names := ", ".join(rule["id"] for rule in data.failed_rules):
+        count = words.plural(len(data.failed_rules), "design rule")
+        yield Remedy(f"The circuit does not keep {count}: {names}.", "designer rules DIR")
+    elif data.warnings:
+        yield Remedy("The design, as the first section of this page says.")
 
 
 def _responses(data: ReportData) -> Iterator[Remedy]:
@@ -46,8 +56,14 @@ def _responses(data: ReportData) -> Iterator[Remedy]:
 
 def _response_command(c: CheckedResponse) -> str:
     """Where the response lives, if the model does not show it; else a match by other parts."""
-    low, high = (words.number(share * c.model.omega, 3) for share in (0.8, 1.2))
     if not c.model.found:
+        hertz = c.model.omega / (2.0 * math.pi) if c.model.spec.in_hertz else None
+        low, high = (
+            words.number(share * c.model.omega, 3)
+            if hertz is None
+            else f"'{value_text(share * hertz, 'Hz', 3)}'"
+            for share in (0.8, 1.2)
+        )
         return f"designer bifurcation DIR --from {low} --to {high}"
     return "designer rules DIR"
 

@@ -22,7 +22,7 @@ from designer.report.design_page import FORMAT
 from designer.report.inline_svg import VARIABLES
 
 _NPQ = r"(?:\d+-\d+-\d+|n-p-q|n-q-p)"
-_WHOLE = re.compile(rf"ω = [\d.]+(?: \({_NPQ}\))?|(?<![\w-]){_NPQ}(?![\w-])")
+_WHOLE = re.compile(rf"(?:ω = [\d.]+|[\d.]+ [mkM]?Hz)(?: \({_NPQ}\))?|(?<![\w-]){_NPQ}(?![\w-])")
 
 
 def render_page(page: Page, plots: Mapping[str, str] | None = None, boards: str = "") -> str:

@@ -39,6 +39,9 @@ EVERY_CLEARANCE = (
     "Displacement and velocity in each clearance over one response; below, "
     "the displacement over time. The engines lie on each other where they agree."
 )
+OVER_A_BASE = (
+    " Where the base moves, x − y is counted from it, as a stop on it sees it; x is absolute."
+)
 KEY = (
     "Model: broad light line. Exact circuit: dashed line. ngspice: dots. Triangles: an impact "
     "begins. Shaded: contact with a stop."
@@ -144,15 +147,14 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
         for view in range(len(data.motions(response)))
     ]
     alone = [motion.symbol for motion in different_motions(system)] == ["x₁"]
-    return Gallery(
-        INTRO if alone else EVERY_CLEARANCE, Picture(svg=element(key, KEY)), tuple(cards)
-    )
+    intro = (INTRO if alone else EVERY_CLEARANCE) + OVER_A_BASE * system.ground_moves
+    return Gallery(intro, Picture(svg=element(key, KEY)), tuple(cards))
 
 
 def _card(data: ReportData, response: int, view: int, element: Element) -> Picture:
     """One response, by one of its motions (``ReportData.motions``)."""
     c = data.checked[response]
-    curves, omega = data.traces[response], words.number(c.model.omega)
+    curves, place_at = data.traces[response], c.model.spec.place_text()
     system = data.design.model.at(c.model.b).second_order()
     motion = data.motions(response)[view]
     engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
@@ -164,10 +166,11 @@ def _card(data: ReportData, response: int, view: int, element: Element) -> Pictu
         place = f" in {' and '.join(names)}"
         caption = f"{motion.label}{place} · {caption}"
     portrait = orbit_plots.phase_portrait(c, curves, motion)
-    shows = element(portrait, f"Phase portrait{place} at ω = {omega}: {engines}.")
-    shows += element(
-        orbit_plots.time_traces(c, curves, motion), f"{motion.symbol} over time at ω = {omega}."
-    )
+    shows = element(portrait, f"Phase portrait{place} at {place_at}: {engines}.")
+    for each in (motion, *data.companions(response, motion)):
+        shows += element(
+            orbit_plots.time_traces(c, curves, each), f"{each.label} over time at {place_at}."
+        )
     plot = portrait_name(response, view)
     return Picture("", caption, svg=shows, warning=words.problem(c), plot=plot)
 

@@ -148,6 +148,8 @@ def _blocks(record: Mapping[str, Any], drawing: Markup) -> Iterator[str | Pictur
         f"{record['kind'] or 'A record'}, {record['samples']} samples over {record['periods']:.3g} "
         f"drive periods; {channels}. It shows {shown_words(record)}."
     )
+    for cut in record["clipped"]:
+        yield cut["words"]
     if record["reason"]:
         yield f"Why it is not sure: {record['reason']}. What would tell: {record['would_tell']}."
     for stop in record["stops"]:

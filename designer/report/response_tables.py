@@ -11,6 +11,7 @@ from typing import Any
 from designer.base.defaults import DRAWN_STARTS
 from designer.base.design_folder import TOLERANCE
 from designer.base.page import Table, table, table_of
+from designer.base.si_unit import is_angular
 from designer.check.checked_design import CheckedResponse
 from designer.check.coexistence import beside
 from designer.circuit.nominal import nominal_reduction
@@ -34,8 +35,7 @@ STARTED = {StartKind.OWN: "its own orbit", StartKind.NOMINAL: "the nominal orbit
 
 def response_table(data: ReportData) -> Table | None:
     columns: Columns = {
-        "ω": _omega,
-        **_mechanism(data),
+        **_frequencies(data),
         "expected": _expected,
         "model": lambda c: c.model.orbit.response + ("" if c.model.found else NOT_WANTED),
         "exact circuit": lambda c: c.circuit.response,
@@ -66,8 +66,7 @@ def settings_table(data: ReportData) -> Table | None:
         return words.quantity(shortest_contact(c.circuit, system, c.excitation), "s", 3)
 
     columns: Columns = {
-        "ω": _omega,
-        **_mechanism(data),
+        **_frequencies(data),
         "b": lambda c: words.number(c.model.b),
         "frequency": lambda c: words.quantity(c.excitation.frequency, "Hz"),
         "amplitude (peak)": lambda c: words.quantity(c.excitation.amplitude, "V"),
@@ -104,12 +103,14 @@ def _omega(c: CheckedResponse) -> str:
     return words.number(c.model.omega)
 
 
-def _mechanism(data: ReportData) -> Columns:
-    """The frequency that the mechanism has, where it has SI values."""
+def _frequencies(data: ReportData) -> Columns:
+    """ω, and the frequency that the mechanism has where it has SI values; that alone where ω is in
+    rad/s."""
     si = data.si
     if si is None:
-        return {}
-    return {"mechanism": lambda c: words.quantity(si.hertz(c.model.omega), "Hz")}
+        return {"ω": _omega}
+    mechanism: Columns = {"mechanism": lambda c: words.quantity(si.hertz(c.model.omega), "Hz")}
+    return mechanism if is_angular(1.0, si.hertz(1.0)) else {"ω": _omega, **mechanism}
 
 
 def _expected(c: CheckedResponse) -> str:

@@ -20,6 +20,7 @@ from designer.base.page import (
     table,
     table_of,
 )
+from designer.base.si_unit import drive_text
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 from designer.fidelity import trade_files
 from designer.report import record_page, words
@@ -79,7 +80,8 @@ def _refused(answer: Answer) -> Items:
 
 
 def _response(row: Answer) -> str:
-    return f"ω = {words.number(row['omega'])}" + (f" ({row['expected']})" * bool(row["expected"]))
+    place = drive_text(row["omega"], row.get("frequency_hz"))
+    return place + (f" ({row['expected']})" * bool(row["expected"]))
 
 
 def _worst(measured: Answer) -> tuple[float, float]:

@@ -25,12 +25,12 @@ _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def name(c: CheckedResponse) -> str:
-    return f"ω = {number(c.model.omega)} ({c.model.expected or c.model.orbit.response})"
+    return f"{c.model.spec.place_text()} ({c.model.expected or c.model.orbit.response})"
 
 
 def label(c: CheckedResponse, join: str = "   ") -> str:
     """The same in a picture, where n-p-q may stand on a line of its own."""
-    return f"ω = {number(c.model.omega)}{join}{c.model.expected or c.model.orbit.response}"
+    return f"{c.model.spec.place_text()}{join}{c.model.expected or c.model.orbit.response}"
 
 
 def orbit(shown: Orbit) -> str:

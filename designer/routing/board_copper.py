@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
 import shapely
 from shapely import Geometry
 
+from designer.base.arrays import Array
 from designer.base.sexpr import Expression, expression, word
 from designer.board.kicad_names import identifier
 from designer.board.kicad_reader import TRACKS, pad_corners, turned
@@ -22,6 +25,10 @@ ALL = "*.Cu"
 """KiCad's name of every copper layer."""
 CHORDS = 8
 """Of a quarter of a circle."""
+MOST_MEETINGS = 10_000
+"""Pairs of pieces of an edge that meet, beyond those that follow each other: a drawing of lines
+that cross has as many faces, and an edge has none."""
+PIECES_AT_ONCE = 16
 SCREW_ROOM = 0.3
 """Round a bare hole, more than the clearance of copper [mm]."""
 NO_NET = 0
@@ -74,6 +81,8 @@ class BoardCopper:
     """The inner copper layers, from the front."""
     planes: tuple[str, ...] = ()
     """Those of them that no zone is on: planes of ground lie there, which every via reaches."""
+    file: Path | None = None
+    """The board's file, for messages."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -92,12 +101,15 @@ def read_copper(board: Expression) -> BoardCopper:
 
     Raises
     ------
-    InputError : the board has no closed edge, or something is not as KiCad 9 writes it.
+    InputError : the board has no closed edge, or one that crosses itself again and again, or
+        something is not as KiCad 9 writes it.
     """
     outline = read_outline(board)
     if not len(outline.sides) or outline.open_at is not None:
         raise board.error("no closed edge", "a closed line on Edge.Cuts")
-    edge = shapely.multilinestrings([shapely.linestrings(outline.sides)])[0]
+    lines = shapely.linestrings(outline.sides)
+    _check_meetings(board, lines)
+    edge = shapely.multilinestrings([lines])[0]
     inner = inner_layers(board)
     pieces = [piece for each in board.all("footprint") for piece in _pads(each, inner)]
     pieces += [_track(each, inner) for kind in TRACKS for each in board.all(kind)]
@@ -110,6 +122,7 @@ def read_copper(board: Expression) -> BoardCopper:
         _enclosed(edge),
         inner,
         tuple(name for name in inner if not zones & {name, ALL}),
+        board.source.file,
     )
 
 
@@ -127,13 +140,27 @@ def zone_layers(zone: Expression) -> frozenset[str]:
 
 
 def _enclosed(edge: Geometry) -> Geometry:
-    """The faces of a drawing of lines, alternately board and cut-out from the outside."""
+    """The faces of a drawing of lines, alternately board and cut-out from the outside: those that
+    lie within an odd number of the faces' outer rings."""
     faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(edge)]))
-    rings = sorted((shapely.polygons(f.exterior) for f in faces), key=lambda f: -float(f.area))
-    area: Geometry = shapely.Polygon()
-    for ring in rings:
-        area = shapely.symmetric_difference(area, ring)
+    rings = shapely.STRtree(shapely.polygons(shapely.get_exterior_ring(faces)))
+    inner, _ = rings.query(shapely.point_on_surface(faces), predicate="within")
+    within = np.bincount(inner, minlength=len(faces))
+    area: Geometry = shapely.unary_union(faces[within % 2 == 1])
     return area
+
+
+def _check_meetings(board: Expression, lines: Array) -> None:
+    """InputError for an edge whose pieces meet more often than ``MOST_MEETINGS``, found a few
+    pieces at a time."""
+    tree, left = shapely.STRtree(lines), MOST_MEETINGS
+    for start in range(0, len(lines), PIECES_AT_ONCE):
+        some = lines[start : start + PIECES_AT_ONCE]
+        # Each meets itself and its two neighbours.
+        left -= tree.query(some, predicate="intersects").shape[1] - 3 * len(some)
+        if left < 0:
+            found = f"an edge whose pieces meet in more than {MOST_MEETINGS} places"
+            raise board.error(found, "a closed line on Edge.Cuts that does not cross itself")
 
 
 def _pads(footprint: Expression, inner: Sequence[str]) -> Iterator[Copper]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 from designer.base.arrays import Array
 from designer.base.sexpr import Expression, expression, expression_text, lists, read, word
@@ -52,17 +53,20 @@ class RoutedBoard:
     """Vias that were set."""
 
 
-def route_board(text: str, circuit: Circuit, rules: Sequence[CustomRule]) -> RoutedBoard:
+def route_board(
+    text: str, circuit: Circuit, rules: Sequence[CustomRule], file: Path | None = None
+) -> RoutedBoard:
     """Lay the tracks of a placed board of a circuit; what is on it already stays.
 
     text : of the ``.kicad_pcb``. rules : the board's, whose widths and clearances hold. The same
-    text gives the same board, byte for byte.
+    text gives the same board, byte for byte. file : where it was read from, for messages.
 
     Raises
     ------
-    InputError : the board has no closed edge, or a pad of a shape that is not read.
+    InputError : the board has no closed edge, is too large, or has a pad of a shape that is not
+        read.
     """
-    board = read(text)
+    board = read(text, file)
     board = Expression(tuple(item for item in board.items if not _ours(item)), board.source)
     copper = read_copper(board)
     kinds = net_kinds(rules)

@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from shapely import Geometry
 
 from designer.base.arrays import Array
+from designer.base.errors import InputError
 from designer.routing.board_copper import NO_NET, BoardCopper, Copper
 from designer.routing.kernel_router import FREE, NOBODY, Grid, SearchSpace
 from designer.routing.net_kinds import VIA_RADIUS, NetKind
 
 STEP = 0.125
 """Between places [mm]."""
+MOST_PLACES = 8_000_000
+"""Of a layer: each takes some 200 bytes while a board is routed."""
 MARGIN = 0.015
 """Added to clearances [mm]: two tracks come as much nearer between the places of the grid."""
 EDGE = 0.5
@@ -106,10 +109,20 @@ class RoutingGrid:
 def routing_grid(
     copper: BoardCopper, kinds: Sequence[NetKind], of: Mapping[int, int]
 ) -> RoutingGrid:
-    """The grid of a board. of : index of the kind of each net, by its number."""
+    """The grid of a board. of : index of the kind of each net, by its number.
+
+    Raises
+    ------
+    InputError : the board is too large for it.
+    """
     left, top, right, bottom = shapely.bounds(copper.area)
     width, height = (math.floor(d / STEP) + 1 for d in (right - left, bottom - top))
     places, count = width * height, len(kinds)
+    if places > MOST_PLACES:
+        found = f"a board of {right - left:.5g} mm × {bottom - top:.5g} mm"
+        raise InputError(
+            copper.file, "Edge.Cuts", found, f"at most {MOST_PLACES * STEP**2:.3g} mm²"
+        )
     arrays = Grid(
         width=width,
         places=places,

@@ -48,7 +48,7 @@ UM = 1000.0
 """Micrometres of a millimetre."""
 PADSTACK = f"via_{VIA['via_diameter'] * UM:g}_{VIA['via_drill'] * UM:g}"
 """Name of the one kind of via: its diameter and its hole."""
-LARGEST = 50_000_000
+LARGEST = 30_000_000
 """Bytes of a session."""
 EXPECTED = "a session of a router (.ses)"
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "mil": 0.0254, "inch": 25.4}
@@ -89,7 +89,7 @@ def design_text(board: BoardFile, name: str, circuit: Circuit, rules: Sequence[C
     InputError : the board has no closed edge, several separate ones, or a pad of a shape that is
         not read.
     """
-    source = read(board.text)
+    source = read(board.text, board.path)
     copper = read_copper(source)
     if (outlines := len(shapely.get_parts(copper.area))) != 1:
         raise source.error(f"{outlines} separate outlines", "one, which Specctra's format has")

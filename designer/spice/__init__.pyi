@@ -47,6 +47,7 @@ from .read_orbit import (
     Read as Read,
     Reading as Reading,
     clearance_rows as clearance_rows,
+    name_in_ngspice as name_in_ngspice,
     read as read,
 )
 from .simulator import (

@@ -34,7 +34,14 @@ from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import BRIEF, Read, Reading, clearance_rows, read
+from designer.spice.read_orbit import (
+    BRIEF,
+    Read,
+    Reading,
+    clearance_rows,
+    name_in_ngspice,
+    read,
+)
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
@@ -391,7 +398,7 @@ def _judge(
     if wanted.status is OrbitStatus.PERIODIC and subject.rung == "ideal":
         bound = wave_bound(wanted)
     if len(good) == len(runs):
-        passed = all(r.orbit.response == wanted.response for r in good)
+        passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
         wave = wave_error(subject, good[0])
         if wanted.status is OrbitStatus.PERIODIC:
             peak = np.abs(wanted.extremes).max(axis=1)

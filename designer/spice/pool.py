@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import multiprocessing
 import os
 import pickle
 import shutil
@@ -26,15 +25,15 @@ import weakref
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, TypeVar
 
-from designer.base.environment import changed_environment
+from designer.base.environment import changed_environment, spawn_context
 from designer.base.errors import EnvironmentMissing
 from designer.spice.batch_backend import program_version
+from designer.spice.shared_backend import library_name
 from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Backend,
@@ -203,7 +202,11 @@ class SpicePool:
         if not was_ready:
             self._failed_starts += 1
             if self._failed_starts >= ATTEMPTS:
-                raise EnvironmentMissing(f"simulation workers do not start: the last {complaint}")
+                where = f": libngspice is {library_name()}" if self._backend == "shared" else ""
+                raise EnvironmentMissing(
+                    f"simulation workers do not start: the last {complaint}{where}; "
+                    f"{HOW_TO_INSTALL}"
+                )
         if task is None:
             return None
         task.complaints.append(complaint)
@@ -281,14 +284,14 @@ def _interrupts_deferred() -> Iterator[None]:
 
 def _start(backend: Backend, folder: Path, workers: list[_Worker]) -> None:
     """Start a worker and enter it in the list, both or neither."""
-    context = multiprocessing.get_context("spawn")
+    # Its tracker runs already: started inside the block below it would lift the hold of Ctrl-C.
+    context = spawn_context()
     parent_end, child_end = context.Pipe()
     process = context.Process(
         target=work, args=(child_end, backend, str(folder)), name="designer-spice", daemon=True
     )
     # A held signal stays held in the child, so Ctrl-C cannot hit it before it can say that it
-    # ignores it. The tracker would lift the hold if it were started inside the block.
-    resource_tracker.ensure_running()
+    # ignores it.
     with _interrupts_deferred(), child_end:
         with changed_environment(ONE_THREAD):  # before the child imports numpy
             process.start()

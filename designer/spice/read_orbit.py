@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
-from designer.dynamics.counts import MAX_PERIOD
+from designer.dynamics.counts import MAX_PERIOD, read_counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice.simulator import Waveforms
@@ -172,6 +172,16 @@ class _Impacts:
     @property
     def pair(self) -> tuple[int, int]:
         return round(self.counts[1]), round(self.counts[-1])
+
+
+def name_in_ngspice(response: str) -> str:
+    """What ngspice calls a response of the exact engine: aperiodic one of a period above
+    ``MAX_PERIOD``, which is not looked for there, and a quasi-periodic one, since no run is long
+    enough to tell it from chaos."""
+    counts = read_counts(response)
+    long = counts is not None and counts.n > MAX_PERIOD
+    torus = response == OrbitStatus.QUASI_PERIODIC
+    return str(OrbitStatus.APERIODIC) if long or torus else response
 
 
 def _impacts(

@@ -129,9 +129,14 @@ class SharedNgspice:
         return 0
 
 
+def library_name() -> str:
+    """The libngspice that a session loads; "" where there is none."""
+    return os.environ.get("NGSPICE_LIBRARY_PATH") or ctypes.util.find_library("ngspice") or ""
+
+
 def _start_session() -> Any:
     """A PySpice session of a libngspice that has read no one's settings."""
-    library = os.environ.get("NGSPICE_LIBRARY_PATH") or ctypes.util.find_library("ngspice")
+    library = library_name()
     if not library:
         raise EnvironmentMissing(f"libngspice is missing; {HOW_TO_INSTALL}")
     # "Unsupported Ngspice version" and an echo of every line; the log of a run says it all
@@ -145,10 +150,9 @@ def _start_session() -> Any:
     with _nobodys_home():
         try:
             session = NgSpiceShared()
-        except OSError as error:
-            raise EnvironmentMissing(f"libngspice does not load: {error}; {HOW_TO_INSTALL}") from (
-                error
-            )
+        except Exception as error:  # another library, another version: it has none of the functions
+            why = f"libngspice does not load: {library}: {error}; {HOW_TO_INSTALL}"
+            raise EnvironmentMissing(why) from None
     # An operating point that no stepping finds is a failure at once. ngspice would look for it by
     # a run in time, which never ends where op-amps of endless gain have no bandwidth.
     session.exec_command("optran 0 1 1 0 0 0")

@@ -62,8 +62,10 @@ def work(connection: Connection, backend: Backend, folder: str) -> None:
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone
         try:
             simulator = open_simulator(backend)
-        except EnvironmentMissing as error:
-            connection.send_bytes(pickle.dumps(Reply(str(error), last=True)))
+        except Exception as error:
+            missing = isinstance(error, EnvironmentMissing)
+            words = str(error) if missing else f"ngspice does not start: {reason_of(error)}"
+            connection.send_bytes(pickle.dumps(Reply(words, last=True)))
             return
         connection.send_bytes(pickle.dumps(Reply(simulator.version)))
         while simulator.usable:

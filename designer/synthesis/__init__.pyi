@@ -3,11 +3,23 @@ from . import (
     parts_choice as parts_choice,
     side_conditions as side_conditions,
 )
+from .force_at_clearance import (
+    Forces as Forces,
+    Statics as Statics,
+    leftovers as leftovers,
+    thermal as thermal,
+)
 from .limits import (
     NO_AIMS as NO_AIMS,
     Aims as Aims,
     bandwidth_limit as bandwidth_limit,
     guaranteed as guaranteed,
+)
+from .operating_point import (
+    Operating as Operating,
+    Peak as Peak,
+    operating as operating,
+    stuck as stuck,
 )
 from .output_loads import (
     REST as REST,
@@ -26,7 +38,9 @@ from .part_checks import (
 )
 from .parts_choice import (
     synthesise as synthesise,
+    ways_to_less_error as ways_to_less_error,
 )
 from .side_conditions import (
+    guaranteed_swing as guaranteed_swing,
     saturating as saturating,
 )

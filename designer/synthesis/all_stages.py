@@ -70,6 +70,18 @@ def size(question: StageQuestion, values: Mapping[str, float]) -> DeadZone | str
     return sizing.enumerated()
 
 
+def with_levels(
+    question: StageQuestion, linear: Mapping[str, float], chosen: Mapping[str, float]
+) -> dict[str, float] | str:
+    """Chosen resistors of rectifying stages and of constant forces, with the clamps' and the feeds
+    of the references; or the condition that leaves none. linear : of the linear block by part."""
+    sizing = _Sizing(question, question.model.second_order(), linear)
+    out = dict(chosen)
+    for place in sizing.places:
+        out |= sizing.lifts(place, chosen)
+    return sizing.with_feeds(out)
+
+
 def alike(clearance: Clearance) -> bool:
     """Whether the stops of a clearance are alike, or only one, away from rest."""
     stops = [stop for _, stop in clearance.sides]
@@ -181,7 +193,12 @@ class _Sizing:
         """What the stage of a clearance has to do, with each amplifier that it may have."""
         return [
             further_stages.RectifierQuestion(
-                self.system, place, scales, each, self._target(place, each.gain)
+                self.system,
+                place,
+                scales,
+                each,
+                self._target(place, each.gain),
+                self.question.peaks.reach(place.index),
             )
             for each in self._differences(place, scales)
         ]
@@ -214,8 +231,7 @@ class _Sizing:
 
     def _differences(self, place: DeadZonePlace, scales: CircuitScales) -> tuple[Difference, ...]:
         """Difference amplifiers that the stage may have, the largest gain first."""
-        reaches = self.question.peaks.reaches
-        peak = reaches[place.index].peak if place.index < len(reaches) else 0.0
+        peak = self.question.peaks.reach(place.index).peak
         volts = float(scales.volts[2 * place.clearance.mass])
         most = self.question.limits.swing / (volts * peak) if peak > 0.0 else 1.0
         return further_stages.differences(place, scales.volts, most, self.heavy)
@@ -256,11 +272,15 @@ class _Sizing:
         self, chosen: Mapping[str, float], scales: CircuitScales
     ) -> dict[str, float] | str:
         """The stages' values with those of constant forces and feeds; what leaves none."""
-        q, reference = self.question, self.question.stage.reference
-        out = dict(chosen)
+        reference, out = self.question.stage.reference, dict(chosen)
         if self.system.constant.any():
             assert reference is not None
             out |= further_stages.constants(self.system, scales, reference.voltage, self.heavy)
+        return self.with_feeds(out)
+
+    def with_feeds(self, chosen: Mapping[str, float]) -> dict[str, float] | str:
+        """The same with the feeds of the references alone."""
+        q, reference, out = self.question, self.question.stage.reference, dict(chosen)
         loads = self._loads(out)
         if reference is not None and set(loads) - {s for s, r in q.stage.feeds.items() if r in out}:
             feeds = further_stages.feeds(q.stage, loads, q.spec.supply, q.resistors, out)
@@ -270,6 +290,21 @@ class _Sizing:
         known = {**self.linear, **out}
         groups = ([known[name] for name in group if name in known] for group in q.spec.matched)
         return "matched parts" if any(len(set(group)) > 1 for group in groups) else out
+
+    def lifts(self, place: DeadZonePlace, chosen: Mapping[str, float]) -> dict[str, float]:
+        """The clamps' resistors of a rectifying stage, beside its other resistors."""
+        reference = self.question.stage.reference
+        assert reference is not None
+        sources, thresholds = {}, {}
+        for side, stop in place.clearance.sides:
+            names = half_parts(place.index, side)
+            sources[side] = chosen[names.source]
+            volts = reference.voltage * sources[side] / chosen.get(names.threshold, np.inf)
+            thresholds[side] = float(np.copysign(volts, stop.gap))
+        q = self.question
+        shares = further_stages.idle_shares(place.clearance, q.peaks.reach(place.index))
+        limit = q.output.limit
+        return further_stages.lifts(place, sources, thresholds, shares, limit, self.heavy)
 
     def _loads(self, values: Mapping[str, float]) -> dict[int, float]:
         """Conductance on each reference that is there [1/ohm], by its sign."""

@@ -22,7 +22,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.circuit.terms import entry_resistor
 from designer.linear_network import linear_search
-from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
+from designer.linear_network.linear_terms import LinearBlock, LinearQuestion, Shortfall, Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import ModelResponse, Peaks
 from designer.model.mechanics import MechanicalModel
@@ -192,19 +192,40 @@ def linear_block(
     ``Order.stiffness`` [ohm]. level : the one level of error to search, if not all. empty : a level
     at which wider limits leave nothing.
     """
+    asked = linear_question(order, limits, most_values=most_values, between=between)
+    return linear_search.best(
+        asked.targets,
+        asked.resistors,
+        asked.capacitors,
+        asked.prices,
+        asked.bounds,
+        asked.spec,
+        level,
+        empty,
+    )
+
+
+def linear_question(
+    order: Order,
+    limits: ConditionLimits,
+    *,
+    most_values: int | None = None,
+    between: tuple[float, float] = (0.0, np.inf),
+) -> LinearQuestion:
+    """What is asked of the linear block within these limits; of all resistors, those outside the
+    range of the side condition too. most_values, between : as of ``linear_block``."""
     system = order.model.second_order()
     mu = max((system.relative_stiffness(stop) for stop in system.clearances), default=0.0)
     mass = system.clearances[0].mass if system.clearances else 0
     bounds = limits.bounds(mu, order.peaks, order.resistors, mass)
-    return linear_search.best(
+    bounds = replace(bounds, stop=max(bounds.stop, between[0]), stop_most=between[1])
+    return LinearQuestion(
         Targets.of(order.model),
         order.resistors,
         order.capacitors,
         order.prices,
-        replace(bounds, stop=max(bounds.stop, between[0]), stop_most=between[1]),
+        bounds,
         replace(order.spec, most_values=most_values),
-        level,
-        empty,
     )
 
 
@@ -215,10 +236,7 @@ def attempt(
 
     thrifty : take values that the linear block has for whatever only sets a level.
     """
-    values = {
-        name: nearest(order.resistors if name.startswith("R") else order.capacitors, value)
-        for name, value in linear.values.items()
-    }
+    values = _bought(order, linear)
     inverters = _inverters(order, limits, values, thrifty)
     if isinstance(inverters, Shortfall):
         return inverters
@@ -226,7 +244,46 @@ def attempt(
     sized = all_stages.size(_question(order, limits), values)
     if isinstance(sized, str):
         return Shortfall(sized, True)
-    values |= sized.values if sized is not None else {}
+    return _driven(order, limits, linear, sized, values, thrifty)
+
+
+def completed(
+    order: Order, limits: ConditionLimits, linear: LinearBlock, stages: DeadZone | None
+) -> Attempt | Shortfall:
+    """A circuit with this linear block and these stages, whose resistors that only set a level are
+    still to be chosen; or what leaves none."""
+    values = _bought(order, linear)
+    inverters = _inverters(order, limits, values, thrifty=False)
+    if isinstance(inverters, Shortfall):
+        return inverters
+    values |= inverters
+    if stages is not None:
+        own = {name: nearest(order.resistors, value) for name, value in stages.values.items()}
+        whole = all_stages.with_levels(_question(order, limits), values, own)
+        if isinstance(whole, str):
+            return Shortfall(whole, True)
+        stages = replace(stages, values=whole)
+    return _driven(order, limits, linear, stages, values, thrifty=False)
+
+
+def _bought(order: Order, linear: LinearBlock) -> dict[str, float]:
+    """The values of a linear block as the catalogue has them."""
+    return {
+        name: nearest(order.resistors if name.startswith("R") else order.capacitors, value)
+        for name, value in linear.values.items()
+    }
+
+
+def _driven(
+    order: Order,
+    limits: ConditionLimits,
+    linear: LinearBlock,
+    stages: DeadZone | None,
+    values: Mapping[str, float],
+    thrifty: bool,
+) -> Attempt | Shortfall:
+    """The circuit with its drive. values : of all but the stages and the drive."""
+    values = {**values, **(stages.values if stages is not None else {})}
     try:
         drive = _drive(order, limits, values, thrifty)
         if isinstance(drive, Shortfall):
@@ -236,7 +293,7 @@ def attempt(
         errors = order.errors(circuit, limits.swing)
     except CutShort:  # an output that is meant to be linear is not, within the clearance
         return Shortfall("swing", False)
-    return Attempt(values, circuit, errors, linear, sized)
+    return Attempt(dict(values), circuit, errors, linear, stages)
 
 
 def _question(order: Order, limits: ConditionLimits) -> StageQuestion:

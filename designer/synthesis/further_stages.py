@@ -6,7 +6,7 @@ as they say, and so is each constant force.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,8 @@ from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_terms import Targets
-from designer.model.mechanics import SecondOrderSystem
+from designer.model.find_responses import Reach
+from designer.model.mechanics import Clearance, SecondOrderSystem
 from designer.synthesis.dead_zone_target import REFERENCE_MARGIN, DeadZoneTarget
 from designer.synthesis.stop_halves import (
     ChosenHalves,
@@ -147,6 +148,8 @@ class RectifierQuestion:
     """In front of the stage."""
     target: DeadZoneTarget
     """Its conditions."""
+    reach: Reach
+    """How far the displacement goes in the clearance."""
 
     @property
     def halves(self) -> list[HalfTarget]:
@@ -185,7 +188,12 @@ def rectifier(
     if chosen is None:
         return None
     values = {**amplifier.values, place.part("R50"): chosen.force, **_named(place, chosen)}
-    values |= _lifts(place, chosen, targets, target, resistors)
+    ends = dict(clearance.sides)
+    volts = {t.side: float(np.copysign(t.threshold, ends[t.side].gap)) for t in targets}
+    sources = {side: half.source for side, half in chosen.halves.items()}
+    shares = idle_shares(clearance, question.reach)
+    heavy = resistors[resistors >= target.load]
+    values |= lifts(place, sources, volts, shares, target.output.limit, heavy)
     errors = {**amplifier.errors, f"stops of {clearance.name}": chosen.error}
     if clearance.other is not None:
         heavy = resistors[resistors >= target.load]
@@ -228,25 +236,46 @@ def _named(place: DeadZonePlace, chosen: ChosenHalves) -> dict[str, float]:
     return out
 
 
-def _lifts(
+def lifts(
     place: DeadZonePlace,
-    chosen: ChosenHalves,
-    targets: Sequence[HalfTarget],
-    target: DeadZoneTarget,
+    sources: Mapping[int, float],
+    thresholds: Mapping[int, float],
+    shares: Mapping[int, float],
+    limit: float,
     resistors: Array,
 ) -> dict[str, float]:
     """The clamps' resistors: as large as lets a half idle inside its swing while the other one
-    drives fv. A clamp then carries both thresholds over its half's input resistor."""
-    if len(chosen.halves) < 2:
+    drives fv. A clamp carries both thresholds over its half's input resistor where contact begins,
+    and ``shares`` of that at the deepest.
+
+    sources : input resistor of each half, by side [ohm]. thresholds : by side [V], negative where
+    the stop is in contact at rest. shares : of ``idle_shares``. limit : of an output [V].
+    resistors : that an output may drive, ascending [ohm].
+    """
+    if len(sources) < 2:
         return {}
-    ends = dict(place.clearance.sides)
-    total = sum(float(np.copysign(t.threshold, ends[t.side].gap)) for t in targets)
+    total = sum(thresholds.values())
     out = {}
-    for side, half in chosen.halves.items():
-        most = LIFT * target.output.limit * half.source / total
-        fine = resistors[resistors <= most]
+    for side, source in sources.items():
+        share = shares.get(-side, 1.0)
+        fine = resistors[resistors * total * max(1.0, share) <= LIFT * limit * source]
         out[half_parts(place.index, side).lift] = float(fine[-1] if len(fine) else resistors[0])
     return out
+
+
+def idle_shares(clearance: Clearance, reach: Reach) -> dict[int, float]:
+    """By driving side: the current of the idle half's clamp at the deepest contact over that where
+    contact begins. It falls with depth where the driving half is the steeper one; where it comes
+    to 0 the idle half does not stay off (``circuit.dead_zone_parts.idle_limits``). Empty with one
+    stop, or where preloads leave no room between the stops."""
+    ends = dict(clearance.sides)
+    room = sum(stop.gap for stop in ends.values())
+    if len(ends) < 2 or room <= 0.0:
+        return {}
+    return {
+        side: 1.0 + reach.on(side) * (1.0 - stop.stiffness / ends[-side].stiffness) / room
+        for side, stop in ends.items()
+    }
 
 
 def constants(

@@ -37,6 +37,8 @@ GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
 INVERTER_GAIN = 2.0
 """Noise gain of an inverter, which every circuit has."""
+VOLTAGES = ("swing_v", "guaranteed_swing_v", "rectifier_fv_v", "generator_peak_v")
+"""Checks that smaller voltages bring inside their limits."""
 MARGIN = 1e-3
 """How much further than the excess a limit is tightened."""
 
@@ -103,7 +105,7 @@ class ConditionLimits:
         out = self
         for check in broken:
             by = check.excess * (1.0 + MARGIN)
-            if check.quantity in ("swing_v", "rectifier_fv_v", "generator_peak_v"):
+            if check.quantity in VOLTAGES:
                 out = replace(out, swing=out.swing / by)
             elif check.quantity == "signal_level_ratio":
                 out = replace(out, level=out.level / by)

@@ -18,7 +18,7 @@ from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
+from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, stage_kind
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
@@ -44,17 +44,18 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         expected = f"above 0 and up to {spec.supply:g} V"
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
     system = model.second_order()
-    rectifies = spec.dead_zone == "rectifier" and bool(system.clearances)
+    rectifies = stage_kind(spec, system.clearances) == "rectifier" and bool(system.clearances)
     if rectifies:
         diode_of(spec.diode, catalog)
     if rectifies or system.constant.any():
         _reference_of(spec, catalog)
-    if spec.objective != "match":
+    if spec.objective == "yield":
         raise InputError(
             None,
             "circuit.objective",
             spec.objective,
-            '"match": a design for the yield comes from search, run or synthesise with --out',
+            '"margin" or "match": a design for the yield comes from search, run or synthesise with '
+            "--out",
         )
     circuit = unit_circuit(model, spec, catalog)
     for group in spec.matched:
@@ -97,7 +98,7 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "0 for a circuit: a force that jumps at the contact has no stage; a negative gap "
                 "is a stop in contact at rest, which the rectifier makes",
             )
-        if system.fixed_stops and system.base and clearance.other is None:
+        if system.fixed_stops and system.ground_moves and clearance.other is None:
             raise InputError(
                 None,
                 "base.stops",
@@ -113,7 +114,7 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "no base, or no force with an amplitude: one generator drives both, and their ratio "
             "changes with the frequency",
         )
-    refusal = stage_refusal(system.clearances, spec.dead_zone)
+    refusal = stage_refusal(system.clearances, stage_kind(spec, system.clearances))
     if refusal is not None:
         raise refusal
 

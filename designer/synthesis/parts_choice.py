@@ -10,36 +10,51 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NoReturn
 
+import numpy as np
+
 from designer.base.errors import Unreachable
-from designer.base.progress import doing, part
+from designer.base.progress import best_so_far, doing, part
 from designer.catalog.catalog import Catalog
-from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design
-from designer.circuit.reduction import Reduction
+from designer.circuit.nominal import circuit_flow, nominal_reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.step_budget import Budget
+from designer.linear_network import linear_search
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
-from designer.model.find_responses import ModelResponse, Peaks
+from designer.model.find_responses import ModelResponse, Peaks, matches
 from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
+from designer.synthesis.all_stages import alike
 from designer.synthesis.attempt import (
     Attempt,
     Order,
     attempt,
     linear_block,
+    linear_question,
     relative_amplitude,
 )
+from designer.synthesis.further_stages import idle_shares
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
 from designer.synthesis.part_checks import check_choices
+from designer.synthesis.scale_box import Conflict
+from designer.synthesis.scale_choice import ScaleAttempt, ScaleChoice
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
+BOX_ROUNDS = 8
+"""How often scales are chosen before the search gives up."""
+BOUND_STEPS = 4_000_000
+"""Steps of the tree of choices that looks for a lower bound."""
+LOOK = 2_000_000
+"""Steps of the engine in which a circuit has to settle on a wanted response."""
 BESIDE, BESIDE_TREE = 10, 2
 """Linear blocks that are tried beside the first: where joins find them, and where a tree of choices
 does, which is slower by far."""
@@ -102,6 +117,8 @@ class _Missed:
     short: Shortfall
     broken: tuple[str, ...] = ()
     free: str = ""
+    conflicts: tuple[Conflict, ...] = ()
+    """Limits that cannot be kept together, by a proof; none where that is not why."""
 
 
 def synthesise(
@@ -139,6 +156,8 @@ def synthesise(
     if spec.composites:
         doing("composites")
         design = search.with_composites(best, design)
+    if spec.max_error is not None and design.errors.max_error > spec.max_error:
+        _refuse_error(design, spec)
     return replace(design, seconds=time.perf_counter() - began)
 
 
@@ -154,11 +173,38 @@ class _Search:
 
         Bandwidth that is missing is sought in smaller gains first, in a slower time scale then.
         """
+        if self.by_scales:
+            return self._in_box(conditions)
         answer = self._rounds(conditions, slower=False)
         short = isinstance(answer, _Missed) and answer.broken and not answer.free
-        return (
-            self._rounds(conditions, slower=True) if short and "bandwidth" in conditions else answer
+        if short and "bandwidth" in conditions:
+            answer = self._rounds(conditions, slower=True)
+        if isinstance(answer, _Missed) and not self.whole_by_joins and not self._asked:
+            return self._in_box(conditions)
+        return answer
+
+    @cached_property
+    def by_scales(self) -> bool:
+        """Whether scales are chosen before values: for all but one clearance of two masses that
+        joins search as a whole, unless the least error or the fewest values are asked for."""
+        return self.order.spec.objective != "match" and not (self.whole_by_joins or self._asked)
+
+    @property
+    def _asked(self) -> bool:
+        """Whether fewest values or equal parts are asked for, which scales first do not know."""
+        return self.order.spec.most_values is not None or bool(self.order.spec.matched)
+
+    @cached_property
+    def whole_by_joins(self) -> bool:
+        """Whether joins and one even stage to ground on the first mass are the whole circuit."""
+        system = self.order.model.second_order()
+        plain = not system.clearances or (
+            len(system.clearances) == 1
+            and alike(system.clearances[0])
+            and system.clearances[0].other is None
+            and system.clearances[0].mass == 0
         )
+        return self.by_joins and plain and not system.constant.any()
 
     @cached_property
     def by_joins(self) -> bool:
@@ -167,9 +213,9 @@ class _Search:
 
     def binding(self, best: _Verified) -> dict[str, float]:
         """max_error without each condition that costs some; nothing where the error is none, and
-        not asked of a tree of choices, which each condition would have searched again."""
+        only asked where joins choose: elsewhere each condition would have to be searched again."""
         error, conditions = best.design.errors.max_error, self.order.spec.active_conditions
-        if error <= EXACT or not self.by_joins:
+        if error <= EXACT or not self.by_joins or self.by_scales:
             return {}
 
         def without(names: frozenset[str]) -> float:
@@ -198,7 +244,7 @@ class _Search:
             and better.distinct_values(spec.preferred) > spec.most_values
         ):
             return design
-        improved = self._verified(better, spec.active_conditions)
+        improved = verified(self.order, better, self.responses, spec.active_conditions)
         if not all(check.holds for check in improved.checks):
             return design
         exact = improved.errors.max_error <= EXACT
@@ -216,6 +262,8 @@ class _Search:
     def refuse(self, missed: _Missed) -> NoReturn:
         """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees
         it."""
+        if missed.conflicts:
+            _refuse_conflicts(missed)
         what = missed.short.what
         guilty, names = self._guilty(missed)
         if names and names != what:
@@ -264,7 +312,7 @@ class _Search:
             made = self._within_most_values(within, widest, again=number > 0)
             if isinstance(made, Shortfall):
                 return _Missed(made, names)
-            design = self._verified(made, conditions)
+            design = verified(self.order, made, self.responses, conditions)
             design = replace(design, certificate=_certificate(made, widest))
             broken = [check for check in design.checks if not check.holds]
             if not broken:
@@ -272,13 +320,81 @@ class _Search:
             names += tuple(check.name for check in broken)
             apart = self._too_unequal(broken)
             if apart is not None:
-                what = f"the stops of clearance {apart}, too unequal for one stage"
-                return _Missed(Shortfall(what, True), ("swing",), SPLIT)
+                return self._unequal(apart)
             tighter = within.tightened(broken, design, slower=slower)
             if tighter == within:
                 break
             within = tighter
         return _Missed(Shortfall(broken[0].name, False), names)
+
+    def _in_box(self, conditions: frozenset[str]) -> _Verified | _Missed:
+        """Scales first, then parts; verify, tighten what is not kept, and again."""
+        for index, clearance in enumerate(self.order.model.second_order().clearances):
+            shares = idle_shares(clearance, self.order.peaks.reach(index))
+            if self.order.stage.kind == "rectifier" and min(shares.values(), default=1.0) <= 0.0:
+                return self._unequal(clearance.name)
+        within = stated = self._limits(conditions)
+        names: tuple[str, ...] = ()
+        before, broken = None, list[ConditionCheck]()
+        for number in range(BOX_ROUNDS):
+            choice = ScaleChoice(self.order, within)
+            made = self._showing(choice.circuits(before))
+            if isinstance(made, Shortfall):
+                conflicts = tuple(choice.conflicts())
+                return _Missed(replace(made, whole=bool(conflicts)), names, conflicts=conflicts)
+            design = verified(self.order, made.made, self.responses, conditions)
+            broken = [check for check in design.checks if not check.holds]
+            if not broken:
+                certificate = _certificate(made.made, self._least(made.made, stated), made.words)
+                return _Verified(made.made, replace(design, certificate=certificate), within)
+            names += tuple(check.name for check in broken)
+            before = made.z
+            tighter = within.tightened(broken, design, slower=number > 0)
+            if tighter == within:
+                break
+            within = tighter
+        return _Missed(Shortfall(broken[0].name, False), names)
+
+    def _showing(self, circuits: Iterable[ScaleAttempt | Shortfall]) -> ScaleAttempt | Shortfall:
+        """The first circuit that shows every response which the model does; the first of all where
+        none does."""
+        first: ScaleAttempt | Shortfall | None = None
+        there = [r for r in self.responses if r.found]
+        for each in circuits:
+            first = first or each
+            if isinstance(each, Shortfall) or self._shows(_design(self.order, each.made), there):
+                return each
+        assert first is not None
+        return first
+
+    @staticmethod
+    def _shows(design: Design, responses: Sequence[ModelResponse]) -> bool:
+        """Whether the nominal circuit shows these responses; one that it takes long to settle on
+        is none."""
+        doing("responses of the finished circuit")
+        system = nominal_reduction(design).system() if responses else None
+        for response in responses:
+            assert system is not None
+            flow = circuit_flow(system, design, response)
+            start = response.orbit.start * design.volts(response.b)
+            if not matches(settle(flow, start, budget=Budget(LOOK), watch=0), response.spec):
+                return False
+        return True
+
+    def _least(self, made: Attempt, within: ConditionLimits) -> LinearBlock:
+        """The linear block with what a tree of choices, or joins, prove of any within these
+        limits."""
+        question = linear_question(self.order, within)
+        if self.order.stage.kind == "rectifier":  # the stop's resistor is one of the program's
+            question = replace(question, bounds=replace(question.bounds, stop=0.0))
+        doing("least error of any integrators")
+        bound, proof = linear_search.lower_bound(question, made.errors.max_error, BOUND_STEPS)
+        return replace(made.linear, bound=bound, proved=True, proof=proof)
+
+    @staticmethod
+    def _unequal(clearance: str) -> _Missed:
+        what = f"the stops of clearance {clearance}, too unequal for one stage"
+        return _Missed(Shortfall(what, True), ("swing",), SPLIT)
 
     def _too_unequal(self, broken: Sequence[ConditionCheck]) -> str | None:
         """The clearance whose steeper half drives fv further than its other half can idle, which
@@ -326,37 +442,6 @@ class _Search:
                 share = max(min(own, most) - over, 1)
         return Shortfall("distinct values", False)
 
-    def _verified(self, made: Attempt, conditions: frozenset[str]) -> Design:
-        """The design of an attempt, its conditions checked on its circuit."""
-        order = self.order
-        design = Design(
-            model=order.model,
-            circuit=made.circuit,
-            errors=made.errors,
-            certificate=Certificate("bound", 0.0, "not yet proved"),
-            conditions={},
-            solver=made.solver,
-            seconds=0.0,
-        )
-        loads = None
-        if self.responses and conditions & {"swing", "load"}:
-            doing("voltages and currents of the finished circuit")
-            board = Reduction(made.circuit, nominal_board(made.circuit))
-            loads = output_loads.design_loads(design, board, self.responses)
-        amplitudes = [design.amplitude(r.b, r.omega) for r in self.responses] or [
-            design.amplitude()
-        ]
-        checks = side_conditions.verify(
-            design, conditions, order.opamp, order.peaks, amplitudes, loads
-        )
-        low, high = order.spec.frequency
-        numbers = {"frequency_low_hz": low, "frequency_high_hz": high}
-        return replace(
-            design,
-            checks=checks,
-            conditions=numbers | {check.quantity: check.limit for check in checks},
-        )
-
     def _acts(self, best: _Verified, name: str) -> bool:
         """Whether the search could notice that this condition is left out."""
         conditions = self.order.spec.active_conditions
@@ -364,6 +449,96 @@ class _Search:
         if best.limits != first:  # some limit had to be tightened
             return True
         return name == "swing" or first != replace(without, conditions=conditions)
+
+
+def verified(
+    order: Order, made: Attempt, responses: Sequence[ModelResponse], conditions: frozenset[str]
+) -> Design:
+    """The design of an attempt, these side conditions checked on its circuit.
+
+    responses : whose voltages and currents count; without them the peaks of the order do.
+    """
+    design = _design(order, made)
+    loads = None
+    if responses and conditions & {"swing", "load"}:
+        doing("voltages and currents of the finished circuit")
+        board = nominal_reduction(design)
+        loads = output_loads.design_loads(design, board, responses)
+    amplitudes = [design.amplitude(r.b, r.omega) for r in responses] or [design.amplitude()]
+    checks = side_conditions.verify(design, conditions, order.opamp, order.peaks, amplitudes, loads)
+    _tell(design, checks)
+    low, high = order.spec.frequency
+    numbers = {"frequency_low_hz": low, "frequency_high_hz": high}
+    return replace(
+        design,
+        checks=checks,
+        conditions=numbers | {check.quantity: check.limit for check in checks},
+    )
+
+
+def _design(order: Order, made: Attempt) -> Design:
+    """The design of an attempt, of which nothing is checked or proved yet."""
+    return Design(
+        model=order.model,
+        circuit=made.circuit,
+        errors=made.errors,
+        certificate=Certificate("bound", 0.0, "not yet proved"),
+        conditions={},
+        solver=made.solver,
+        seconds=0.0,
+    )
+
+
+def _refuse_conflicts(missed: _Missed) -> NoReturn:
+    """Raise ``Unreachable`` with limits that cannot be kept together, and how far each would have
+    to give."""
+    limits = ", ".join(c.limit.told(c.limit.value) for c in missed.conflicts)
+    found = f"no scales within the limits of the search (linear program): together stand {limits}"
+    if missed.broken:
+        names = ", ".join(n for n in SIDE_CONDITIONS if n in missed.broken)
+        found += f"; where finished circuits did not keep {names}, that was made narrower"
+    ways = [c.limit.told(c.needed) for c in missed.conflicts if np.isfinite(c.needed) and c.needed]
+    there = {c.limit.condition for c in missed.conflicts}
+    free = "one of them as wide as this, the others as they are: " + " or ".join(ways)
+    if not ways:
+        free = "two of them wider"
+    if there & set(SIDE_CONDITIONS):
+        free += "; or circuit.side_conditions without "
+        free += " or ".join(n for n in SIDE_CONDITIONS if n in there)
+    raise Unreachable(None, "circuit", found, free)
+
+
+def _refuse_error(design: Design, spec: CircuitSpec) -> NoReturn:
+    """Raise ``Unreachable`` for an error above ``circuit.max_error``, with what would lower it."""
+    errors, certificate = design.errors, design.certificate
+    assert spec.max_error is not None
+    name = max(errors.errors, key=lambda each: abs(errors.errors[each]))
+    found = (
+        f"{spec.max_error:g}, where the best design that was found has {errors.max_error:.3g} "
+        f"({name}); no smaller error than {certificate.lower_bound:.3g} is possible with these "
+        "choices"
+    )
+    ways = [*ways_to_less_error(spec), "a larger number"]
+    raise Unreachable(None, "circuit.max_error", found, " or ".join(ways))
+
+
+def _tell(design: Design, checks: Sequence[ConditionCheck]) -> None:
+    """A circuit that was found: a step on the way where it does not keep every condition."""
+    broken = ", ".join(check.name for check in checks if not check.holds)
+    not_yet = f", which does not keep {broken} yet" if broken else ""
+    text = f"a circuit with a largest error of {design.errors.max_error:.2g}{not_yet}"
+    best_so_far(text, step=bool(broken))
+
+
+def ways_to_less_error(spec: CircuitSpec) -> list[str]:
+    """What may lower a design's largest coefficient error, in words of the model file."""
+    ways = ["a finer series or several in circuit.resistors"]
+    if not spec.composites:
+        ways.append("circuit.composites = true")
+    ways.append("wider circuit.resistor_range, capacitor_range or frequency")
+    if spec.active_conditions:
+        ways.append("fewer circuit.side_conditions")
+    return ways
 
 
 def best_beside(
@@ -412,7 +587,7 @@ def _error(made: Attempt | Shortfall) -> float:
     return made.errors.max_error if isinstance(made, Attempt) else float("inf")
 
 
-def _certificate(made: Attempt, widest: LinearBlock) -> Certificate:
+def _certificate(made: Attempt, widest: LinearBlock, words: str = "") -> Certificate:
     """No circuit has a smaller error than the linear block's bound under the stated conditions.
 
     widest : the linear block that they allow; the circuit may have another. The dead zone's own
@@ -420,9 +595,11 @@ def _certificate(made: Attempt, widest: LinearBlock) -> Certificate:
     """
     error, dead_zone = made.errors.max_error, made.dead_zone
     proof = f"linear block: {widest.proof}"
-    if made.linear is not widest:
+    if words:
+        proof += f"; {words}"
+    elif made.linear is not widest:
         proof += "; the circuit has another linear block, for the dead zone or the conditions"
-    if dead_zone is not None:
+    if dead_zone is not None and not words:
         proof += f"; dead zone, for the scales of the circuit's linear block: {dead_zone.proof}"
     proved = widest.proved and error <= widest.bound + EXACT
     return Certificate("optimal" if proved else "bound", min(widest.bound, error), proof)

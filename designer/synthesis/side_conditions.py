@@ -29,6 +29,24 @@ from designer.synthesis.limits import (
 )
 from designer.synthesis.output_loads import Load, Loads
 
+HEAVY, LIGHT = 2e3, 10e3
+"""Loads that data sheets state the swing for [Ω]."""
+
+
+def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
+    """Least output swing [V] at this output current [A] and the circuit's rails.
+
+    The figures are those into 10 kΩ and 2 kΩ; between and beyond them in proportion to the current.
+    """
+    shift = circuit.supply - opamp.rated_supply
+    light = guaranteed(opamp.swing)
+    if opamp.swing_2k is None:
+        return light + shift
+    heavy = guaranteed(opamp.swing_2k)
+    from_, to = light / LIGHT, heavy / HEAVY
+    share = max((current - from_) / (to - from_), 0.0)
+    return light + share * (heavy - light) + shift
+
 
 def verify(
     design: Design,
@@ -46,7 +64,7 @@ def verify(
     """
     sections = () if loads is None else loads.sections
     checks = [
-        *_swing(design, peaks, sections),
+        *_swing(design, opamp, peaks, sections),
         *_level(design, opamp, peaks),
         *_stages(design, opamp, peaks),
     ]
@@ -67,7 +85,9 @@ def verify(
     return tuple(check for check in checks if check.name in conditions)
 
 
-def _swing(design: Design, peaks: Peaks, sections: Sequence[Load]) -> list[ConditionCheck]:
+def _swing(
+    design: Design, opamp: OpAmp, peaks: Peaks, sections: Sequence[Load]
+) -> list[ConditionCheck]:
     """Outputs that stay linear against the op-amp's limit; fv of a rectifier, on its worse side,
     against what the idle half's series diode stands (the driving section is a drop beyond fv)."""
     circuit = design.circuit
@@ -78,6 +98,18 @@ def _swing(design: Design, peaks: Peaks, sections: Sequence[Load]) -> list[Condi
     where = max(tops, key=tops.__getitem__)
     limit = SWING_SHARE * circuit.saturation
     checks = [ConditionCheck("swing", "swing_v", limit, tops[where], where)]
+    loaded = [
+        ConditionCheck(
+            "swing",
+            "guaranteed_swing_v",
+            guaranteed_swing(opamp, circuit, load.current),
+            load.peak,
+            load.section,
+        )
+        for load in sections
+        if load.section not in meant
+    ]
+    checks += sorted(loaded, key=lambda check: -check.excess)[:1]
     reach = idle_limits(circuit, effective(circuit.values, design.composites))
     drop = {d.name: d.model.drop for d in circuit.diodes}
     idle = []

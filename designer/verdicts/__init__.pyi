@@ -8,6 +8,7 @@ from .cross_check import (
     NOMINAL_SAMPLES as NOMINAL_SAMPLES,
     OWN_SAMPLES as OWN_SAMPLES,
     SLOW as SLOW,
+    UNDECIDED as UNDECIDED,
     Ask as Ask,
     CrossCheck as CrossCheck,
     NgspiceVerdict as NgspiceVerdict,

@@ -14,9 +14,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from designer.dynamics.counts import MAX_PERIOD, read_counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
+from designer.spice.read_orbit import name_in_ngspice
 from designer.verdicts.verdict import Answer, Question, Verdict
 
 OWN_SAMPLES = 10
@@ -149,14 +149,6 @@ def is_answer(response: str) -> bool:
     """Whether ngspice named a response or a status of one: "" is no answer, nor is a run that
     failed or has not settled, or two that differ."""
     return response not in ("", OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, UNDECIDED)
-
-
-def name_in_ngspice(response: str) -> str:
-    """What ngspice calls a response of the exact rung: of a period above `MAX_PERIOD`, which is not
-    looked for there, aperiodic."""
-    counts = read_counts(response)
-    long = counts is not None and counts.n > MAX_PERIOD
-    return str(OrbitStatus.APERIODIC) if long else response
 
 
 def margin_share(answer: Answer, nominal: Orbit) -> float:

@@ -28,7 +28,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import Read
+from designer.spice.read_orbit import Read, name_in_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_rung
 from designer.verdicts.cross_check import (
@@ -38,7 +38,6 @@ from designer.verdicts.cross_check import (
     CrossCheck,
     StartKind,
     is_answer,
-    name_in_ngspice,
 )
 from designer.verdicts.verdict import StudyPlan
 

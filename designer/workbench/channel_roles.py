@@ -10,21 +10,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Mask
 from designer.base.errors import InputError
 from designer.workbench.drive_estimate import (
     FEWEST_PERIODS,
     drive_frequency,
-    refined_frequency,
+    near_frequency,
     sine,
     sine_frequency,
 )
 from designer.workbench.folding import POINTS, Samples, best_knots, fold, samples_of
-from designer.workbench.prediction import POINTS as WAVE_POINTS, BoardPrediction, nearest
+from designer.workbench.force_balance import Balance, ForceBalance
+from designer.workbench.prediction import (
+    POINTS as WAVE_POINTS,
+    SAME_FREQUENCY,
+    BoardPrediction,
+    nearest,
+)
 from designer.workbench.record import Record, RecordedMotion
 
 BAND = 0.15
@@ -39,6 +46,19 @@ APART = 0.02
 """Least difference of that share to the next way of saying which channel is which."""
 KNOTS = 64
 """Of a period."""
+STEPS, STRETCH = 64, 1 << 14
+"""Of the fastest that a board does: samples of its period that equations of motion are held
+against; and the most samples of a record."""
+SINE_LEFT = 0.04
+"""Of the generator's amplitude: what is left of its channel where that is a sine."""
+MOST_WAYS = 6000
+"""Of giving channels to nets: of more it has to be said."""
+FITS, LOOSE = 5.0, 10.0
+"""Misfit of channels that are taken for those nets; and up to which what they leave is taken for
+the drive where they are told."""
+CLEARER, LITTLE = 3.0, 1.0
+"""Logarithm of how much more an assignment has to explain than the next; and of what it has to
+explain at all."""
 
 
 def recorded_motion(
@@ -50,13 +70,15 @@ def recorded_motion(
 ) -> RecordedMotion:
     """A record with the nets that its channels show and its drive.
 
-    frequency : about that of the drive [Hz]; else it is looked for near all settings. told : the
-    channel of each net; what it does not name is left out. Else the channels are recognised.
+    frequency : about that of the drive [Hz], for a record without the generator; else it is found.
+    told : the channel of each net; what it does not name is left out. Else the channels are
+    recognised: by the board's equations of motion (``force_balance``), and where these say nothing
+    by the shapes that the nets have at the nearest settings.
 
     Raises
     ------
     InputError : a net or channel that is not there; a record shorter than two drive periods; or one
-        whose channels cannot be told apart.
+        whose channels are like no nets of the board.
     """
     if told:
         _check(record, prediction, told)
@@ -64,23 +86,105 @@ def recorded_motion(
             expected = "a net of the board as well"
             raise InputError(None, "--channels", "the generator alone", expected)
     channels = tuple(dict.fromkeys(told.values())) if told else tuple(record.signals)
-    shown = [c for c in channels if record.span[c] > 0.0]
+    shown = [c for c in channels if record.moves(c)]
     if not shown:
         raise InputError(record.source, "its channels", "no signal", "a channel that moves")
+    band = (0.0, math.inf) if frequency is None else _near(frequency)
+    balance = ForceBalance(prediction, *_stretch(record, shown, prediction), band)
+    if told:
+        net_of = {channel: net for net, channel in told.items()}
+        best, doubt, remedy = balance.balance([net_of[c] for c in shown]), "", ""
+    else:
+        best, doubt, remedy = _recognised(balance, shown)
+        if best.nets == (prediction.generator,):
+            found = f"{shown[0]}, a sine as the generator's"
+            expected = f"a net of the board as well, or --channels, such as v1={shown[0]}"
+            raise InputError(record.source, "its channels", found, expected)
+    nets = dict(told) if told else dict(zip(best.nets, shown, strict=False))
+    drive = best.frequency
+    if best.misfit > LOOSE and prediction.generator not in nets:
+        drive = math.nan
+    if not math.isfinite(drive):
+        drive = _by_shape(record, shown, prediction, frequency)
+        if frequency is None and not _is_set(drive, prediction):
+            doubt = doubt or "its channels do not tell the drive frequency"
+            remedy = remedy or "the generator on a channel as well, or --omega"
+    if record.duration * drive < FEWEST_PERIODS:
+        raise _short(record, record.duration * drive)
+    samples = samples_of(record, shown, drive)
+    if not nets:
+        nets = _found(record, samples, shown, drive, prediction)
+        doubt = doubt or "its channels were recognised by their shapes alone"
+        remedy = remedy or _example(nets)
+    motion = _motion(record, samples, shown, nets, prediction.generator, drive)
+    return replace(motion, doubt=doubt, remedy=remedy)
+
+
+def _recognised(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, str, str]:
+    """The assignment that obeys the equations and explains most of the channels by each other, with
+    what speaks against it; one of no nets where they leave it open, with the frequency of a channel
+    that is a sine.
+
+    It is sure where every other one explains clearly less: a channel that could be any net, for
+    nothing tests it or needs it, is one of which another assignment explains as much.
+    """
+    every = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= FITS]
+    every.sort(key=lambda each: -each.told)
+    if not every or not every[0].told > LITTLE:
+        return _by_shapes(balance, shown)
+    best, others = every[0], every[1:]
+    example = _example(dict(zip(best.nets, shown, strict=True)))
+    if len(shown) == 1:
+        return best, "one channel alone may show another net", example
+    if others and best.told - others[0].told < CLEARER:
+        if not best.whole:
+            return _by_shapes(balance, shown)
+        other = ", ".join(f"{net}={c}" for net, c in zip(others[0].nets, shown, strict=True))
+        return best, f"its channels may be {other} as well", example
+    return best, "", ""
+
+
+def _by_shapes(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, str, str]:
+    """No assignment, and the frequency of a channel that is a sine."""
+    frequency = balance.sine_of_all(range(len(shown)))
+    return Balance((), math.nan, 0.0, False, frequency), "", ""
+
+
+def _example(nets: Mapping[str, str]) -> str:
+    return "--channels " + ",".join(f"{net}={channel}" for net, channel in nets.items())
+
+
+def _stretch(
+    record: Record, shown: Sequence[str], prediction: BoardPrediction
+) -> tuple[Array, Array, Mask]:
+    """Times (k,) [s] and voltages (k, c) of the record's begin, neighbours averaged to what the
+    board's equations need, and where they are cut off (k, c)."""
+    fastest = max([prediction.fastest, *(s.frequency_hz for s in prediction.settings)])
+    width = max(int(1.0 / (fastest * STEPS * record.interval)), 1)
+    count = min(len(record.time) // width, STRETCH)
+    cut = slice(0, count * width)
+    time = (record.time[cut] - record.time[0]).reshape(count, width).mean(axis=1)
+    values = [record.signals[c][cut].reshape(count, width).mean(axis=1) for c in shown]
+    clipped = [record.cut(c)[cut].reshape(count, width).any(axis=1) for c in shown]
+    return time, np.column_stack(values), np.column_stack(clipped)
+
+
+def _by_shape(
+    record: Record, shown: Sequence[str], prediction: BoardPrediction, frequency: float | None
+) -> float:
+    """The drive frequency [Hz] at which the record lies on itself, near the settings or near the
+    one that was said; of several the nearest to that."""
     low, high = _band(prediction, frequency)
     samples = samples_of(record, shown, high)
     if record.duration * high < FEWEST_PERIODS:
         raise _short(record, record.duration * high)
     drive, _ = drive_frequency(samples, low, high)
-    times = _whole(drive, prediction) if frequency is None else 1
-    if times > 1:
-        drive *= times
-    if samples.time[-1] * drive < FEWEST_PERIODS:
-        raise _short(record, record.duration * drive)
-    for knots in (KNOTS, max(best_knots(samples, drive))):
-        drive, error = refined_frequency(samples, drive, knots)
-    nets = dict(told) if told else _found(record, samples, shown, drive, prediction)
-    return _motion(record, samples, shown, nets, prediction.generator, drive, error)
+    return drive
+
+
+def _is_set(frequency: float, prediction: BoardPrediction) -> bool:
+    """Whether a frequency is that of a setting, as a scope's clock shows it."""
+    return any(abs(frequency / s.frequency_hz - 1.0) < SAME_FREQUENCY for s in prediction.settings)
 
 
 def _motion(
@@ -90,22 +194,29 @@ def _motion(
     nets: Mapping[str, str],
     generator: str,
     frequency: float,
-    error: float,
 ) -> RecordedMotion:
-    """With the drive by the generator's channel, where there is one."""
+    """With the drive by the generator's channel, where there is one; else by how the record lies on
+    itself."""
     channel = nets.get(generator)
     amplitude = offset = phase = math.nan
     if channel is not None and channel in shown:
-        values = samples.values[:, list(shown).index(channel)]
-        own = sine_frequency(samples.time, values, frequency)
-        fit = sine(samples.time, values, own)
-        length = float(np.ptp(samples.time))
-        by_sine = (
+        place = list(shown).index(channel)
+        free = ~samples.cut[:, place]
+        time, values = samples.time[free], samples.values[free, place]
+        frequency = sine_frequency(time, values, frequency)
+        fit = sine(time, values, frequency)
+        if fit.left > SINE_LEFT * fit.amplitude:  # no clean sine: how the record repeats says more
+            frequency, _ = near_frequency(samples, frequency, (KNOTS,))
+            fit = sine(time, values, frequency)
+        length = float(np.ptp(time))
+        error = (
             math.sqrt(6.0 / len(values)) * fit.left / (math.pi * fit.amplitude * length)
         )  # Cramér and Rao's bound
-        frequency, error = own, min(error, by_sine)
         amplitude, offset = fit.amplitude, fit.offset
         phase = fit.phase
+    else:
+        knots = (KNOTS, max(best_knots(samples, frequency)))
+        frequency, error = near_frequency(samples, frequency, knots)
     return RecordedMotion(record, dict(nets), generator, frequency, error, amplitude, offset, phase)
 
 
@@ -128,22 +239,18 @@ def _short(record: Record, periods: float) -> InputError:
     )
 
 
+def _near(frequency: float) -> tuple[float, float]:
+    return (1.0 - BAND) * frequency, (1.0 + BAND) * frequency
+
+
 def _band(prediction: BoardPrediction, frequency: float | None) -> tuple[float, float]:
-    """Least and greatest drive frequency [Hz] that is looked for."""
-    known = [s.frequency_hz for s in prediction.settings] if frequency is None else [frequency]
+    """Least and greatest drive frequency [Hz] that is looked for by shape."""
+    if frequency is not None:
+        return _near(frequency)
+    known = [s.frequency_hz for s in prediction.settings]
     if not known:
         raise InputError(None, "--omega", "no wanted response in the design", "the drive frequency")
     return (1.0 - BAND) * min(known), (1.0 + BAND) * max(known)
-
-
-def _whole(frequency: float, prediction: BoardPrediction) -> int:
-    """How many times this the drive frequency is: a motion may repeat after several periods only,
-    and without the generator's channel the settings say which are drive frequencies."""
-    for times in range(1, 5):
-        gaps = [abs(times * frequency / s.frequency_hz - 1.0) for s in prediction.settings]
-        if min(gaps) < BAND:
-            return times
-    return 1
 
 
 def _found(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from designer.base.arrays import Array
 from designer.workbench.folding import Samples, fold, left_over, rates_at
@@ -22,6 +24,12 @@ MUCH = 0.2
 """Of the most power that any frequency explains: candidates have more."""
 CANDIDATES = 24
 """At most."""
+FEW = 4
+"""Tops of a spectrum that are tried for a sine."""
+STRAY = 0.3
+"""Of a line of the spectrum: how far a frequency is from where it was first seen."""
+FEWEST_LINES = 1.5
+"""Periods of a sine that is looked for."""
 TWICE, FAINT = 2.0, 0.01
 """A record lies on itself if what is left over is at most twice the least that any frequency leaves
 over, and a hundredth of its power: a period of several drive periods may be hidden in that."""
@@ -86,21 +94,21 @@ def _tops(samples: Samples, low: float, high: float) -> list[float]:
 
 
 def refined_frequency(
-    samples: Samples, frequency: float, knots: int = COARSE
+    samples: Samples, frequency: float, knots: int | Sequence[int] = COARSE, n: int = 1
 ) -> tuple[float, float]:
-    """The frequency [Hz] at which the record lies best on itself after one period, and its standard
-    error, by Newton's method on all channels. knots : of a period, of the curve.
+    """The frequency [Hz] at which the record lies best on itself after n periods, and its standard
+    error, by Newton's method on all channels. knots : of a period, of all channels or of each.
 
     A curve that moves by δf · t of a period leaves δf · t · rate over, which is fitted.
     """
     error = math.inf
     middle = samples.time - samples.time.mean()
     for _ in range(ROUNDS):
-        curve = fold(samples, frequency, 1, knots)
+        curve = fold(samples, frequency, n, knots)
         scale = np.maximum(curve.left, 1e-300)
         slope = rates_at(samples, frequency, curve) * middle[:, None] / scale
         left = left_over(samples, frequency, curve) / scale
-        weight = float((slope**2).sum())
+        weight = max(float((slope**2).sum()), 1e-300)
         step = float((slope * left).sum()) / weight
         frequency, error = frequency + step, 1.0 / math.sqrt(weight)
         if abs(step) < 0.1 * error:
@@ -118,21 +126,57 @@ def sine(time: Array, values: Array, frequency: float) -> SineFit:
     return SineFit(math.hypot(a, b), math.atan2(b, a) % (2.0 * math.pi), float(offset), left)
 
 
-def sine_frequency(time: Array, values: Array, frequency: float, rounds: int = 8) -> float:
-    """The frequency [Hz] of a sine near ``frequency``, by Gauss and Newton on all four numbers."""
-    for _ in range(rounds):
-        fit = sine(time, values, frequency)
-        angle = 2.0 * np.pi * frequency * time + fit.phase
-        middle = time - time.mean()
-        columns = np.column_stack(
-            [
-                np.sin(angle),
-                np.cos(angle),
-                np.ones_like(angle),
-                2.0 * np.pi * middle * fit.amplitude * np.cos(angle),
-            ]
-        )
-        left = values - fit.amplitude * np.sin(angle) - fit.offset
-        (*_, step), *_ = np.linalg.lstsq(columns, left, rcond=None)
-        frequency += float(step)
-    return frequency
+def near_frequency(
+    samples: Samples, frequency: float, knots: Sequence[int | Sequence[int]], n: int = 1
+) -> tuple[float, float]:
+    """``refined_frequency`` with curves of more and more knots, from one [Hz] that it may not leave
+    by more than `STRAY`."""
+    line = 1.0 / float(np.ptp(samples.time))
+    best, error = frequency, STRAY * line
+    for each in knots:
+        found, spread = refined_frequency(samples, best, each, n)
+        if not abs(found - frequency) < STRAY * line:
+            break
+        best, error = found, spread
+    return best, error
+
+
+def spectrum_tops(time: Array, values: Array, low: float, high: float) -> list[float]:
+    """Frequencies [Hz] from low to high at which the spectrum of values (k,) at equal steps has
+    tops, the highest first: those above `MUCH` of it, and at most `FEW`."""
+    count, step = len(time), float(time[1] - time[0])
+    size = 1 << (FINE * count - 1).bit_length()
+    power = np.abs(np.fft.rfft(values - values.mean(), size)) ** 2
+    line = 1.0 / (size * step)
+    begin = max(round(max(low, FEWEST_LINES / (count * step)) / line), 1)
+    end = round(min(high / line, len(power) - 2))
+    inside = np.arange(begin, end + 1)
+    if not len(inside) or not power[inside].max() > 0.0:
+        return []
+    is_top = (power[inside] >= power[inside - 1]) & (power[inside] >= power[inside + 1])
+    tops = inside[is_top & (power[inside] > 0.0)]
+    tops = tops if len(tops) else inside[[int(power[inside].argmax())]]
+    tops = tops[np.argsort(-power[tops])]
+    return [float(k * line) for k in tops[:FEW] if power[k] > MUCH * power[tops[0]]]
+
+
+def tuned(left: Callable[[float], float], frequency: float, time: Array) -> float:
+    """The frequency [Hz] within half a line of the spectrum at which a sine leaves least over.
+
+    left : squares that are left, by frequency.
+    """
+    half = min(0.5 / float(np.ptp(time)), 0.5 * frequency)
+    # The search is exact to a fraction of its variable: so of the way from the middle.
+    found = minimize_scalar(
+        lambda off: left(frequency + off),
+        bounds=(-half, half),
+        method="bounded",
+        options={"xatol": 1e-7 * half},
+    )
+    return frequency + float(found.x)
+
+
+def sine_frequency(time: Array, values: Array, frequency: float) -> float:
+    """The frequency [Hz] of a sine within half a line of the spectrum of ``frequency``, by least
+    squares of all four numbers."""
+    return tuned(lambda each: sine(time, values, each).left, frequency, time)

@@ -26,6 +26,10 @@ SAMPLES_A_KNOT = 4
 """At least."""
 POINTS = 1024
 """Of a drive period, of the curve."""
+DITHER = 0.5
+"""Of a converter's step: noise that makes its rounding independent from sample to sample."""
+EXACT = 1e-6
+"""Of the largest channel's range: noise of one that has none, as computed signals."""
 RIDGE = 1e-9
 """Of the normal matrix' largest entry: what holds a knot that no sample is near."""
 
@@ -40,6 +44,11 @@ class Samples:
     """(k, c) [V]."""
     noise: Array
     """(c,) standard deviation of what is noise in them [V]."""
+    cut: Mask
+    """(k, c) where a channel is cut off."""
+    rounding: Array
+    """(c,) standard deviation of a converter's rounding that no noise makes independent from sample
+    to sample [V]; 0 where noise does."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +81,16 @@ def samples_of(record: Record, channels: Sequence[str], frequency: float) -> Sam
     time = (record.time[cut] - record.time[0]).reshape(count, block).mean(axis=1)
     values = [record.signals[c][cut].reshape(count, block).mean(axis=1) for c in channels]
     noise = np.array([record.noise[c] for c in channels])
-    floor = np.array([record.quantum[c] for c in channels]) / math.sqrt(12.0 * block)
-    return Samples(time, np.column_stack(values), np.maximum(noise / math.sqrt(block), floor))
+    quantum = np.array([record.quantum[c] for c in channels])
+    # Rounding averages out only where noise carries the signal from one step to the next.
+    carried = noise > DITHER * quantum
+    rounding = np.where(carried, 0.0, quantum / math.sqrt(12.0))
+    floor = quantum / np.sqrt(12.0 * np.where(carried, block, 1))
+    table = np.column_stack(values)
+    least = EXACT * max(float(np.ptp(table, axis=0).max()), 1e-300)
+    noise = np.maximum(noise / math.sqrt(block), floor)
+    clipped = [record.cut(c)[cut].reshape(count, block).any(axis=1) for c in channels]
+    return Samples(time, table, np.maximum(noise, least), np.column_stack(clipped), rounding)
 
 
 def fold(samples: Samples, frequency: float, n: int, knots: int | Sequence[int]) -> Fold:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -29,6 +29,7 @@ from designer.workbench.contact_count import (
     count,
 )
 from designer.workbench.dead_zone_curve import DeadZoneCurve, fitted
+from designer.workbench.drive_estimate import near_frequency
 from designer.workbench.folding import (
     KNOTS,
     POINTS,
@@ -36,9 +37,10 @@ from designer.workbench.folding import (
     Samples,
     best_knots,
     fold,
+    left_over,
     samples_of,
 )
-from designer.workbench.prediction import BoardPrediction, PredictedStop
+from designer.workbench.prediction import LEVEL, BoardPrediction, PredictedStop
 from designer.workbench.record import NORMAL, RecordedMotion
 
 LAPS = 2.0
@@ -48,15 +50,34 @@ FEWEST_LAPS = 1.5
 COARSE = 64
 """Knots of a period, at most, while the period is sought."""
 DIFFERENT = 6.0
-"""Standard errors by which a longer period has to leave less over to be seen."""
+"""Standard errors by which a longer period has to leave less over to be seen, and by which its laps
+have to differ."""
+PERHAPS = 3.0
+"""Such standard errors from which on a period that is not seen is not ruled out either."""
+WHITE, NEARER, FEWEST_PAIRS = 1.1, 0.85, 32
+"""Times the noise that a curve leaves over that is all noise; times as far as before that
+neighbours of different laps are at most where a longer period is right, unless so near is noise;
+and the fewest of them."""
 NOISE_ROOM = 1.25
 """How much more than the noise a curve may leave over and still be the whole motion."""
 SCOPE_GAIN = 0.03
 """Of a channel's value: how wrong scope and probe may be where they are not told."""
 KINK = 5e-4
-"""Of the peak: the least error of a threshold that is a corner only on paper."""
+"""Of the peak: the least error of a threshold that is a corner only on paper, and of a curve
+through such corners."""
 FLAT = 0.15
 """Of the output's range: how far from its median it is still inside the clearance."""
+CORNER, BEYOND = 0.03, 0.1
+"""Of a channel that is cut off: how far from there its curve is round, of its range; and how far
+beyond a stop it has to reach, of the stop."""
+FEWEST_FREE = 0.1
+"""Of the curve: what has to be left to fit a stage."""
+SURELY = 2.0
+"""Times the noise that a curve leaves over of a motion that surely does not repeat."""
+STRETCHES, FEWEST_ALIKE, MOST_OF_IT, COLOURED = 16, 4, 0.9, 0.15
+"""Of a drive period, in which what is left over ought to be noise; samples of one, and share of
+those that most of them have; and how much more than white noise has the squared mean of one may
+have, for a converter's steps."""
 MOST_OTHERS = 8
 """Other responses that are listed."""
 
@@ -96,6 +117,9 @@ class NamedMotion:
     there."""
     by_board: bool = False
     """Whether impacts that the curve leaves open were counted on the board behind the record."""
+    clipped: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """Lowest and highest voltage [V] at which the channel of a net is cut off; None where it is
+    not."""
 
     @property
     def symmetric(self) -> bool | None:
@@ -113,23 +137,31 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
     channels = [motion.channels[net] for net in nets]
     samples = samples_of(motion.record, channels, motion.frequency)
     lap = _whole_lap(samples, motion)
-    if lap is None:
-        return _without_period(motion, nets, _moving(nets, prediction), samples)
-    curve, doubt = lap
+    if isinstance(lap, float):
+        without = _without_period(motion, nets, _moving(nets, prediction), samples, lap)
+        return replace(without, clipped=_clipped(motion, prediction))
+    curve, doubt, motion = lap
     n = curve.n
-    zones = dict(_zones(curve, nets, prediction.stops))
+    limits = _limits(motion, prediction)
+    zones = dict(_zones(curve, nets, prediction.stops, limits))
     counted = [
-        _counted(curve, nets, stop, zones.get(stop.clearance), prediction, k)
+        _counted(curve, nets, stop, zones.get(stop.clearance), prediction, k, limits)
         for k, stop in enumerate(prediction.stops)
     ]
     asymmetry, error = _asymmetry(curve, nets, prediction)
     names, by_board = list(_names(n, counted)), False
-    if len(names) > 1 and not doubt:
+    if len(names) > 1 and not doubt and not limits:
         evidence = board_evidence(curve, samples, motion, nets, prediction, zones)
         instead = [_by_board(sides, k, evidence) for k, sides in enumerate(counted)]
         by_board = instead != counted
         counted, names = instead, list(_names(n, instead))
     reason, remedy = _why(names, counted, doubt, motion, n)
+    if not reason and all(net in limits for net in nets):
+        reason, remedy = "every channel is cut off", "a larger range of the channels"
+    if not reason and _laps_differ(samples, motion.frequency, curve):
+        reason, remedy = "its laps differ by more than the noise", "a record of more drive periods"
+    if not reason:
+        reason, remedy = motion.doubt, motion.remedy
     counts = None if "?" in names[0] else Counts.parse(names[0])
     return NamedMotion(
         motion=motion,
@@ -146,40 +178,199 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
         moving=_moving(nets, prediction),
         dead_zones=zones,
         by_board=by_board,
+        clipped=_clipped(motion, prediction),
     )
 
 
 # -- the period -------------------------------------------------------------------------------
 
 
-def _whole_lap(samples: Samples, motion: RecordedMotion) -> tuple[Fold, str] | None:
-    """The curve of the least period, with what speaks against it; None where the record repeats
-    after none that it is long enough to show."""
-    knots = best_knots(samples, motion.frequency)
+def _whole_lap(
+    samples: Samples, motion: RecordedMotion
+) -> tuple[Fold, str, RecordedMotion] | float:
+    """The curve of the least period, with what speaks against it, and the motion with the drive
+    frequency that this period shows. Where the record repeats after none that it is long enough to
+    show, how many times the noise the best curve leaves over."""
+    seen, n, knots, doubt = motion, 1, best_knots(samples, motion.frequency), ""
     coarse, most = min(*knots, COARSE), int(min(MAX_PERIOD, motion.periods / FEWEST_LAPS))
-    folds = [
-        fold(samples, motion.frequency, n, coarse)
-        for n in range(1, max(most, 1) + 1)
-        if n == 1 or 2 * coarse * n <= len(samples.time)
-    ]
-    best = folds[0]
-    for further in folds[1:]:
-        if _gain(best, further) > DIFFERENT:
-            best = further
-    if best.n > 1:  # what one period leaves over has hidden what is fine in the curve
-        knots = best_knots(samples, motion.frequency, n=best.n)
-    whole = fold(samples, motion.frequency, best.n, _room(samples, best.n, knots))
-    if not (whole.left < NOISE_ROOM * samples.noise).all():
-        return None
-    short = motion.periods < LAPS * best.n
-    return whole, f"it lasts {motion.periods:.3g} drive periods" if short else ""
+    for longer in range(2, min(most, len(samples.time) // (2 * coarse)) + 1):
+        tried = _at_period(samples, seen, (coarse, _room(samples, longer, knots)), longer)
+        if not _lies_better(samples, motion, tried, (n, longer), knots, coarse):
+            continue
+        surely, perhaps = _laps_apart(samples, tried.frequency, (n, longer), knots)
+        if surely > DIFFERENT:
+            # What a shorter lap leaves over has hidden what is fine in the curve.
+            motion, n, knots = tried, longer, best_knots(samples, tried.frequency, n=longer)
+            doubt = ""
+        elif perhaps > PERHAPS and not doubt:
+            doubt = f"it may repeat after {longer} drive periods only"
+    if n > 1:
+        motion = _at_period(samples, motion, (knots,), n)
+    whole = fold(samples, motion.frequency, n, _room(samples, n, knots))
+    noise = np.hypot(samples.noise, KINK * _peaks(samples))
+    rest = left_over(samples, motion.frequency, whole)
+    left = np.minimum(whole.left, _between_laps(samples, motion.frequency, rest, n))
+    if not (left < NOISE_ROOM * noise).all():
+        return float((left / noise).max())
+    if motion.periods < LAPS * n:
+        doubt = f"it lasts {motion.periods:.3g} drive periods"
+    return whole, doubt, motion
 
 
-def _gain(shorter: Fold, longer: Fold) -> float:
-    """By how many standard errors a longer period leaves less over than its extra knots explain."""
-    extra = float((shorter.freedom - longer.freedom).sum())
-    drop = float(((shorter.squares - longer.squares) / longer.left**2).sum())
-    return (drop - extra) / math.sqrt(2.0 * extra)
+def _peaks(samples: Samples) -> Array:
+    """(c,) half of what each channel spans [V]."""
+    return np.asarray(np.maximum(np.ptp(samples.values, axis=0) / 2.0, 1e-300))
+
+
+def _between_laps(samples: Samples, frequency: float, left: Array, n: int) -> Array:
+    """(c,) standard deviation [V] of what is left (k, c), by samples of different laps of n drive
+    periods that are neighbours in the lap: what a smooth curve leaves at a corner of each lap is
+    the same for both (von Neumann, Ann. Math. Stat. 12, 1941). Infinite without such neighbours."""
+    cycles = samples.time * (frequency / n)
+    order = np.argsort(cycles % 1.0)
+    apart = np.diff(np.floor(cycles[order])) != 0.0
+    if np.count_nonzero(apart) < FEWEST_PAIRS:
+        return np.full(left.shape[1], np.inf)
+    steps = np.diff(left[order], axis=0)[apart]
+    return np.asarray(np.sqrt((steps**2).mean(axis=0) / 2.0))
+
+
+def _laps_differ(samples: Samples, frequency: float, curve: Fold) -> bool:
+    """Whether what is left of the samples differs from lap to lap for longer than noise does: an
+    aperiodic motion that stays near a period for a few laps passes for it in all else.
+
+    Of white noise the squared mean of a stretch, less that of all laps, over its variance, is 1 on
+    average. What a curve leaves over in every lap alike is no difference.
+    """
+    least = KINK * _peaks(samples)
+    left = left_over(samples, frequency, curve) / np.maximum(curve.left, least)
+    stretch = np.floor(samples.time * frequency * STRETCHES).astype(np.int64)
+    many = np.bincount(stretch)
+    whole = np.flatnonzero(many >= max(FEWEST_ALIKE, MOST_OF_IT * float(np.median(many))))
+    place = whole % (curve.n * STRETCHES)
+    laps = np.bincount(place)[place]
+    free = float((1.0 - 1.0 / laps).sum()) * left.shape[1]
+    if free < STRETCHES:
+        return False
+    total = 0.0
+    for column in left.T:
+        means = np.bincount(stretch, column)[whole] / many[whole]
+        common = np.bincount(place, means)[place] / laps
+        total += float((many[whole] * (means - common) ** 2).sum())
+    return bool(total / free > 1.0 + COLOURED + math.sqrt(2.0 / free))
+
+
+def _at_period(
+    samples: Samples, motion: RecordedMotion, knots: Sequence[int | Sequence[int]], n: int
+) -> RecordedMotion:
+    """The motion with the drive frequency at which the record lies on itself after n periods; as it
+    is where the generator says it, or where it has been seen by one period."""
+    if n == 1 or motion.generator in motion.channels:
+        return motion
+    frequency, error = near_frequency(samples, motion.frequency, knots, n)
+    return replace(motion, frequency=frequency, frequency_error=error)
+
+
+def _lies_better(
+    samples: Samples,
+    shorter: RecordedMotion,
+    longer: RecordedMotion,
+    laps: tuple[int, int],
+    knots: Sequence[int],
+    coarse: int,
+) -> bool:
+    """Whether the record lies on itself better after more drive periods.
+
+    shorter, longer : with the frequency of each. laps : drive periods of each. knots : of a drive
+    period, those that the curve of the shorter lap needs. coarse : how many there are for what
+    differs between the shorter laps in one longer lap.
+
+    Of channels of which the shorter lap leaves no more than noise, what the longer one explains
+    beyond that counts against what its extra knots do. Of the others it may be that the laps
+    differ, or that a curve is no corner: neighbours of different laps tell.
+    """
+    few, many = laps
+    short = fold(samples, shorter.frequency, few, knots)
+    left = left_over(samples, shorter.frequency, short)
+    common = fold(samples, longer.frequency, few, knots)
+    rest = left_over(samples, longer.frequency, common)
+    noise = np.hypot(samples.noise, KINK * _peaks(samples))
+    white = short.left < WHITE * noise
+    after = _between_laps(samples, longer.frequency, rest, many)
+    before = np.minimum(
+        _between_laps(samples, shorter.frequency, left, few),
+        _between_laps(samples, longer.frequency, rest, few),
+    )
+    nearer = np.maximum(NEARER, noise / np.maximum(short.left, 1e-300))
+    if longer.periods >= LAPS * many and (after < nearer * before)[~white].any():
+        return True
+    if not white.any():
+        return False
+    if many % few:
+        long = fold(samples, longer.frequency, many, _room(samples, many, knots))
+        extra, used = np.maximum(long.knots - short.knots, 1), long.knots
+        squares = (left_over(samples, longer.frequency, long) ** 2).sum(axis=0)
+    else:
+        differing = fold(replace(samples, values=rest), longer.frequency, many, coarse)
+        extra, squares = differing.knots - coarse * few, differing.squares
+        used = common.knots + extra
+    variance = squares / np.maximum(len(samples.time) - used, 1)
+    variance = np.maximum(variance, (KINK * _peaks(samples)) ** 2)
+    drop = float((((left**2).sum(axis=0) - squares) / variance)[white].sum())
+    more = float(extra[white].sum())
+    return drop - more > DIFFERENT * math.sqrt(2.0 * more)
+
+
+def _laps_apart(
+    samples: Samples, frequency: float, laps: tuple[int, int], knots: Sequence[int]
+) -> tuple[float, float]:
+    """Standard errors by which shorter laps at different places of a longer one differ more than
+    those at the same place, of the channel where they do most: surely and perhaps. 0 where none is
+    recorded twice.
+
+    frequency : of the drive [Hz]. laps : drive periods of each; where the longer one is no
+    multiple, the shorter is what both are multiples of. knots : of a drive period.
+
+    That a longer lap leaves less over proves no period. Steps of a converter are alike from sample
+    to sample, and a corner that the curve does not follow meets other samples in each lap. Both
+    differ as much between laps that ought to be alike. So the means over short parts of a lap are
+    held against each other, between places and at one place (Fisher's analysis of variance; parts
+    of unequal variance count for fewer: Satterthwaite, Biometrics 2, 1946). Where the samples come
+    at the same times of every lap at one place, these are alike all the same: surely is what is
+    beyond the steps that no noise carries, and beyond what a curve may be off at corners.
+    """
+    few, many = math.gcd(*laps), laps[1]
+    left = left_over(samples, frequency, fold(samples, frequency, few, _room(samples, few, knots)))
+    cycles = samples.time * (frequency / few)
+    parts = max(int(min(COARSE * few, len(cycles) / (FEWEST_ALIKE * cycles[-1]))), 1)
+    shape = int(cycles[-1] * few / many) + 1, many // few, parts
+    place = np.floor(cycles * parts).astype(np.int64)
+    number = np.bincount(place, minlength=math.prod(shape)).reshape(shape)
+    count = np.where(number > 0.5 * float(np.median(number[number > 0])), number, 0)
+    at_place = count.sum(axis=0)
+    again = np.maximum((count > 0).sum(axis=0) - 1, 0).sum(axis=0)
+    others = np.maximum((at_place > 0).sum(axis=0) - 1, 0)
+    used = (again > 0) & (others > 0)
+    if not used.any():
+        return 0.0, 0.0
+    found = []
+    white = (KINK * _peaks(samples)) ** 2
+    alike_in_part = float(at_place[:, used].mean()) * (white + samples.rounding**2)
+    for column, floors in zip(left.T, np.column_stack([alike_in_part, white]), strict=True):
+        sums = np.bincount(place, column, minlength=math.prod(shape)).reshape(shape)
+        means = sums / np.maximum(number, 1)
+        alike = (count * means).sum(axis=0) / np.maximum(at_place, 1)
+        common = (at_place * alike).sum(axis=0) / np.maximum(at_place.sum(axis=0), 1)
+        within = (count * (means - alike) ** 2).sum(axis=(0, 1))[used]
+        between = (at_place * (alike - common) ** 2).sum(axis=0)[used]
+        each = np.maximum(within / again[used], 1e-300)
+        counted = float(each.sum() ** 2 / (each**2).sum()) / len(each)
+        free = counted * float(others[used].sum()), counted * float(again[used].sum())
+        error = math.sqrt(2.0 / free[0] + 2.0 / free[1])
+        noise = np.maximum(within.sum() / again[used].sum(), floors)
+        found.append((between.sum() / others[used].sum() / noise - 1.0) / error)
+    surely, perhaps = np.max(found, axis=0)
+    return float(surely), float(perhaps)
 
 
 def _room(samples: Samples, n: int, knots: Sequence[int]) -> tuple[int, ...]:
@@ -188,10 +379,10 @@ def _room(samples: Samples, n: int, knots: Sequence[int]) -> tuple[int, ...]:
 
 
 def _without_period(
-    motion: RecordedMotion, nets: tuple[str, ...], moving: str, samples: Samples
+    motion: RecordedMotion, nets: tuple[str, ...], moving: str, samples: Samples, left: float
 ) -> NamedMotion:
     """A motion that the record does not show to repeat: still settling, aperiodic, or of a period
-    that is too long for it."""
+    that is too long for it. left : what the best curve leaves over, in noise."""
     settles = _settles(samples, motion.frequency)
     response = str(OrbitStatus.NOT_SETTLED if settles else OrbitStatus.APERIODIC)
     tried = int(min(MAX_PERIOD, motion.periods / FEWEST_LAPS))
@@ -203,6 +394,11 @@ def _without_period(
     elif not enough:
         reason = f"no period up to {tried}; longer ones do not fit into the record"
         remedy = f"a record of {3 * MAX_PERIOD} drive periods or more"
+    elif left < SURELY:
+        reason = f"what the best curve leaves over is {left:.2g} times the noise"
+        remedy = "less noise, or a channel over more of its screen"
+    else:
+        reason, remedy = motion.doubt, motion.remedy
     return NamedMotion(
         motion=motion,
         response=response,
@@ -238,17 +434,71 @@ def _settles(samples: Samples, frequency: float) -> bool:
 # -- the impacts ------------------------------------------------------------------------------
 
 
+def _limits(motion: RecordedMotion, prediction: BoardPrediction) -> dict[str, tuple[float, float]]:
+    """Lowest and highest voltage [V] of each net whose channel is cut off, but the generator's.
+
+    The output of a dead zone that rests on its level inside the clearance, with no noise, is not.
+    """
+    inside = {stop.output: stop for stop in prediction.stops}
+    out = {}
+    for net, channel in motion.channels.items():
+        low, high = motion.record.limits[channel]
+        if net in inside:
+            level, room = inside[net].inside[0], LEVEL * motion.record.span[channel]
+            low = low if abs(low - level) > room else -math.inf
+            high = high if abs(high - level) > room else math.inf
+        if net != motion.generator and not (math.isinf(low) and math.isinf(high)):
+            out[net] = low, high
+    return out
+
+
+def _clipped(
+    motion: RecordedMotion, prediction: BoardPrediction
+) -> dict[str, tuple[float | None, float | None]]:
+    """Where the channels of nets are cut off, the generator's too."""
+    cut, own = _limits(motion, prediction), motion.channels.get(motion.generator)
+    if own in motion.record.clipped:
+        cut[motion.generator] = motion.record.limits[str(own)]
+    return {
+        net: (low if low > -math.inf else None, high if high < math.inf else None)
+        for net, (low, high) in cut.items()
+    }
+
+
 def _zones(
-    curve: Fold, nets: Sequence[str], stops: Sequence[PredictedStop]
+    curve: Fold,
+    nets: Sequence[str],
+    stops: Sequence[PredictedStop],
+    limits: Mapping[str, tuple[float, float]],
 ) -> Iterator[tuple[str, DeadZoneCurve]]:
-    """The stage of each clearance whose output and displacement were recorded."""
+    """The stage of each clearance whose output and displacement were recorded, the displacement in
+    full and the output by where it is not cut off."""
     for stop in stops:
         moved = _displacement(curve, nets, stop)
-        if moved is not None and stop.output in nets:
-            output = nets.index(stop.output)
-            errors = moved[1], float(curve.error[output])
-            shape = fitted(moved[0], curve.curve[:, output], errors, stop, float(curve.knots.min()))
-            yield stop.clearance, shape
+        if moved is None or not _tells(stop, nets, limits) or limits.keys() & stop.displacement:
+            continue
+        output = nets.index(stop.output)
+        wave = curve.curve[:, output]
+        low, high = limits.get(stop.output, (-math.inf, math.inf))
+        room = CORNER * float(np.ptp(wave))
+        free = (wave > low + room) & (wave < high - room)
+        if np.count_nonzero(free) < FEWEST_FREE * len(free):
+            continue
+        errors = moved[1], float(curve.error[output])
+        dof = float(curve.knots.min()) * float(free.mean())
+        shape = fitted(moved[0][free], curve.curve[free, output], errors, stop, dof)
+        yield stop.clearance, shape
+
+
+def _tells(
+    stop: PredictedStop, nets: Sequence[str], limits: Mapping[str, tuple[float, float]]
+) -> bool:
+    """Whether the output of a stage was recorded, and not cut off from where it is inside the
+    clearance."""
+    if stop.output not in nets:
+        return False
+    low, high = limits.get(stop.output, (-math.inf, math.inf))
+    return low < stop.inside[0] < high
 
 
 def _displacement(
@@ -271,11 +521,12 @@ def _counted(
     zone: DeadZoneCurve | None,
     prediction: BoardPrediction,
     index: int,
+    limits: Mapping[str, tuple[float, float]],
 ) -> dict[int, ContactCount | None]:
     """The impacts on each stop of a clearance, by side; None where no channel shows them."""
     out: dict[int, ContactCount | None] = {}
     for side in stop.ends:
-        evidence = _evidence(curve, nets, stop, zone, side, prediction, index)
+        evidence = _evidence(curve, nets, stop, zone, side, prediction, index, limits)
         out[side] = None if evidence is None else count(evidence)
     return out
 
@@ -288,11 +539,13 @@ def _evidence(
     side: int,
     prediction: BoardPrediction,
     index: int,
+    limits: Mapping[str, tuple[float, float]],
 ) -> ContactEvidence | None:
     """What the recorded channels say of contact with one stop."""
     moved = _displacement(curve, nets, stop)
-    if moved is None:
-        return _by_output(curve, nets, stop, side)
+    tells = _tells(stop, nets, limits)
+    if moved is None or not _reaches(stop, side, limits) or (tells and zone is None):
+        return _by_output(curve, nets, stop, side) if tells else None
     displacement, error = moved
     if zone is None:
         scope = SCOPE_GAIN * abs(stop.ends[side])
@@ -312,6 +565,19 @@ def _evidence(
         math.hypot(line, zone.misfit) / abs(zone.gains[side]),
         error,
     )
+
+
+def _reaches(stop: PredictedStop, side: int, limits: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether the displacement was recorded beyond a stop: where it is cut off there it is in
+    contact, as it is at the place where it is cut off."""
+    cut = [net for net in stop.displacement if net in limits]
+    if not cut:
+        return True
+    if len(stop.displacement) > 1:
+        return False
+    (net,) = cut
+    ends = [stop.displacement[net] * end for end in limits[net]]
+    return max(side * end for end in ends) > side * stop.ends[side] + BEYOND * abs(stop.ends[side])
 
 
 def _by_output(

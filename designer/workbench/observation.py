@@ -95,10 +95,12 @@ def observe(
 
     Raises
     ------
-    InputError : none of the nets was recorded; or the amplitude is neither given nor recorded.
+    InputError : none of the nets was recorded in full, for a channel that is cut off says nothing;
+        or the amplitude is neither given nor recorded.
     """
     scope = ScopeErrors() if scope is None else scope
-    there = tuple(net for net in nets if motion.has(net))
+    cut = motion.record.clipped
+    there = tuple(net for net in nets if motion.has(net) and motion.channels[net] not in cut)
     source = motion.record.source
     if not there:
         raise InputError(None, source, "none of them", f"a channel that shows {' or '.join(nets)}")

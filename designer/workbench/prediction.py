@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Mask
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import GeneratorSetting, settings
 from designer.circuit.netlist import Circuit, Excitation
@@ -36,6 +36,8 @@ SAME_FREQUENCY = 1e-3
 """Of a setting's frequency: how far a scope's clock shows it elsewhere, with room to spare."""
 SAME_AMPLITUDE = 0.06
 """Of a setting's amplitude: three standard deviations of a scope's gain."""
+LEVEL = 0.05
+"""Of its range: how near its level inside the clearance an output rests."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class PredictedStop:
             beyond = side * np.maximum(side * (displacement - end), 0.0)
             value = value + self.gains[side] * beyond
         return np.asarray(value)
+
+    def resting(self, output: Array) -> Mask:
+        """(k,) whether an output (k,) [V] is on its level inside the clearance, where many of its
+        values pile up though nothing cuts it off."""
+        return np.asarray(np.abs(output - self.inside[0]) <= LEVEL * np.ptp(output))
 
 
 @dataclass(frozen=True)
@@ -152,6 +159,12 @@ class BoardPrediction:
             moved = sum(factor * waves[net] for net, factor in stop.displacement.items())
             waves[stop.output] = stop.output_of(np.asarray(moved))
         return waves
+
+    @cached_property
+    def fastest(self) -> float:
+        """Highest natural frequency of the nominal board with its clearances open [Hz]."""
+        roots = np.linalg.eigvals(self.reduction.system().mode(self.circuit.open).A)
+        return float(np.abs(roots).max()) / (2.0 * np.pi)
 
     @cached_property
     def prior(self) -> Prior:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,12 +14,20 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import reading
 from designer.workbench.record import Record
+from designer.workbench.record_arrays import stored_arrays
 from designer.workbench.scope_text import EXPECTED, NUMBER, TextColumns, read_columns
 
-FEWEST_SAMPLES = 100
-"""Fewer show no motion."""
+FEWEST_SAMPLES, MOST_SAMPLES = 100, 1 << 21
+"""Fewer show no motion; more tell nothing that these do not."""
+MOST_CHANNELS = 16
+"""Of an oscilloscope."""
+MOST_VOLTS, MOST_SECONDS = 1e6, 1e9
+"""What a probe is put to, and how long one waits for a record."""
+STEPS = (1e-12, 1e3)
+"""From one sample to the next [s]."""
+FARTHEST = 1e11
+"""Steps of the first time from 0: a float then has it to a thousandth of a step or better."""
 TIME_NAMES = re.compile(r"(time|zeit|temps|tiempo|tempo|x-axis|x|t|s|seconds?)", re.IGNORECASE)
 COUNT_NAMES = re.compile(r"(x|sequence|sample|index|nr|no|n|#)", re.IGNORECASE)
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -68,12 +77,12 @@ def read_record(path: Path | str) -> Record:
         than `FEWEST_SAMPLES`; names file, line or array, found and expected.
     """
     path = Path(path)
-    if path.suffix in (".npy", ".npz"):
+    if path.suffix.lower() in (".npy", ".npz"):
         return _of_arrays(path)
     columns = read_columns(path)
     named = _named(columns, path)
     start, interval = _increments(columns.header)
-    return _record(path, named, start, interval, _kind(columns.header), columns.line)
+    return _record(path, named, start, interval, _kind(columns.header), columns.lines)
 
 
 def _record(
@@ -82,27 +91,43 @@ def _record(
     start: float | None,
     interval: float | None,
     kind: str,
-    line: int | None = None,
+    lines: Sequence[int] = (),
 ) -> Record:
     """The record of these columns. start, interval : of the times [s], where the header says them;
-    line : of the file where the numbers begin."""
+    lines : of the file where the numbers stand."""
     times = [c for c in columns if c.measure == "s"]
     voltages = [c for c in columns if c.measure in ("V", "")]
     if not times and interval is None:
         raise InputError(path, "its times", MISSING, "a column of times, or their step in a header")
     if not voltages:
         raise InputError(path, "its channels", MISSING, "a column of volts beside the times")
+    if len(voltages) > MOST_CHANNELS:
+        raise InputError(path, "its channels", len(voltages), f"at most {MOST_CHANNELS}")
     count = len(columns[0].values)
-    if count < FEWEST_SAMPLES:
-        raise InputError(path, "its samples", count, f"at least {FEWEST_SAMPLES}")
+    if not FEWEST_SAMPLES <= count <= MOST_SAMPLES:
+        expected = f"at least {FEWEST_SAMPLES} and at most {MOST_SAMPLES}"
+        raise InputError(path, "its samples", count, expected)
+    for column in columns:
+        limit, unit = (MOST_SECONDS, "s") if column.measure == "s" else (MOST_VOLTS, "V")
+        wrong = np.flatnonzero(~(np.abs(column.values) <= limit))
+        if len(wrong) and column.measure != "count":
+            bad = int(wrong[0])
+            found, expected = f"{column.values[bad]:.6g} {unit}", f"at most {limit:g} {unit}"
+            raise InputError(path, f"{column.name}, {_place(bad, lines)}", found, expected)
     steps = np.arange(count, dtype=np.float64)
     time = (start or 0.0) + (interval or 0.0) * steps
     if times:
-        time = _even(times[0].values, path, line)
+        time = _even(times[0].values, path, lines)
+    _check_times(path, time, interval if not times else None)
     return Record(time, {c.name: c.values for c in voltages}, path.name, kind)
 
 
-def _even(times: Array, path: Path, line: int | None) -> Array:
+def _place(sample: int, lines: Sequence[int]) -> str:
+    """Where a sample stands in the file."""
+    return f"line {lines[sample]}" if sample < len(lines) else f"sample {sample}"
+
+
+def _even(times: Array, path: Path, lines: Sequence[int]) -> Array:
     """(k,) equal steps through these times.
 
     Scopes write times with few digits: a step may be smaller than the last of them.
@@ -113,12 +138,26 @@ def _even(times: Array, path: Path, line: int | None) -> Array:
     digit = float(gaps[gaps > 0.0].min()) if (gaps > 0.0).any() else 0.0
     allowed = UNEVEN * max(abs(float(step)), digit)
     off = np.abs(times - begin - step * k)
-    if not step > 0.0 or float(off.max()) > allowed:
-        worst = int(np.argmax(off)) if step > 0.0 else 0
-        place = f"sample {worst}" if line is None else f"line {line + worst}"
+    rises = step > 0.0 and times[-1] > times[0]
+    if not rises or float(off.max()) > allowed:
+        worst = int(np.argmax(off)) if rises else int(np.argmax(np.diff(times) <= 0.0)) + 1
         expected = "times at equal steps: one record without gaps, not segments one after the other"
-        raise InputError(path, place, f"{times[worst]:.9g} s", expected)
+        raise InputError(path, _place(worst, lines), f"{times[worst]:.9g} s", expected)
     return np.asarray(begin + step * k)
+
+
+def _check_times(path: Path, time: Array, told: float | None) -> None:
+    """InputError for steps that no oscilloscope has, or that the digits of a number do not hold.
+    told : the step that a header says [s]."""
+    step = float(time[-1] - time[0]) / (len(time) - 1) if told is None else told
+    low, high = STEPS
+    if not low <= step <= high:
+        expected = f"from {low:g} s to {high:g} s"
+        raise InputError(path, "the step of its times", f"{step:.6g} s", expected)
+    first = float(time[0])
+    if not abs(first) <= FARTHEST * step:
+        expected = f"within {FARTHEST:g} steps of {step:.3g} s from 0"
+        raise InputError(path, "its first time", f"{first:.6g} s", expected)
 
 
 # -- text -------------------------------------------------------------------------------------
@@ -204,7 +243,8 @@ def _increments(header: Iterable[Sequence[str]]) -> tuple[float | None, float | 
 
 
 def _number(cell: str) -> float | None:
-    return float(cell) if NUMBER.fullmatch(cell) else None
+    value = float(cell) if NUMBER.fullmatch(cell) else math.nan
+    return value if math.isfinite(value) else None
 
 
 def _kind(header: Iterable[Sequence[str]]) -> str:
@@ -216,26 +256,27 @@ def _kind(header: Iterable[Sequence[str]]) -> str:
 
 
 def _of_arrays(path: Path) -> Record:
-    with reading(path, "arrays of numbers, as NumPy writes them"):
-        stored = np.load(path, allow_pickle=False)
-        if path.suffix == ".npz":
-            with stored:
-                arrays = {name: np.atleast_1d(stored[name]) for name in stored.files}
-        elif stored.dtype.names:
-            arrays = {name: stored[name] for name in stored.dtype.names}
-        else:
-            table = np.atleast_2d(stored)
-            table = table if table.shape[0] >= table.shape[1] else table.T
-            arrays = {"time" if k == 0 else f"column {k + 1}": c for k, c in enumerate(table.T)}
-        arrays = {name: np.asarray(values, dtype=np.float64) for name, values in arrays.items()}
-    start, interval = (_single(arrays, name) for name in ("Tstart", "Tinterval"))
-    _single(arrays, "Length")
+    arrays = {name: _floats(values) for name, values in stored_arrays(path).items()}
+    start, interval = (_single(arrays, name, path) for name in ("Tstart", "Tinterval"))
+    arrays.pop("Length", None)
     return _record(path, _checked(arrays, path), start, interval, "NumPy")
 
 
-def _single(arrays: dict[str, Any], name: str) -> float | None:
+def _floats(values: Array) -> Array:
+    """As floats; what is too large for one is infinite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(values, dtype=np.float64)
+
+
+def _single(arrays: dict[str, Any], name: str, path: Path) -> float | None:
     """A named number, taken out of the arrays."""
-    return float(arrays.pop(name).ravel()[0]) if name in arrays else None
+    if name not in arrays:
+        return None
+    values = arrays.pop(name).ravel()
+    if len(values) != 1 or not np.isfinite(values[0]):
+        found = f"{values[0]:g}" if len(values) == 1 else f"{len(values)} numbers"
+        raise InputError(path, name, found, "one finite number of seconds")
+    return float(values[0])
 
 
 def _checked(arrays: Mapping[str, Array], path: Path) -> list[_Column]:

@@ -23,9 +23,11 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +37,8 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.guarded_reading import read_bytes, reading
 
+MOST_BYTES = 1 << 26
+"""Of a file: a million and more samples of three channels."""
 HEAD = 1 << 16
 """Characters in which a header has to end."""
 MIDDLE = 1 << 13
@@ -42,7 +46,7 @@ MIDDLE = 1 << 13
 FEWEST_LINES = 5
 """Lines of numbers that follow each other where a header has ended."""
 EXPECTED = "a record of an oscilloscope: a column of times and columns of volts"
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 COMMAS = str.maketrans({",": ".", ".": ","})
 """Turns decimal commas into points, so that a point there makes no number."""
 OVERRANGE = re.compile(r"[+-]?(∞|inf(inity)?)", re.IGNORECASE)
@@ -58,8 +62,8 @@ class TextColumns:
     """(c,) where each column stands in the file, from 0."""
     header: tuple[tuple[str, ...], ...]
     """Cells of each line of the header; also of words that stand beside the numbers."""
-    line: int
-    """Number of the first line of numbers, from 1."""
+    lines: tuple[int, ...]
+    """(k,) number of each line of numbers, from 1."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,10 @@ class _Layout:
     def is_number(self, cell: str) -> bool:
         plain = cell.translate(COMMAS) if self.decimal == "," else cell
         return bool(NUMBER.fullmatch(plain) or OVERRANGE.fullmatch(plain))
+
+    def value(self, cell: str) -> float:
+        """Of a cell that is a number."""
+        return float(cell.translate(COMMAS) if self.decimal == "," else cell)
 
     def places(self, lines: Sequence[str]) -> tuple[int, ...]:
         """Columns that hold a number in each of these lines."""
@@ -101,45 +109,55 @@ def read_columns(path: Path) -> TextColumns:
     InputError : no text, no columns of numbers, or a line among them that has something else: names
         the line, what was found there and what was expected.
     """
-    text = _decoded(read_bytes(path, EXPECTED), path)
+    content = read_bytes(path, EXPECTED, most=MOST_BYTES)
+    with reading(path, EXPECTED):
+        return _columns_of(_decoded(content, path), path)
+
+
+def _columns_of(text: str, path: Path) -> TextColumns:
+    """The columns of a text."""
     middle = _middle(text)
     if not middle:
-        raise InputError(path, "the file", "nothing in it", EXPECTED)
+        found = "a line without end" if text.strip() else "nothing in it"
+        raise InputError(path, "the file", found, EXPECTED)
     layout = _layout(middle)
     places = layout.places(middle)
     if not places:
         raise InputError(path, "a line in the middle", middle[0].strip(), EXPECTED)
-    head = text[:HEAD].splitlines()
+    head = text[:HEAD].split("\n")
     first = _first_line(head, layout, places)
     if first is None:
         found = head[0].strip() if head else ""
         raise InputError(path, "line 1", found, "a header of at most 64 kB and numbers below it")
-    values = _numbers(text, first, layout, places, path)
+    values, begin = _numbers(text, first, layout, places, path)
     header = [*head[:first], *_beside(head[first:], layout, places)]
     cells = tuple(tuple(layout.cells(line.lstrip("#% "))) for line in header)
-    return TextColumns(values, places, cells, first + 1)
+    filled = (k for k, line in enumerate(text.split("\n"), 1) if k > first and line.strip())
+    return TextColumns(values, places, cells, tuple(islice(filled, begin, begin + len(values))))
 
 
 def _decoded(content: bytes, path: Path) -> str:
-    """Text in UTF-8, in UTF-16 with a mark, or else in Latin 1 (the µ of older scopes)."""
+    """Text in UTF-8, in UTF-16 with a mark, or else in Latin 1 (the µ of older scopes), whose lines
+    end in a line feed: a lone carriage return is the end of a line too."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        with reading(path, EXPECTED):
-            return content.decode("utf-16")
-    if b"\0" in content[:HEAD]:
+        text = content.decode("utf-16")
+    elif b"\0" in content:
         raise InputError(path, "the file", "bytes that are no text", f"text: {EXPECTED}")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
+    else:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _middle(text: str) -> list[str]:
     """Whole lines from the middle of a text, those without anything left out."""
     if len(text) <= 2 * MIDDLE:
-        lines = [line for line in text.splitlines() if line.strip()]
+        lines = [line for line in text.split("\n") if line.strip()]
         return lines[len(lines) // 2 :]
     start = (len(text) - MIDDLE) // 2
-    lines = text[start : start + MIDDLE].splitlines()[1:-1]
+    lines = text[start : start + MIDDLE].split("\n")[1:-1]
     return [line for line in lines if line.strip()]
 
 
@@ -157,8 +175,8 @@ def _first_line(head: Sequence[str], layout: _Layout, places: Sequence[int]) -> 
     """Index of the line from which on the lines are numbers, as far as the eye reaches."""
     for first, line in enumerate(head):
         if layout.is_data(line, places):
-            following = [each for each in head[first:] if each.strip()][:FEWEST_LINES]
-            if all(layout.is_data(each, places) for each in following):
+            following = (head[k] for k in range(first, len(head)) if head[k].strip())
+            if all(layout.is_data(each, places) for each in islice(following, FEWEST_LINES)):
                 return first
     return None
 
@@ -170,8 +188,11 @@ def _beside(lines: Sequence[str], layout: _Layout, places: Sequence[int]) -> lis
     return [line for line in lines if layout.cells(line)[:1] not in ([], [""])]
 
 
-def _numbers(text: str, first: int, layout: _Layout, places: Sequence[int], path: Path) -> Array:
-    """(k, c) the numbers; rows that are not whole are left out at both ends."""
+def _numbers(
+    text: str, first: int, layout: _Layout, places: Sequence[int], path: Path
+) -> tuple[Array, int]:
+    """(k, c) the numbers, and how many rows before them are left out; rows that are not whole are,
+    at both ends."""
     try:
         frame = pd.read_csv(
             io.StringIO(text),
@@ -193,7 +214,7 @@ def _numbers(text: str, first: int, layout: _Layout, places: Sequence[int], path
     begin, end = int(inside[0]), int(inside[-1]) + 1
     if not whole[begin:end].all() or np.isinf(values).any():
         raise _first_fault(text, first, layout, places, path, skip=begin)
-    return np.ascontiguousarray(values[begin:end])
+    return np.ascontiguousarray(values[begin:end]), begin
 
 
 def _first_fault(
@@ -216,6 +237,8 @@ def _first_fault(
                 return InputError(path, f"line {number}", cell, expected)
             if not layout.is_number(cell) and (cell or count >= skip):
                 return InputError(path, f"line {number}", line.strip() or "nothing", expected)
+            if cell and math.isinf(layout.value(cell)):
+                return InputError(path, f"line {number}", cell, "numbers that an oscilloscope has")
     return InputError(path, f"line {first + 1}", "lines of different lengths", expected)
 
 

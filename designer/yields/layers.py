@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Any, Literal, Protocol
 
 from designer.base.threads import parallel
@@ -85,7 +86,9 @@ def fill(
             continue
         stored = [] if store is None else store.read(block)
         count, rest = divmod(len(stored), len(plan.questions))
-        if rest or (stored and stored[-1].sample != block.start + count - 1):
+        samples = range(block.start, block.start + count)
+        wanted = product(samples, range(len(plan.questions)))
+        if rest or [(row.sample, row.question) for row in stored] != list(wanted):
             stored, count = [], 0
         for _ in stored:
             step()

@@ -1,23 +1,23 @@
 """Boards from the moment they are switched on: every capacitor discharged, the generator anywhere
 in its period, the op-amps free to clip, on the exact circuit.
 
-The flow starts at drive phase 0. The rest of the first period is run with the generator as two more
-states, sine and cosine, which start at any phase: as exact as everything else.
+The rest of the first period is run by the general kernel, which starts at any phase; the drives
+after it by the compiled way of boards where that knows it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Mask
 from designer.base.threads import parallel
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import FloatingCircuit
-from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, failed
@@ -29,6 +29,11 @@ from designer.yields.start_recipe import Recipe
 
 WATCHED = 20
 """Drive periods after switching on in which clipping is looked for."""
+NEAR = 0.01
+"""Of each state's peak: a board that has come as near to an orbit that is known to attract, and is
+nearer after one more of its periods, has arrived."""
+STILL = 1e-3
+"""Peaks below this share of the largest count as so much."""
 STREAM = "phase:"
 """Sets the generator's phase apart from the other draws of a sample."""
 
@@ -70,41 +75,59 @@ class PowerUpEnd(NamedTuple):
     """The end of the recipe; None where the flow failed."""
 
 
-def until_strobe(driven: PiecewiseLinearSystem, drive: Drive, phase: float) -> Arrival | None:
+Swept = Callable[[Sequence[tuple[Drive, int]], Array], tuple[Array, Mask]]
+"""What knows the way of a board through drives from several states, or where it does not
+(``Ensemble.swept`` of a board)."""
+
+
+def until_strobe(flow: Flow, phase: float) -> Arrival | None:
     """The first strobe after switching on at drive phase ``phase`` [rad]; None if the flow fails.
 
-    driven : the system with the drive's sine and cosine as states (``with_drive_states``).
+    Raises
+    ------
+    ArithmeticError : no mode of the system holds at the start.
     """
-    left = 1.0 - (phase / (2.0 * np.pi)) % 1.0
-    start = np.zeros(driven.size)
-    start[-2:] = np.sin(phase), np.cos(phase)
-    # The generator's swing is in the states: what is left of the drive is its offset.
-    rest = Drive(drive.omega / left, 0.0, drive.offset)
-    # One period: the tables of the fast path cost as much, and are compiled for two more states.
-    run = Flow(driven, rest, fast=False).run(start, 1, measure=True)
+    run = flow.to_strobe(np.zeros(flow.system.size), phase)
     if run.status is not FlowStatus.DONE:
         return None
-    return Arrival(run.strobes[-1][:-2], 1, run.clipped_time > 0.0)
+    return Arrival(run.strobes[-1], 1, run.clipped_time > 0.0)
 
 
 def follow(
-    system: PiecewiseLinearSystem, stages: Sequence[tuple[Drive, int]], phases: Sequence[float]
+    system: PiecewiseLinearSystem,
+    stages: Sequence[tuple[Drive, int]],
+    phases: Sequence[float],
+    swept: Swept | None = None,
 ) -> list[Arrival | None]:
     """Switch on at each of these drive phases [rad] under the first drive, then each drive for its
     whole periods, phase-continuous; None where the flow fails.
+
+    swept : a faster way through the stages, of the same system.
 
     Raises
     ------
     ArithmeticError : no mode of the system holds at some state on the way.
     """
-    driven = with_drive_states(system, stages[0][0])
-    arrivals = [until_strobe(driven, stages[0][0], phase) for phase in phases]
+    # One for all phases: its tables cost more than a few periods.
+    general = Flow(system, stages[0][0], fast=False)
+    arrivals = [until_strobe(general, phase) for phase in phases]
+    known: dict[int, Arrival] = {}
+    if swept is not None:
+        begun = {k: arrival for k, arrival in enumerate(arrivals) if arrival is not None}
+        states = np.array([a.state for a in begun.values()]).reshape(len(begun), system.size)
+        periods = sum(count for _, count in stages)
+        for (k, arrival), end, whole in zip(begun.items(), *swept(stages, states), strict=True):
+            if whole:
+                known[k] = Arrival(end, arrival.periods + periods, arrival.clipped)
+                arrivals[k] = None
     for number, (drive, periods) in enumerate(stages):
-        flow = Flow(system, drive)  # one for all phases: its tables cost more than a few periods
+        if not any(arrivals):
+            break
+        flow = Flow(system, drive)
         watched = min(periods, WATCHED) if number == 0 else 0
         arrivals = [_on(flow, a, watched, True) for a in arrivals]
         arrivals = [_on(flow, a, periods - watched, False) for a in arrivals]
-    return arrivals
+    return [known.get(k, arrival) for k, arrival in enumerate(arrivals)]
 
 
 def _on(flow: Flow, arrival: Arrival | None, periods: int, measure: bool) -> Arrival | None:
@@ -121,22 +144,33 @@ def switched_on(
     ensemble: Ensemble,
     starts: Sequence[tuple[int, Question, Recipe, float]],
     jobs: int = 1,
+    known: Sequence[Orbit | None] = (),
 ) -> list[PowerUpEnd]:
     """What each start leads to: a board of the ensemble, a response with its recipe, and the drive
-    phase at power-up [rad]."""
+    phase at power-up [rad].
+
+    known : of each start the board's own orbit of the response, where it has one that attracts; a
+    start that has come to it is not settled again.
+    """
     arrivals = _arrivals(ensemble, starts, jobs)
+    orbits = _arrived(ensemble, starts, arrivals, known, jobs)
     cases: list[Case] = [
         (board, question, recipe.target, arrival.state)
-        for (board, question, recipe, _), arrival in zip(starts, arrivals, strict=True)
-        if isinstance(arrival, Arrival)
+        for (board, question, recipe, _), arrival, orbit in zip(
+            starts, arrivals, orbits, strict=True
+        )
+        if isinstance(arrival, Arrival) and orbit is None
     ]
     ends = iter(settled(ensemble, cases, jobs))
-    return [
-        PowerUpEnd(failed(arrival), Verdict.FAILED, arrival, None)
-        if isinstance(arrival, str)
-        else PowerUpEnd(*next(ends), arrival)
-        for arrival in arrivals
-    ]
+    out = []
+    for (_, question, _, _), arrival, orbit in zip(starts, arrivals, orbits, strict=True):
+        if not isinstance(arrival, Arrival):
+            out.append(PowerUpEnd(failed(arrival), Verdict.FAILED, arrival, None))
+        elif orbit is not None:
+            out.append(PowerUpEnd(orbit, *question.judge(orbit), arrival))
+        else:
+            out.append(PowerUpEnd(*next(ends), arrival))
+    return out
 
 
 def _arrivals(
@@ -146,20 +180,79 @@ def _arrivals(
     groups: dict[tuple[int, Recipe], list[int]] = {}
     for k, (board, _, recipe, _) in enumerate(starts):
         groups.setdefault((board, recipe), []).append(k)
+    # The starts of one board share its tables, unless threads would have nothing to do.
+    parts = 1 if len(groups) >= jobs else jobs
+    tasks = [
+        (key, members[k::parts])
+        for key, members in groups.items()
+        for k in range(min(parts, len(members)))
+    ]
 
-    def arrive(group: tuple[tuple[int, Recipe], list[int]]) -> list[Arrival | str]:
-        (board, recipe), members = group
+    def arrive(task: tuple[tuple[int, Recipe], list[int]]) -> list[Arrival | str]:
+        (board, recipe), members = task
         try:
             system = ensemble.reduction(board).system()
-            arrivals = follow(system, recipe.drives, [starts[k][3] for k in members])
+            swept, phases = partial(ensemble.swept, board), [starts[k][3] for k in members]
+            arrivals = follow(system, recipe.drives, phases, swept)
         except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
             return [str(error)] * len(members)
         return [a or "the flow did not get through the start" for a in arrivals]
 
     by_start: dict[int, Arrival | str] = {}
-    for members, some in zip(groups.values(), parallel(arrive, groups.items(), jobs), strict=True):
+    for (_, members), some in zip(tasks, parallel(arrive, tasks, jobs), strict=True):
         by_start |= dict(zip(members, some, strict=True))
     return [by_start[k] for k in range(len(starts))]
+
+
+def _arrived(
+    ensemble: Ensemble,
+    starts: Sequence[tuple[int, Question, Recipe, float]],
+    arrivals: Sequence[Arrival | str],
+    known: Sequence[Orbit | None],
+    jobs: int,
+) -> list[Orbit | None]:
+    """Of each start the known orbit that it has come to; None where that is not plain."""
+    out: list[Orbit | None] = [None] * len(starts)
+    groups: dict[tuple[int, Recipe], list[int]] = {}
+    for k, orbit in enumerate(known):
+        if orbit is not None and isinstance(arrivals[k], Arrival):
+            groups.setdefault((starts[k][0], starts[k][2]), []).append(k)
+
+    def near(task: tuple[tuple[int, Recipe], list[int]]) -> Mask:
+        (board, recipe), members = task
+        orbit = known[members[0]]
+        assert orbit is not None
+        states = np.array([a.state for k in members if isinstance(a := arrivals[k], Arrival)])
+        return come_to(orbit, states, partial(ensemble.swept, board), recipe.target.drive)
+
+    for (_, members), some in zip(
+        groups.items(), parallel(near, groups.items(), jobs), strict=True
+    ):
+        for k, yes in zip(members, some.tolist(), strict=True):
+            out[k] = known[k] if yes else None
+    return out
+
+
+def come_to(orbit: Orbit, states: Array, swept: Swept, drive: Drive) -> Mask:
+    """(E,) whether each of these states (E, n) lies within ``NEAR`` of an orbit that attracts, and
+    nearer to it after one more of its periods."""
+    no = np.zeros(len(states), dtype=bool)
+    if orbit.start.shape != states.shape[1:]:
+        return no
+    laps, on_it = swept([(drive, 1)], orbit.start[None]), [orbit.start]
+    while laps[1].all() and len(on_it) < orbit.n:
+        on_it.append(laps[0][0])
+        laps = swept([(drive, 1)], laps[0])
+    peaks = np.abs(orbit.extremes).max(axis=1)
+    peaks = np.maximum(peaks, STILL * peaks.max())
+
+    def distances(of: Array) -> Array:
+        apart = np.abs(of[:, None] - np.array(on_it)[None]) / peaks
+        return np.asarray(apart.max(axis=2).min(axis=1))
+
+    before = distances(states)
+    later, whole = swept([(drive, orbit.n)], states)
+    return laps[1].all() & whole & (before < NEAR) & (distances(later) < before)
 
 
 def phases(seed: int, question: Question, indices: range) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_type_hints
 
@@ -18,8 +19,11 @@ import pyarrow as pa
 
 from designer.base.atomic_write import appearing
 from designer.base.keyed_store import KeyedStore, Vouch, nobody, quiet
-from designer.base.parquet_entry import ParquetForm, Rows
-from designer.verdicts.cross_check import CrossCheck
+from designer.base.parquet_entry import MOST_ROWS, ParquetForm, Rows
+from designer.base.record_check import checked_record
+from designer.dynamics.counts import read_counts
+from designer.dynamics.orbit import OrbitStatus
+from designer.verdicts.cross_check import UNDECIDED, CrossCheck, StartKind
 from designer.verdicts.verdict import BLOCK, BoardRow
 
 Row = TypeVar("Row", bound=BoardRow | CrossCheck)
@@ -30,6 +34,10 @@ _TYPES: dict[type, pa.DataType] = {
     float: pa.float64(),
     str: pa.string(),
 }
+
+
+_WORDS = {*OrbitStatus, UNDECIDED, ""}
+"""What a response is called that has no n-p-q."""
 
 
 class BlockStore(Generic[Row]):
@@ -71,7 +79,8 @@ class BlockStore(Generic[Row]):
         self._labels = labels
         self._noted = 0
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
-        form = ParquetForm(self._schema_of())
+        most = size * len(StartKind) * len(omegas) if omegas else MOST_ROWS
+        form = ParquetForm(self._schema_of(), most=most)
         self._store: KeyedStore[Rows] = KeyedStore(root, form, note, vouch, self._write)
         self._read: dict[str, list[Row]] = {}
 
@@ -83,12 +92,8 @@ class BlockStore(Generic[Row]):
         """The stored rows of the block's samples in this study; none where a file is of another
         study, damaged or not there."""
         name = self.name(block)
-        stored = self._store.read(name, self._key(block))
-        if stored is None:
-            return []
-        try:
-            rows = [self._row_of(values) for values in stored]
-        except (KeyError, ValueError):  # a word that is none of an enumeration's
+        rows = self._store.read_as(name, self._key(block), partial(self._rows_of, block))
+        if rows is None:
             return []
         if name not in self._store.unsealed:
             self._read[name] = rows
@@ -155,10 +160,27 @@ class BlockStore(Generic[Row]):
             values["board"] = self._labels[row.sample % len(self._labels)]
         return values
 
+    def _rows_of(self, block: range, stored: Rows) -> list[Row]:
+        """The rows of a file; ValueError where they are not such as a study writes."""
+        rows = [self._row_of(values) for values in stored]
+        first = block.start // self.size * self.size
+        for row in rows:
+            if not first <= row.sample < first + self.size:
+                raise ValueError(f"sample {row.sample}")
+            if not 0 <= row.question < (len(self._omegas) or MOST_ROWS):
+                raise ValueError(f"question {row.question}")
+            if row.response not in _WORDS and read_counts(row.response) is None:
+                raise ValueError(f"response {row.response}")
+        keys = [(row.sample, row.question, getattr(row, "kind", "")) for row in rows]
+        if len(set(keys)) < len(keys):
+            raise ValueError("two rows of one sample")
+        return rows
+
     def _row_of(self, values: Mapping[str, Any]) -> Row:
-        return self._row(
-            **{
+        return checked_record(
+            self._row,
+            {
                 name: kind(values[name]) if issubclass(kind, StrEnum) else values[name]
                 for name, kind in self._hints.items()
-            }
+            },
         )

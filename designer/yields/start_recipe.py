@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
+from designer.base.si_unit import value_text
 from designer.circuit.netlist import Excitation
 from designer.dynamics.piecewise_linear import Drive
 
@@ -65,6 +66,8 @@ class Recipe:
     """Whether a sweep without steps did as well."""
     slower: bool = False
     """Whether a sweep ``SLOWER`` times as slow did as well."""
+    hertz_scale: float | None = None
+    """How many hertz of the mechanism ω = 1 is; None where that is not known."""
 
     def stages(self) -> Iterator[tuple[Excitation, int]]:
         """Settings of the generator in order, each with its whole drive periods."""
@@ -101,7 +104,10 @@ class Recipe:
 
     @property
     def text(self) -> str:
-        """The recipe in words, for ``setup.csv``: what a person sets on a generator."""
+        """The recipe in words, for ``setup.csv``: what a person sets on a generator. One that never
+        worked is not offered."""
+        if self.trials and not self.reached:
+            return "; ".join([f"none: {self._unreached()}", *self._caution()])
         end = [f"wait {_seconds(self.wait_seconds)} or longer", *self._success()]
         if self.way is RecipeKind.DIRECT:
             return "; ".join(["switch on at this setting", *end])
@@ -132,16 +138,33 @@ class Recipe:
                 f"{self.able} sample boards"
             )
         yield text
+        yield from self._caution()
+
+    def _unreached(self) -> str:
+        """That no recipe worked."""
+        text = f"no recipe that was tried led to it from any of {self.trials} switch-on phases"
+        if not self.board_reached:
+            return text
+        return (
+            f"{text}, and at most at {self.board_reached} of {self.board_trials} starts of boards"
+        )
+
+    def _caution(self) -> Iterator[str]:
+        """A warning where few boards can show the response."""
         if 2 * self.able < self.boards:
             shows = self.able or "none"
             yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
 
     def _hertz(self, at: Excitation) -> str:
-        """In Hz and dimensionless."""
+        """In Hz, and what that is in the model: in Hz of the mechanism where that is known, else
+        dimensionless."""
         text = f"{hertz(at.frequency)} Hz"
         if self.omega is None:
             return text
-        return f"{text} (omega {self.omega * at.frequency / self.target.frequency:.4g})"
+        omega = self.omega * at.frequency / self.target.frequency
+        if self.hertz_scale is None:
+            return f"{text} (omega {omega:.4g})"
+        return f"{text} ({value_text(omega * self.hertz_scale, 'Hz')} of the mechanism)"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: settings in Hz and V, times in drive periods and seconds."""

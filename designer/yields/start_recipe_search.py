@@ -6,7 +6,7 @@ a person does with a generator.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,12 +22,15 @@ from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.power_up import switched_on
 from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind
 
-TRIALS = 12
-"""Phases at which the nominal circuit is switched on."""
+TRIALS, FEW_TRIALS = 12, 4
+"""Phases at which the nominal circuit is switched on; the first few of them, where none works, are
+enough to go on to another recipe, and to ask what a person may do otherwise."""
 BOARDS = 24
 """Sample boards that a recipe is tried on, if they show the response as built."""
 STARTS = 3
 """Phases from which each of them is switched on."""
+FEW_BOARDS = 8
+"""Of the able ones, those that are asked what a person may do otherwise."""
 TRIAL = "recipe:"
 """Stream of those boards."""
 STEP = 0.01
@@ -62,8 +65,17 @@ def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
 
 def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Recipe]:
     """Recipes for a response, the simplest first. system : the nominal circuit."""
-    target = question.excitation
-    wait = _wait(question.start)
+    target, spec = question.excitation, question.spec
+    direct = Recipe(
+        RecipeKind.DIRECT,
+        spec.omega,
+        target,
+        target,
+        steps=0,
+        hold=HOLD,
+        wait=_wait(question.start),
+        hertz_scale=1.0 / (2.0 * math.pi) if spec.in_hertz else None,
+    )
 
     def sweep(way: RecipeKind, frequency: float, amplitude: float) -> Recipe:
         first = Excitation(frequency, amplitude, target.offset)
@@ -72,10 +84,10 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
             abs(math.log(amplitude / target.amplitude)),
         )
         steps = math.ceil(ratio / math.log1p(STEP) - 1e-9)
-        return Recipe(way, question.spec.omega, target, first, steps, HOLD, wait)
+        return replace(direct, way=way, first=first, steps=steps)
 
     frequency, amplitude = target.frequency, target.amplitude
-    yield Recipe(RecipeKind.DIRECT, question.spec.omega, target, target, 0, HOLD, wait)
+    yield direct
     yield sweep(RecipeKind.FROM_ABOVE, frequency * (1.0 + ASIDE), amplitude)
     yield sweep(RecipeKind.FROM_BELOW, frequency * (1.0 - ASIDE), amplitude)
     yield sweep(RecipeKind.AMPLITUDE, frequency, SOFT * amplitude)
@@ -126,67 +138,94 @@ class _Trials:
 
 @dataclass(frozen=True)
 class _Bench:
-    """Where the recipes of a question are tried. able : sample boards that show it as built."""
+    """Where the recipes of a question are tried. able : sample boards that show it as built, with
+    the orbits that they show."""
 
     question: Question
     nominal: Ensemble
     sample: Ensemble
-    able: tuple[int, ...]
+    able: Mapping[int, Orbit]
     jobs: int
 
-    def on_nominal(self, trials: _Trials) -> _Trials:
-        starts = [(0, self.question, trials.recipe, phase(k)) for k in range(TRIALS)]
-        return replace(trials, nominal=self._worked(self.nominal, starts))
+    def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
+        """From the first ``count`` phases, without those that were tried before."""
+        rest = range(len(trials.nominal), count)
+        starts = [(0, self.question, trials.recipe, phase(k)) for k in rest]
+        own = self.question.start
+        known = [own if own.radius < 1.0 else None] * len(starts)
+        more = self._worked(self.nominal, starts, known)
+        return replace(trials, nominal=(*trials.nominal, *more))
 
-    def on_boards(self, trials: _Trials, each: int = STARTS) -> _Trials:
-        """``each`` : phases for each board; with fewer, the first ones."""
+    def on_boards(self, trials: _Trials, boards: int = BOARDS, each: int = STARTS) -> _Trials:
+        """On the first ``boards`` able ones, from the first ``each`` phases of each."""
+        able = list(self.able.items())[:boards]
         starts = [
             (i, self.question, trials.recipe, phase(STARTS * i + k))
             for k in range(each)
-            for i in self.able
+            for i, _ in able
         ]
-        return replace(trials, boards=self._worked(self.sample, starts))
+        known = [orbit for _ in range(each) for _, orbit in able]
+        return replace(trials, boards=self._worked(self.sample, starts, known))
 
     def _worked(
-        self, ensemble: Ensemble, starts: Sequence[tuple[int, Question, Recipe, float]]
+        self,
+        ensemble: Ensemble,
+        starts: Sequence[tuple[int, Question, Recipe, float]],
+        known: Sequence[Orbit | None],
     ) -> tuple[bool, ...]:
-        ends = switched_on(ensemble, starts, self.jobs)
+        ends = switched_on(ensemble, starts, self.jobs, known)
         return tuple(end.verdict is Verdict.OK for end in ends)
 
 
 def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
     start = question.start.start
     cases: list[Case] = [(i, question, question.excitation, start) for i in range(BOARDS)]
-    as_built = settled(sample, cases, jobs)
-    able = [i for i, (_, verdict, _) in enumerate(as_built) if verdict is Verdict.OK]
-    bench = _Bench(question, nominal, sample, tuple(able), jobs)
+    as_built = enumerate(settled(sample, cases, jobs))
+    able = {i: orbit for i, (orbit, verdict, _) in as_built if verdict is Verdict.OK}
+    bench = _Bench(question, nominal, sample, able, jobs)
     every: list[_Trials] = []
     for option in candidates(question, nominal.reduction(0).system()):
         doing(str(option.way))
-        trials = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
+        trials = _Trials(replace(option, boards=BOARDS, able=len(able)))
+        trials = bench.on_nominal(trials, FEW_TRIALS)
+        if any(trials.nominal):
+            trials = bench.on_nominal(trials)
         if all(trials.nominal):
             trials = bench.on_boards(trials)
             if trials.certain:
                 return _by_hand(trials, bench)
         every.append(trials)
-    complete = [t if t.boards else bench.on_boards(t) for t in every]
+    if not any(any(trials.nominal) for trials in every):
+        every = [bench.on_nominal(trials) for trials in every]
+    return _best(every, bench)
+
+
+def _best(every: Sequence[_Trials], bench: _Bench) -> Recipe:
+    """The first recipe that no other one plainly beats, of those that worked at all."""
+    working = [t for t in every if any(t.nominal)]
+    if not working:
+        return every[0].counted
+    first = max(working, key=lambda t: sum(t.nominal))
+    hopeful = [t for t in working if not replace(t, boards=()).beaten_by(replace(first, boards=()))]
+    complete = [t if t.boards else bench.on_boards(t) for t in hopeful]
     best = max(complete, key=lambda t: sum(t.starts))
     return _by_hand(next(t for t in complete if not t.beaten_by(best)), bench)
 
 
 def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
     """The recipe with how freely its sweep may be done: without steps, and slower. These are tried
-    from one phase of each board."""
+    from a few phases, and from one phase of a few boards."""
     recipe = trials.counted
     if recipe.way is RecipeKind.DIRECT:
         return recipe
-    first = trials.boards[: len(bench.able)]
+    few = min(FEW_BOARDS, len(bench.able))
+    nominal, boards = sum(trials.nominal[:FEW_TRIALS]), sum(trials.boards[:few])
 
     def as_well(other: Recipe) -> bool:
-        other_trials = bench.on_boards(bench.on_nominal(_Trials(other)), 1)
-        return sum(other_trials.nominal) >= sum(trials.nominal) and sum(other_trials.boards) >= sum(
-            first
-        )
+        tried = bench.on_nominal(_Trials(other), FEW_TRIALS)
+        if sum(tried.nominal) < nominal:
+            return False
+        return sum(bench.on_boards(tried, few, 1).boards) >= boards
 
     smooth = as_well(recipe.refined())
     slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)

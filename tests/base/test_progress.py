@@ -9,12 +9,17 @@ import pytest
 
 from designer.base.progress import (
     EVERY,
+    MINUTE,
     Progress,
     ProgressLines,
     Terminal,
+    best_so_far,
     how_far,
+    note,
+    part,
     progress_for,
     rate,
+    seeking,
 )
 
 
@@ -53,6 +58,23 @@ def test_lines_say_how_far_from_time_to_time(capsys: pytest.CaptureFixture[str])
     assert rest[0] == "  10/100, 30/min, 0:03:00 left"
     lines.stage("one step")()
     assert capsys.readouterr().err == "one step …\n"
+
+
+def test_work_that_waits_for_somebody_is_silent(capsys: pytest.CaptureFixture[str]) -> None:
+    """A page that is served does nothing until it is asked."""
+    now = [0.0]
+    with ProgressLines(lambda: now[0]) as lines:
+        now[0] += EVERY
+        lines.beat()
+        assert "starting" in capsys.readouterr().err
+        lines.idle()
+        now[0] += EVERY
+        lines.beat()
+        assert capsys.readouterr().err == ""
+        lines.stage("boards")
+        now[0] += EVERY
+        lines.beat()
+        assert "so far" in capsys.readouterr().err
 
 
 def test_a_stage_of_unknown_length_is_not_silent(capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,3 +125,56 @@ def test_what_is_printed_aside_stands_between_the_bars(capfd: pytest.CaptureFixt
     assert "boards" not in said[said.index("a table") :]
     with Progress().aside():
         pass
+
+
+def test_the_best_so_far_is_told_after_a_minute_and_each_minute(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    now = [0.0]
+
+    def later(seconds: float) -> list[str]:
+        now[0] += seconds
+        lines.beat()
+        said = capsys.readouterr().err.splitlines()
+        return [line for line in said if "best" in line]
+
+    with ProgressLines(lambda: now[0]) as lines:
+        with seeking("parts"):
+            assert later(0.9 * MINUTE) == []
+            assert later(0.1 * MINUTE) == ["  parts, best so far after 0:01:00: none yet"]
+            best_so_far("integrators", step=True)
+            assert later(0.5 * MINUTE) == []
+            assert later(0.5 * MINUTE) == ["  parts, best so far after 0:02:00: integrators"]
+            best_so_far("a circuit")
+            best_so_far("other integrators", step=True)
+            assert later(MINUTE) == ["  parts, best so far after 0:03:00: a circuit"]
+        assert later(2.0 * MINUTE) == []
+
+
+def test_what_the_outer_search_knows_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    """A search for designs chooses parts again and again."""
+    now = [0.0]
+
+    def told() -> str:
+        capsys.readouterr()
+        now[0] += MINUTE
+        lines.beat()
+        return next(line for line in capsys.readouterr().err.splitlines() if "best" in line)
+
+    with ProgressLines(lambda: now[0]) as lines, seeking("design"):
+        with part("design 1"), seeking("parts"):
+            best_so_far("an error")
+            assert told().endswith("design, best so far after 0:01:00: an error")
+        assert told().endswith("none yet")
+        best_so_far("a yield")
+        with part("design 2"), seeking("parts"):
+            best_so_far("another error")
+            assert told().endswith(": a yield")
+
+
+def test_a_note_reaches_who_is_watched(capsys: pytest.CaptureFixture[str]) -> None:
+    note("nobody hears it")
+    best_so_far("nor this")
+    with seeking("anything"), ProgressLines():
+        note("parts stand")
+    assert capsys.readouterr().err == "parts stand\n"

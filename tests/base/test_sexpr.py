@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given, strategies as st
 
+from designer.base import sexpr
 from designer.base.errors import InputError
 from designer.base.sexpr import (
     DEEPEST,
@@ -123,3 +126,42 @@ def test_what_is_missing_in_a_list_is_said_with_its_place() -> None:
     ):
         with pytest.raises(InputError, match=r"line [123], column [12]"):
             ask()
+
+
+def test_more_lists_than_a_file_needs_are_refused_before_any_is_made() -> None:
+    with pytest.raises(InputError, match=r"board: the file: found 1500002 lists"):
+        read("(" + "()" * (sexpr.MOST_LISTS + 1) + ")", Path("board"))
+
+
+def test_more_words_than_a_file_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Different ones count: a board repeats its words."""
+    monkeypatch.setattr(sexpr, "MOST_WORDS", 5)
+    assert len(read("(a b c d e " + "e " * 50 + ")").items) == 55
+    with pytest.raises(InputError, match="line 2, column 5: found more than 5 different words"):
+        read("(a b c\nd e f)")
+
+
+@pytest.mark.parametrize("text", ["x" * 1_000_001, '"' + "\\n" * 500_001 + '"'])
+def test_a_word_without_end(text: str) -> None:
+    with pytest.raises(InputError, match="a word of more than 1000000 characters"):
+        read(f"(a {text})")
+
+
+@given(st.text(st.sampled_from('"\\ab \n'), max_size=40))
+def test_a_quoted_word_ends_at_the_first_bare_quotation_mark(text: str) -> None:
+    """By a walk over its characters."""
+    end = at = 0
+    while at < len(text) and not end:
+        if text[at] == "\\":
+            at += 1
+        elif text[at] == '"':
+            end = at + 1
+        at += 1
+    if not end:
+        with pytest.raises(InputError):
+            read(f'(a "{text}')
+        return
+    with_end = read(f'(a "{text[:end]})')
+    assert len(with_end.items) == 2
+    assert isinstance(with_end.items[1], Atom)
+    assert with_end.items[1].quoted

@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, strategies as st
 from matplotlib.path import Path as Polygon
 
 from designer.base.arrays import Array
+from designer.base.errors import InputError
 from designer.base.sexpr import read
 from designer.board.outline import Outline, circle, read_outline
 
@@ -151,3 +153,46 @@ def test_a_polygon_for_a_circle() -> None:
     points = circle((1.0, 2.0), 3.0, 16)
     assert len(points) == 16
     assert {round(math.dist(p, (1.0, 2.0)), 12) for p in points} == {3.0}
+
+
+@given(
+    x=st.floats(-8.0, 48.0),
+    y=st.floats(-8.0, 58.0),
+    half=st.sampled_from([0.3, 1.0, 4.0, 12.0]),
+    turn=st.floats(0.0, 1.5),
+)
+def test_room_as_shapely_says(x: float, y: float, half: float, turn: float) -> None:
+    """An L with three cut-outs, and pads of any size anywhere."""
+    holes = [(10.0, 10.0, 3.0), (10.0, 35.0, 1.0), (30.0, 10.0, 0.2)]
+    outline = board(
+        polygon(L_SHAPE), *(f"gr_circle (center {a} {b}) (end {a + r} {b})" for a, b, r in holes)
+    )
+    area = shapely.Polygon(L_SHAPE, [circle((a, b), r) for a, b, r in holes])
+    corners = square(x, y, half, turn)
+    pad = shapely.Polygon(corners)
+    out = [
+        float(area.boundary.distance(p)) for p in map(shapely.Point, corners) if not area.covers(p)
+    ]
+    inside = float(area.boundary.distance(pad)) if area.covers(pad) else 0.0
+    expected = -max(out) if out else inside
+    assert outline.room(corners) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("item", "count"),
+    [
+        ("gr_circle (center 0 0) (end 9 0)", 556),
+        ("gr_arc (start 0 0) (mid 9 9) (end 18 0)", 1112),
+        ("gr_poly (pts " + "(xy 0 0) (xy 1 0)" * 500 + ")", 41),
+        ("gr_rect (start 0 0) (end 9 9)", 10_001),
+    ],
+)
+def test_an_edge_of_too_many_pieces(item: str, count: int) -> None:
+    with pytest.raises(InputError, match="an edge of more than 40000 pieces"):
+        board(*[item] * count)
+
+
+def test_a_polygon_of_too_many_points_is_refused_before_they_are_made() -> None:
+    arcs = "(arc (start 0 0) (mid 9 9) (end 18 0))" * 20_000
+    with pytest.raises(InputError, match="more than 40000 points"):
+        board(f"gr_poly (pts {arcs})")

@@ -6,7 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from designer.base.keyed_store import read_line, sealed_line
 from designer.centering.answer_cache import AnswerCache
+
+MOST = (10, 20)
+"""Greatest numbers of an answer."""
 
 
 def fill(memory: AnswerCache, questions: list[int]) -> list[int]:
@@ -17,7 +21,7 @@ def fill(memory: AnswerCache, questions: list[int]) -> list[int]:
         made.extend(questions[k] for k in new)
         return [(questions[k], 2 * questions[k]) for k in new]
 
-    answers = memory.get_all(list(questions), make)
+    answers = memory.get_all(list(questions), make, MOST)
     assert answers == [(q, 2 * q) for q in questions]
     return made
 
@@ -72,4 +76,18 @@ def test_a_file_without_seals_is_not_believed(tmp_path: Path) -> None:
     notes: list[str] = []
     assert fill(AnswerCache(path, "a", notes.append), [1]) == [1]
     assert len(notes) == 1
+    assert fill(AnswerCache(path, "a"), [1]) == []
+
+
+@pytest.mark.parametrize(
+    "answer", [[], [1], [1, 2, 3], [-1, 2], [1, 21], [10**30, 2], [1.0, 2], ["1", 2], [None, 2], 7]
+)
+def test_an_answer_that_cannot_be_is_made_again(tmp_path: Path, answer: object) -> None:
+    """On a line that a stranger has sealed."""
+    path = tmp_path / "file"
+    fill(AnswerCache(path, "a"), [1])
+    head, line = path.read_bytes().splitlines()
+    key, _ = read_line(line)
+    path.write_bytes(head + b"\n" + sealed_line([key, answer]).encode() + b"\n")
+    assert fill(AnswerCache(path, "a"), [1]) == [1]
     assert fill(AnswerCache(path, "a"), [1]) == []

@@ -269,6 +269,11 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
     again = measure(plan, 0.9, Book(json.loads(json.dumps(kept))["studies"]))
     assert again == measure(plan, 0.9, book)
     assert sorted(set(blocks)) == sorted(blocks)
+    for letters in ("!" * 250, ["o"] * 250, 250, None):  # with a seal that is right
+        blocks.clear()
+        strange = {s: {**known, "250": letters} for s, known in kept["studies"].items()}
+        assert measure(plan, 0.9, Book(strange)) == again
+        assert blocks == [250]
 
 
 def coins(monkeypatch: pytest.MonkeyPatch, asked: list[tuple[int, range]]) -> None:

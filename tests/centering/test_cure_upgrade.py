@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +38,7 @@ from designer.spread.part_grades import bought
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
 from tests.shared import paper_cases
+from tests.shared.mechanism_file import HAMMER
 
 CATALOG = load_catalog()
 
@@ -95,6 +97,38 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
     ]
     assert read.model == base.modelfile.model
     assert upgraded_file(base.modelfile, Upgrades()) is base.modelfile
+
+
+@pytest.mark.parametrize(
+    ("key", "stated", "rate"),
+    [
+        ("omega", "125.66", 1.0),
+        ("Omega", '"125.66 rad/s"', 1.0),
+        ("Omega", "125.66", 1.0),
+        ("frequency", '"20 Hz"', 1.0 / math.tau),
+        ("frequency", "20", 1.0 / math.tau),
+        ("frequency", '"125.66 rad/s"', 1.0 / math.tau),
+    ],
+)
+@pytest.mark.parametrize("b", [1.0, 1.1])
+def test_a_response_moves_in_the_key_of_its_frequency(
+    key: str, stated: str, rate: float, b: float
+) -> None:
+    text = f'{HAMMER}[[response]]\n{key} = {stated}\nexpect = "1-1-0;0-1"\ntwin = "exact"\n'
+    file = parse_model_file(text)
+    (before,) = file.responses
+    assert before.omega is not None
+    assert before.omega == pytest.approx(125.66, rel=1e-4)
+    moved = upgraded_file(file, Upgrades(places={0: WindowPlace(131.4, b)}))
+    (after,) = moved.responses
+    assert after.omega == pytest.approx(131.4, rel=1e-15)
+    assert (after.b, after.expect, after.twin) == (b, before.expect, "exact")
+    (table,) = tomllib.loads(moved.text)["response"]
+    assert {*table} & {"omega", "Omega", "frequency"} == {key}
+    assert float(str(table[key]).removesuffix(" Hz")) == pytest.approx(131.4 * rate, rel=1e-15)
+    stays = upgraded_file(file, Upgrades(places={0: WindowPlace(before.omega, 1.2)}))
+    assert stays.responses[0].omega == before.omega
+    assert tomllib.loads(stays.text)["response"][0][key] == tomllib.loads(f"key = {stated}")["key"]
 
 
 def test_a_better_part_is_bought_and_spreads_less(base: Synthesis) -> None:

@@ -21,13 +21,16 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.plots import simulate_plots
 from tests.shared.model_text import PAPER_TABLE
+from tests.shared.system_text import clearance, system_text, table
 
 BASE = "format = 1\n" + PAPER_TABLE
 REQUIRED = (
     "omega response status symmetric x1_max x1_min impact_velocities multipliers lyapunov others "
     "cost"
 )
-ADDED = "n p q start asymmetry twin impacts penetration miss extremes reason engine trust"
+ADDED = (
+    "n p q start asymmetry twin impacts penetration miss extremes reason engine trust frequencies"
+)
 Captured = pytest.CaptureFixture[str]
 
 
@@ -114,6 +117,30 @@ def test_an_orbit_without_a_period(tmp_path: Path, capfd: Captured) -> None:
     assert r["twin"] is r["penetration"] is None
     assert r["impacts"] == []
     assert r["x1_max"] > 0.25
+
+
+def test_a_motion_on_a_torus(tmp_path: Path, capfd: Captured) -> None:
+    """What its frequencies are is in tests/dynamics/test_quasi_periodic.py."""
+    free = clearance("A", "m1", "ground", upper=0.2, stiffness=8.0)
+    text = system_text(
+        {"m1": "1 kg", "m2": 1.4},
+        {("m1", "ground"): 1.0, ("m2", "m1"): 1.3},
+        {("m1", "ground"): 0.05, ("m2", "m1"): 0.05},
+        free,
+        table("force", on="m1", amplitude=1.0),
+    )
+    words = ["simulate", _model(tmp_path, text), "--omega", "1.25", "--starts", "2"]
+    (r,) = _answer(words, capfd)["responses"]
+    assert (r["response"], r["status"], r["n"]) == ("quasi-periodic", "quasi-periodic", 0)
+    assert (r["found"], r["trust"]["trusted"]) == (True, True)
+    assert r["frequencies"] == pytest.approx([1.25, 0.5309084], rel=1e-6)
+    hertz = [w / (2.0 * math.pi) for w in r["frequencies"]]
+    assert r["frequencies_hz"] == pytest.approx(hertz, rel=1e-12)
+    assert abs(r["lyapunov"]) < 4.0 * r["lyapunov_error"]
+    assert [a["response"] for a in r["starts"]["attractors"]] == ["quasi-periodic"]
+    assert entry.status(words) == 0
+    said = " ".join(capfd.readouterr().err.split())
+    assert "quasi-periodic with the frequencies 0.1989 Hz of the drive and 84.49669 mHz" in said
 
 
 def test_without_stops(tmp_path: Path, capfd: Captured) -> None:

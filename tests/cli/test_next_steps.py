@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable
 from pathlib import Path
@@ -54,10 +55,21 @@ def test_the_board_s_rules_are_proposed_once(folder: Path) -> None:
     assert verbs(next_steps.after_rules(folder, {"board": "rig.kicad_pcb"})) == []
 
 
+def test_a_model_in_hertz_is_swept_in_hertz(tmp_path: Path) -> None:
+    wanted = response(found=False) | {"omega": 2.0 * math.pi * 36.0}
+    for hertz in ({"frequency_hz": 36.0}, {"frequency_hz": 140.8, "mechanism_hz": 36.0}):
+        steps = list(next_steps.after_response(tmp_path, [wanted | hertz]))
+        assert verbs(steps) == ["bifurcation"]
+        assert "--from '25.2 Hz' --to '46.8 Hz'" in steps[0][0]
+
+
 def test_a_sweep_goes_around_the_frequency_that_was_wanted(tmp_path: Path) -> None:
     ((command, purpose),) = next_steps.after_response(tmp_path, [response(found=False)])
     assert "--from 7 --to 13" in command
     assert "1-1-1" in purpose
+    any_response = response(found=False) | {"expected": None}
+    ((_, purpose),) = next_steps.after_response(tmp_path, [any_response])
+    assert "None" not in purpose
 
 
 def test_a_design_or_a_model_leads_on(tmp_path: Path) -> None:
@@ -66,3 +78,13 @@ def test_a_design_or_a_model_leads_on(tmp_path: Path) -> None:
         "rules",
     ]
     assert verbs(next_steps.after_model(tmp_path / "my.toml")) == ["simulate", "run"]
+
+
+def test_rules_that_fail_are_proposed_first(tmp_path: Path) -> None:
+    """And once: rules without a board say nothing else."""
+    failing = {"failed_rules": [{"id": "swing"}, {"id": "offset-force"}]}
+    steps = list(next_steps.after_design(tmp_path, {"knobs": [response()], **failing}))
+    assert verbs(steps) == ["rules", "tolerance"]
+    assert steps[0][1].endswith("swing, offset-force")
+    study = {"responses": [response()], **failing}
+    assert verbs(next_steps.after_study(tmp_path, study)) == ["rules", "export"]

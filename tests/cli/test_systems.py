@@ -53,10 +53,10 @@ def answer_of(capfd: Captured, *words: str) -> Any:
     return json.loads(printed.out)
 
 
-def shaken(response: dict[str, Any]) -> NDArray[np.float64]:
+def shaken(response: dict[str, Any], base: float = 3e-3) -> NDArray[np.float64]:
     """Absolute displacement of ``SHAKEN`` over a period, densely, by an independent integrator of
     the equation in absolute displacements."""
-    omega, base = response["omega"], 3e-3
+    omega = response["omega"]
 
     def rate(t: float, s: NDArray[np.float64]) -> list[float]:
         x, v = s
@@ -90,6 +90,39 @@ def test_displacements_are_absolute_where_the_base_moves(file: str, capfd: Captu
     assert [impact["clearance"] for impact in r["impacts"]] == ["A"]
 
 
+ACCELERATED = SHAKEN.replace('"3 mm"', '"14 m/s²"')
+
+
+@pytest.mark.parametrize("file", [ACCELERATED], indirect=True)
+def test_displacements_from_a_base_of_given_acceleration(
+    file: str, tmp_path: Path, capfd: Captured
+) -> None:
+    """At each frequency against the independent integrator with a displacement of a/ω²."""
+    words = ("--frequency", "11 Hz", "--frequency", "12.5 Hz", "--starts", "3")
+    answer = answer_of(capfd, "simulate", file, *words)
+    for r in answer["responses"]:
+        base = 14.0 / r["omega"] ** 2
+        x = shaken(r, base)
+        steps = np.linspace(0.0, 2.0 * np.pi, len(x))
+        z = x - base * np.sin(steps)
+        fine = 1e-6 * np.ptp(x)
+        assert r["base_amplitude"] == pytest.approx(base)
+        assert [*r["x_min"], *r["x_max"]] == pytest.approx([x.min(), x.max()], abs=fine)
+        ends = [*r["from_base_min"], *r["from_base_max"]]
+        assert ends == pytest.approx([z.min(), z.max()], abs=fine)
+    plots = tmp_path / "plots"
+    assert entry.status(["simulate", file, *words[:2], "--starts", "2", "--plots", str(plots)]) == 0
+    said = capfd.readouterr().err
+    for text in ("Displacements from the base", "x1 − y (block)", "11 Hz   ", "± 2.931 mm"):
+        assert text in said
+    assert "rad/s" not in said
+    assert "e-0" not in said
+    (picture,) = plots.glob("*-time.svg")
+    drawn = picture.read_text("utf-8")
+    for text in ("11 Hz: 1-1-0", "x₁ − y (block, from the base) [mm]", "x₁ (block) [mm]"):
+        assert text in drawn
+
+
 @pytest.mark.parametrize("file", [CHAIN], indirect=True)
 def test_several_masses_and_clearances(file: str, capfd: Captured, tmp_path: Path) -> None:
     plots = tmp_path / "plots"
@@ -120,6 +153,10 @@ def test_parameters_are_swept_in_their_units(file: str, capfd: Captured, tmp_pat
     ends = [swept["windows"][0]["from"], swept["windows"][-1]["to"]]
     assert ends == pytest.approx([3.5e-3, 4e-3])
     assert swept["unit"] == "m"
+    assert entry.status([*words, *over]) == 0
+    said = capfd.readouterr().err
+    assert "3.5 mm" in said
+    assert "0.0035" not in said
     over = ["--over", "block-ground.stiffness", "--from", "8 kN/m", "--to", "9 kN/m"]
     assert answer_of(capfd, *words, *over)["windows"][-1]["to"] == 9e3
     swept = answer_of(capfd, *words, "--from", "11 Hz", "--to", "12 Hz")

@@ -124,3 +124,25 @@ def test_the_figure_of_a_design_rule_is_said(capsys: pytest.CaptureFixture[str])
     }
     tables.rules({"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}})
     assert "Room to the range's end 11 V at U1B" in " ".join(capsys.readouterr().err.split())
+
+
+def test_what_is_not_good_enough_is_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
+    design: dict[str, Any] = {
+        "parts": {"R1": 1e3},
+        "max_error": 0.19,
+        "certificate": {"status": "bound", "lower_bound": 0.0},
+        "distinct_values": 1,
+        "knobs": [],
+        "dead_zone": None,
+    }
+    tables.synthesised(design)
+    assert capsys.readouterr().err.startswith("\nParts")
+    rule = {"id": "swing", "found": "11.3 V", "limit": "at most 11 V", "do": "scale down"}
+    found = {"warnings": ["The error is 19 %."], "failed_rules": [rule]}
+    tables.run(answer(**design, **found))
+    first, _, title, heads, row, *_ = capsys.readouterr().err.splitlines()
+    assert first == "Not good enough: The error is 19 %."
+    assert title == "Design rules that fail"
+    assert heads.split() == ["rule", "found", "limit", "what", "to", "do"]
+    assert row.split("  ")[0] == "swing"
+    assert [part in row for part in ("11.3 V", "at most 11 V", "scale down")] == [True] * 3

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from designer.base.arrays import Array
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
@@ -16,14 +17,15 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.reduction import Reduction
-from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
-from designer.design_rules.force_at_clearance import Statics, leftovers, thermal
-from designer.design_rules.operating_point import operating, stuck
+from designer.design_rules import on_nets, on_precision, run_rules
 from designer.design_rules.subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
 from designer.synthesis import output_loads
+from designer.synthesis.force_at_clearance import Statics, leftovers, thermal
+from designer.synthesis.operating_point import operating, stuck
 from designer.synthesis.output_loads import Run
+from designer.synthesis.side_conditions import guaranteed_swing
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
@@ -171,6 +173,36 @@ def test_operating_values_are_the_loads_that_ngspice_confirms() -> None:
         assert met.source[load.section].value == pytest.approx(load.current, rel=1e-2)
 
 
+def hand_over(reduction: Reduction, moving: Array) -> Array:
+    """A state of this motion in which neither diode of the upper half conducts: between the clamp's
+    letting go and the series diode's taking over."""
+    system, low, high = reduction.system(), moving.copy(), moving.copy()
+    high[0] = 6.0
+    while True:
+        middle = 0.5 * (low + high)
+        series, clamp, *_ = system.mode_at(middle, 0.0)[len(reduction.circuit.sections) :]
+        if not series and not clamp:
+            return middle
+        (low if clamp else high)[0] = middle[0]
+
+
+def test_a_diode_s_hand_over_is_no_motion_that_an_output_follows() -> None:
+    """A strobe that falls between two diodes sees v1 times the open-loop gain. The slope that
+    counts is that of the motion: what the same run has when it begins a millivolt earlier."""
+    subject = base()
+    run = next(run for run in subject._runs[0] if not run.name.endswith("rest"))
+    peak = subject.operating.high["v2"].value
+    # At the switching instant v1 moves; v2's sign does not matter to what an output follows.
+    start = hand_over(subject.reduction, np.array([0.0, 0.5 * peak, 0.0, 0.0]))
+    before = start - np.array([1e-3, 0.0, 0.0, 0.0])
+    there, earlier = (
+        operating(subject.reduction, [replace(run, start=x, periods=1)], {}).slew
+        for x in (start, before)
+    )
+    for name, slope in earlier.items():
+        assert there[name].value == pytest.approx(slope.value, rel=0.05), name
+
+
 def test_a_virtual_ground_leaves_ground_while_its_output_is_at_its_limit() -> None:
     """U3C at its limit: its input divides what is on either side of it."""
     subject = RuleSubject(base().synthesis, stage("saturation", "both", EXACT), base().components)
@@ -201,13 +233,13 @@ def test_a_stuck_section_stands_at_the_rail_and_heats_what_hangs_on_it() -> None
 
 def test_the_guaranteed_swing_lies_between_the_data_sheet_s_two_loads() -> None:
     circuit, opamp = base().circuit, base().opamp
-    assert on_ratings.guaranteed_swing(opamp, circuit, 0.0) == 12.0
-    assert on_ratings.guaranteed_swing(opamp, circuit, 12.0 / 10e3) == 12.0
-    assert on_ratings.guaranteed_swing(opamp, circuit, 10.0 / 2e3) == pytest.approx(10.0)
+    assert guaranteed_swing(opamp, circuit, 0.0) == 12.0
+    assert guaranteed_swing(opamp, circuit, 12.0 / 10e3) == 12.0
+    assert guaranteed_swing(opamp, circuit, 10.0 / 2e3) == pytest.approx(10.0)
     middle = 0.5 * (12.0 / 10e3 + 10.0 / 2e3)
-    assert on_ratings.guaranteed_swing(opamp, circuit, middle) == pytest.approx(11.0)
+    assert guaranteed_swing(opamp, circuit, middle) == pytest.approx(11.0)
     lower = replace(circuit, supply=12.0)
-    assert on_ratings.guaranteed_swing(opamp, lower, 0.0) == pytest.approx(9.0)
+    assert guaranteed_swing(opamp, lower, 0.0) == pytest.approx(9.0)
 
 
 def test_protection_shares_the_fault_current() -> None:

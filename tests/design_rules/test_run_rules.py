@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -281,6 +283,42 @@ def test_bad_input_writes_nothing(
     assert (design / "rules.json").read_text() == "mine"
     (design / "rules.json").unlink()
     assert _tree(design) == before
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_a_folder_that_cannot_be_written_is_judged_all_the_same(
+    design: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], before: bool
+) -> None:
+    """A read-only file system refuses to remove even what is not there."""
+    if before:
+        rules_job.rules(design)
+    tree = _tree(design)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    opened = Path.open
+
+    def read_only(self: Path, mode: str = "r", **more: Any) -> Any:
+        return opened(self, mode, **more) if mode in ("r", "rb") else refuse()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", read_only)
+        patch.setattr(Path, "unlink", refuse)
+        patch.setattr(os, "replace", refuse)
+        status = entry.status(["rules", str(design), "--json"])
+    out, err = capfd.readouterr()
+    answer = json.loads(out)
+    assert status == (1 if answer["counts"]["fail"] else 0)
+    assert "Read-only file system" in answer["not_stored"]
+    assert "the answer is not stored" in err
+    assert "Read-only file system" in err
+    assert "Traceback" not in err
+    assert _tree(design) == tree
+    rules_job.rules(design)
+    stored = json.loads((design / "rules.json").read_text())
+    assert "not_stored" not in stored
+    assert stored["rules"] == answer["rules"]
 
 
 def test_a_design_made_anew_forgets_its_rules(design: Path) -> None:

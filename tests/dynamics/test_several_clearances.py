@@ -9,7 +9,6 @@ import pytest
 
 from designer.dynamics.attractors import (
     asymmetry,
-    coexisting,
     describe,
     mirrored_strobes,
     settle,
@@ -17,6 +16,7 @@ from designer.dynamics.attractors import (
     shoot_symmetric,
     twin,
 )
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.lyapunov_exponent import lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus

@@ -13,7 +13,8 @@ from designer.base.errors import InputError
 from designer.check import coexistence
 from designer.cli import entry
 from designer.dynamics import flow, step_budget
-from designer.dynamics.attractors import coexisting, settle
+from designer.dynamics.attractors import settle
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS
@@ -73,6 +74,22 @@ def test_settling_that_is_cut_short_says_after_how_many_periods() -> None:
     with made.within(Budget(0.0)):
         assert made.run(np.zeros(4), 1).status is FlowStatus.TOO_LONG
     assert made.run(np.zeros(4), 1).status is FlowStatus.DONE
+
+
+@pytest.mark.parametrize("omega", [1e-3, 1e3])
+def test_a_single_period_without_end_is_cut_short(omega: float) -> None:
+    """A mass of 1e-9 takes 200 million steps to a drive period of ω = 1e-3: the fast paths, which
+    stop at strobes alone, took minutes of it."""
+    light = Dimensionless(m=1e-9, k=0.5, k0=0.5, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+    made = Flow(light.second_order().piecewise_linear(), Drive(omega))
+    budget = Budget(ENOUGH)
+    orbit = settle(made, np.zeros(4), budget=budget)
+    assert str(orbit.status) == "not settled"
+    assert "the fastest motion of the model" in orbit.reason
+    assert budget.spent <= ENOUGH + flow.SLICE
+    if omega < 1.0:
+        assert made.steps_a_period * flow.FAST_STEP > flow.SLICE
+        assert orbit.periods == 0
 
 
 def test_all_starts_together_have_a_budget(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -181,6 +182,30 @@ def test_everybody_can_use_it(browser: Browser, address: str, scheme: str, width
     )
     assert (ink == "#1a1a1a") == (scheme == "light")
     page.close()
+
+
+def test_a_model_in_hertz_and_millimetres_is_moved_in_them(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with served(EXAMPLES / "hammer-base.toml", tmp_path, "--port", "0") as address:
+        page = opened(browser, address)
+        fields = {"omega": "12", "anvil\\.lower": "3", "hammer\\.mass": "2"}
+        for name, text in fields.items():
+            assert float(page.input_value(f"[data-name={name}] .number")) == float(text)
+        page.fill("[data-name=omega] .number", "13")
+        page.press("[data-name=omega] .number", "Enter")
+        page.wait_for_function("() => new URLSearchParams(location.search).has('omega')")
+        assert float(query(page)["omega"][0]) == 26.0 * math.pi
+        assert page.input_value("[data-name=omega] .number") == "13"
+        assert "mm" in page.inner_text("#facts")
+        page.wait_for_function("() => !document.getElementById('pin').disabled")
+        page.click("#pin")
+        assert " at 13 Hz, " in page.inner_text("#pins li")
+        page.fill("#name", "mine")
+        page.click("[data-keep=save]")
+        kept(page, "mine.toml is saved.")
+        page.close()
+    assert 'frequency = "13 Hz"' in (tmp_path / "mine.toml").read_text("utf-8")
 
 
 def test_a_pinned_response_is_saved_and_never_over_another_file(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,23 @@ def test_pins_become_the_wanted_responses_and_are_looked_for() -> None:
     wanted = [(r.omega, str(r.expect), r.b) for r in again.responses]
     assert wanted == [(0.85, "1-2-2", None), (1.55, "1-1-1", 0.3), (0.54, "1-7-7", None)]
     assert not_found(again) == ["1-7-7 at ω = 0.54"]
+
+
+def test_a_file_in_hertz_millimetres_and_grams_is_saved_in_them() -> None:
+    """The frequency reads back to the last digit, and a gap has the prefix it had."""
+    text = (EXAMPLES / "hammer-base.toml").read_text("utf-8").split("[[response]]")[0]
+    assert 'mass = "2 kg"' in text
+    modelfile = parse_model_file(text.replace('mass = "2 kg"', 'mass = "2000g"', 1))
+    omega = 72.0 * math.pi
+    words = {"anvil.lower": 0.00123, "hammer.mass": 1.9}
+    pins = read_pins(modelfile, [f"{omega!r}~1-1-0~1.0"])
+    saved = saved_text(modelfile, read_place(modelfile, words), pins)
+    assert 'frequency = "36 Hz"' in saved
+    assert 'lower = "1.23 mm"' in saved
+    assert 'mass = "1900g"' in saved
+    again = parse_model_file(saved)
+    assert again.responses[0].omega == omega
+    assert again.model.parameter("anvil.lower") == 0.00123
 
 
 @pytest.mark.parametrize(

@@ -161,6 +161,16 @@ def test_only_this_machine_under_its_own_names_is_answered(tmp_path: Path) -> No
     assert visiting(visit, tmp_path) == (200, 403, 403)
 
 
+def test_an_address_of_version_six_is_answered_under_its_own_name(tmp_path: Path) -> None:
+    """A browser writes it in brackets, with the port behind them or without."""
+
+    async def visit(port: int) -> list[int]:
+        names = (f"[::1]:{port}", "[::1]", f"[::2]:{port}", f"[evil.example]:{port}")
+        return [(await get(port, Host=name)).code for name in names]
+
+    assert visiting(visit, tmp_path, host="::1") == [200, 200, 403, 403]
+
+
 def test_a_token_is_asked_for_and_then_kept_as_a_cookie(tmp_path: Path) -> None:
     async def visit(port: int) -> list[Any]:
         without, wrong = await get(port), await get(port, "/?token=secreT")

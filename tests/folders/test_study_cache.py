@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -9,6 +12,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
+from designer.base.seal import BLANK, sealed
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.folders.study_cache import StudyCache
 from designer.spice.deck import SolverSettings
@@ -164,3 +168,94 @@ def test_what_would_not_come_back_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="object"):
         kept(tmp_path / "kept.npz").put("it", "key", object())
     assert not (tmp_path / "kept.npz").exists()
+
+
+# ---------------------------------------------------------------------------------------------
+# Items that a stranger wrote, with a seal that is right
+
+
+def strange(path: Path, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> list[str]:
+    """What is said of a file in which an orbit's items and arrays are changed."""
+    kept(path).put("it", "key", ORBIT)
+    with np.load(path) as archive:
+        arrays: dict[str, Any] = dict(archive)
+    head = json.loads(str(arrays.pop("items")))
+    change(head, arrays)
+    stream = io.BytesIO()
+    np.savez_compressed(stream, items=np.array(json.dumps(head)), **arrays)
+    with ZipFile(stream, "a") as archive:
+        archive.comment = BLANK.encode("ascii")
+    path.write_bytes(sealed(stream.getvalue()))
+    notes: list[str] = []
+    assert StudyCache(path, lambda *_: None, notes.append).get("it", "key") is None
+    return notes
+
+
+def with_field(name: str, value: Any) -> Callable[[dict[str, Any], dict[str, Any]], None]:
+    def change(head: dict[str, Any], _arrays: dict[str, Any]) -> None:
+        head["items"]["it"][1]["record"][1][name] = value
+
+    return change
+
+
+def with_item(value: Any) -> Callable[[dict[str, Any], dict[str, Any]], None]:
+    def change(head: dict[str, Any], _arrays: dict[str, Any]) -> None:
+        head["items"]["it"] = value
+
+    return change
+
+
+def swollen(head: dict[str, Any], arrays: dict[str, Any]) -> None:
+    """100 kB of an archive are 100 MB."""
+    arrays["array0"] = np.zeros(12_500_000)
+
+
+def of_text(head: dict[str, Any], arrays: dict[str, Any]) -> None:
+    arrays["array0"] = np.array(["a", "b"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        with_field("n", "1"),
+        with_field("n", None),
+        with_field("p", True),
+        with_field("status", "periodic"),
+        with_field("status", {"word": ["OrbitStatus", "asleep"]}),
+        with_field("status", {"word": ["Other", "ok"]}),
+        with_field("start", {"array": 99}),
+        with_field("start", 0.5),
+        with_field("start", {"tuple": [0.5]}),
+        with_field("start", {"other": []}),
+        with_field("reason", 3),
+        with_field("more", {"tuple": [1]}),
+        with_field("nothing", 1),
+        with_item(["key"]),
+        with_item([["key"], 1]),
+        with_item(["key", {"record": ["Path", {}]}]),
+        with_item(["key", {}]),
+        swollen,
+        of_text,
+    ],
+)
+def test_what_is_no_item_holds_nothing(
+    tmp_path: Path, change: Callable[[dict[str, Any], dict[str, Any]], None]
+) -> None:
+    path = tmp_path / "kept.npz"
+    assert strange(path, change) == [f"{path}: damaged, computed again"]
+    assert path.stat().st_size < 200_000
+
+
+def test_an_array_that_is_named_often_is_unpacked_once(tmp_path: Path) -> None:
+    path = tmp_path / "kept.npz"
+    many = 100_000
+
+    def change(head: dict[str, Any], arrays: dict[str, Any]) -> None:
+        arrays["array0"] = np.zeros(10_000)
+        head["items"]["other"] = ["key", {"tuple": [{"array": 0}] * many}]
+        head["items"]["it"] = ["none", 0]
+
+    assert strange(path, change) == []
+    value = kept(path).get("other", "key")
+    assert value is not None
+    assert len({id(each) for each in value}) == 1

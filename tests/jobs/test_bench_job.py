@@ -72,10 +72,29 @@ def test_the_verb_prints_the_object(
     assert cli.status([*words, "--channels", "v1=CH1,fv=CH2", "--json"]) == 0
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert record["response"] == "1-5-5"
+    assert record["frequency"] == pytest.approx(stored(5).frequency, rel=2e-4)
     assert cli.status([*words, "--channels", "v1=CH9"]) == 2
     assert "CH9" in capsys.readouterr().err
     assert cli.status(["bench", str(folder)]) == 2
     assert "--record is missing" in capsys.readouterr().err
+
+
+def test_tables_are_the_answer(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On standard output, and nothing with --quiet."""
+    words = ["bench", str(folder), "--record", str(csv_of(2, tmp_path / "a.csv"))]
+    assert cli.status(words) == 0
+    assert "1-2-2" in capsys.readouterr().out
+    assert cli.status([*words, "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("omega", [0.0, -0.85, float("nan"), float("inf")])
+def test_a_frequency_that_is_none_is_refused(folder: Path, tmp_path: Path, omega: float) -> None:
+    with pytest.raises(InputError, match="above 0") as error:
+        bench(folder, [csv_of(2, tmp_path / "a.csv")], omega=omega)
+    assert error.value.field == "--omega"
 
 
 @pytest.mark.slow
@@ -176,6 +195,23 @@ def test_a_decay_needs_a_record_of_its_board(folder: Path, tmp_path: Path) -> No
     off = csv_of_decay(tmp_path / "B" / "off.csv", 100.0, 0.06)
     with pytest.raises(InputError, match="another --record of it"):
         bench(folder, files, boards=True, decay=[off])
+
+
+@pytest.mark.parametrize("what", ["no record", "never free"])
+def test_a_wrong_decay_is_refused_before_anything_is_named(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    def late(*_: object) -> None:
+        raise AssertionError("a record was named")
+
+    monkeypatch.setattr(bench_job, "named", late)
+    off = csv_of(3, tmp_path / "off.csv")  # the generator is on to its end
+    if what == "no record":
+        off.write_text("nothing\n" * 200)
+    with pytest.raises(InputError) as error:
+        bench(folder, [csv_of(3, tmp_path / "on.csv")], decay=[off], out=tmp_path / "out")
+    assert "off.csv" in str(error.value)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_record_that_does_not_repeat_has_no_board(folder: Path, tmp_path: Path) -> None:

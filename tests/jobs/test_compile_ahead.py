@@ -88,5 +88,6 @@ def test_it_compiles_what_a_circuit_needs() -> None:
         kernel_nodal.solve_all,
         kernel_propagators.advance,
         kernel_boards.respond_all,
+        kernel_boards.sweep_all,
     ]
     assert all(kernel.signatures for kernel in kernels)

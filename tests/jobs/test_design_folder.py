@@ -79,7 +79,7 @@ def test_a_study_extends_a_design(tmp_path: Path) -> None:
 def test_other_inputs_need_overwrite(tmp_path: Path) -> None:
     _fill(tmp_path)
     other: Any = {**STUDY, "study": ({"model": "a", "seed": 2}, STUDY["study"][1])}
-    with pytest.raises(InputError, match=r"seed 1.*seed 2.*--overwrite"):
+    with pytest.raises(InputError, match=r"made with --seed 1, asked for 2.*--overwrite"):
         _decide(tmp_path, other)
     with pytest.raises(InputError):
         _decide(tmp_path, other, resume=True)
@@ -194,7 +194,7 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The design folder of the paper's example; tests work on copies."""
     out = tmp_path_factory.mktemp("paper") / "out"
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(synthesis_result, "synthesise", lambda *_: synthesised())
+        patched.setattr(synthesis_result, "synthesise", lambda *_, **__: synthesised())
         without_starts(patched)
         assert entry.status(["synthesise", str(PAPER), "--out", str(out), "-q"]) == 0
     return out
@@ -214,7 +214,7 @@ def test_a_design_is_read_back_as_it_was_made(
     else:
         model = ROOT / "examples" / example
         out, kept = tmp_path / "out", synthesise(read_model_file(model))
-        monkeypatch.setattr(synthesis_result, "synthesise", lambda *_: kept)
+        monkeypatch.setattr(synthesis_result, "synthesise", lambda *_, **__: kept)
         without_starts(monkeypatch)
         # 0 or 1: whether every wanted response was found is not the question here
         assert entry.status(["synthesise", str(model), "--out", str(out), "-q"]) in (0, 1)

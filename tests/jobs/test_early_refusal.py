@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -200,6 +201,37 @@ def test_the_verbs_refuse_before_any_work(
     assert field in told
     assert other in told
     assert "Traceback" not in told
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("verb", ["synthesise", "run", "tolerance", "trade", "search"])
+@pytest.mark.parametrize(
+    ("wanted", "instead"),
+    [('"1-9-9"', "1-3-3"), ('"1-3-3"\nsymmetric = false', "1-3-3, symmetric")],
+)
+def test_no_part_is_chosen_for_a_response_that_no_start_finds(
+    verb: str,
+    wanted: str,
+    instead: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At ω = 0.54 the paper's model has one attractor, the symmetric 1-3-3."""
+
+    def fail(*_: object, **__: object) -> object:
+        raise AssertionError("work before the refusal")
+
+    monkeypatch.setattr(parts_choice, "synthesise", fail)
+    file, out = tmp_path / "wrong.toml", tmp_path / "out"
+    there = f"format = 1\n{PAPER_TABLE}"
+    responses = [f"[[response]]\nomega = {w}\n" for w in (1.55, f"0.54\nexpect = {wanted}")]
+    file.write_text(there + "".join(responses), encoding="utf-8")
+    assert entry.status([verb, str(file), "--out", str(out), "--jobs", "1", "--json"]) == 1
+    told = capfd.readouterr()
+    assert f"{file}: response[2]: {wanted.strip(chr(34))[:5]}" in told.err
+    assert f"from none of 16 starts; found instead: {instead}\n" in told.err
+    assert [row["found"] for row in json.loads(told.out)["responses"]] == [True, False]
     assert not out.exists()
 
 

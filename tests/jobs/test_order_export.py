@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from designer.base.sexpr import Expression, expression, expression_text, read
 from designer.catalog.design_rule import NOT_RUN, PASS, RuleOutcome
 from designer.catalog.design_rules import RULES
 from designer.jobs import export_job
@@ -149,3 +150,31 @@ def test_a_routed_board_is_ordered_under_its_own_rules(made: Path, tmp_path: Pat
     copper = (place / "gerbers" / "linear-pair-B_Cu.gbl").read_text()
     assert "D01*" in copper, "tracks are drawn"
     assert "G36*" in copper, "the ground pour is drawn"
+
+
+@pytest.mark.kicad
+@pytest.mark.parametrize("edge", ["no edge", "an edge that is not closed"])
+def test_a_board_without_an_edge_is_refused(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edge: str
+) -> None:
+    """Nobody can mill it, whatever the rules are told to accept; nothing is written."""
+    finished(monkeypatch)
+    (path,) = (made / "kicad").glob("*.kicad_pcb")
+    board = read(path.read_text("utf-8"))
+    inner = [each for each in board.items if not (isinstance(each, Expression) and on_edge(each))]
+    if edge != "no edge":
+        inner.append(expression("gr_line", start=(0, 0), end=(9, 9), layer="Edge.Cuts"))
+    bare = tmp_path / "bare.kicad_pcb"
+    bare.write_text(expression_text(Expression(tuple(inner))), encoding="utf-8")
+    before = snapshot(made)
+    words = ("--fab", "generic", "--board", bare, "--overwrite", "--accept", "board-outline")
+    done = ordered(made, *words)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "bare.kicad_pcb: Edge.Cuts" in done.stderr
+    assert edge in done.stderr
+    assert snapshot(made) == before
+
+
+def on_edge(item: Expression) -> bool:
+    return any(layer.text() == "Edge.Cuts" for layer in item.all("layer"))

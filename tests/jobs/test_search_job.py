@@ -209,6 +209,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
     monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})
     monkeypatch.setattr(f"{design}.write", lambda out, _, files: out.write(MODEL, files[MODEL]))
+    monkeypatch.setattr(f"{design}.write_last", lambda *_: None)
     monkeypatch.setattr(Folder, "begin", killed)
     with pytest.raises(KeyboardInterrupt):
         searched_into(file, out, Options(jobs=1, overwrite=True), Progress())

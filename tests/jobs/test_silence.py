@@ -191,8 +191,9 @@ class Walk(ProgressLines):
 STAGES = {
     "ngspice": "",
     "responses of the model, parts": "swing|integrators|dead zone|cost",
-    "start recipes, files of the design": "start recipe of response 1 of 1, direct|drawing",
+    "files of the design": "drawing",
     "KiCad project": "drawing",
+    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct|rules",
     "ngspice, equation check": "6 of 6 runs",
     "exact circuit": "",
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",

@@ -171,6 +171,9 @@ WRONG: list[tuple[str, str, str]] = [
     ),
     (HAMMER.replace("[[clearance]]", "[[clearence]]"), "clearence", 'did you mean "clearance"?'),
     ("format = 2\n", "mass", "at least one table"),
+    (HAMMER.replace('"2 kg"', "5e-324"), "mass[1].mass", "from 1e-60 to 1e+60"),
+    (HAMMER.replace('"540 kN/m"', "1e300"), "clearance[1].stiffness", "from 1e-60 to 1e+60"),
+    (HAMMER.replace('upper = "0.5 mm"', "upper = 1e-61"), "clearance[1].upper", "1e-60"),
     (
         HAMMER + '[[clearance]]\nname = "a"\nbetween = ["casing", "ground"]\nupper = 1.0\n'
         "stiffness = 2.0\n",

@@ -19,7 +19,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import FileTable, keys_of
 from designer.dynamics.counts import Counts
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
-from designer.model.lumped_elements import Damper, Force, Gap, Mass, MovingBase, Spring
+from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
 from designer.model.response_table import Response, ResponseTable
@@ -99,7 +99,7 @@ def test_paper_is_written_for_editing_by_line() -> None:
     assert set(tables) == {"format", "title", "model", "response", "circuit"}
     assert set(tables["model"]) == {each.name for each in fields(Dimensionless)}
     # Choices are stated; wishes, of which the paper has none, are left out.
-    wishes = {"diode", "reference", "matched", "preferred", "most_values", "slack"}
+    wishes = {"diode", "reference", "matched", "preferred", "most_values", "slack", "max_error"}
     wishes |= {"resistor_family", "capacitor_family"}
     assert set(tables["circuit"]) == {each.name for each in fields(CircuitSpec)} - wishes
     assert all({"omega", "expect"} <= set(table) for table in tables["response"])
@@ -139,12 +139,14 @@ def test_a_small_file_gets_the_defaults() -> None:
     assert parse_model_file(SMALL, Path("a/bench.toml")).title == "bench"
 
 
-def test_the_defaults_are_those_of_the_paper_but_for_the_saturation() -> None:
+def test_the_defaults_are_those_of_the_paper_but_for_what_is_chosen() -> None:
     stated = parse_model_file(PAPER).circuit
     default = CircuitSpec()
     differ = {f.name for f in fields(stated) if getattr(stated, f.name) != getattr(default, f.name)}
-    assert differ == {"saturation"}
+    assert differ == {"saturation", "objective", "dead_zone"}
     assert default.saturation is None
+    assert default.dead_zone is None
+    assert (stated.objective, default.objective) == ("match", "margin")
 
 
 def test_values_with_units() -> None:
@@ -436,7 +438,7 @@ def test_an_empty_text() -> None:
 
 def test_nesting_beyond_reason() -> None:
     error = refused("title = " + "[" * 100_000)
-    assert error.field == "the file"
+    assert error.field == "line 1"
 
 
 @pytest.mark.parametrize("name", ["title", "model", "mechanical", "response", "circuit", "format"])
@@ -632,7 +634,7 @@ def test_the_docs_name_every_key_of_an_element() -> None:
             found.setdefault(table, {}).update(dict.fromkeys(keys, match[3]))
     kinds: dict[str, type[FileTable]] = {
         "mass": Mass, "spring": Spring, "damper": Damper, "clearance": Gap, "force": Force,
-        "base": MovingBase,
+        "base": BaseTable,
     }  # fmt: skip
     assert found.keys() == kinds.keys()
     for table, kind in kinds.items():

@@ -17,6 +17,32 @@ LAST_OF_THE_FIRST = 41.0
 """rad/s: 1-2-0;0-1 ends by grazing between 41 and 42."""
 
 
+def test_a_sweep_in_hertz_has_no_axis_in_radians() -> None:
+    file = parse_model_file(HAMMER)
+    assert file.si is not None
+    for parameter, ends, label in (
+        ("omega", (41.0, 61.0), "drive frequency [Hz]"),
+        ("anvil.upper", (3e-4, 5e-4), "anvil.upper [mm]"),
+    ):
+        subject = ModelSubject(file.model, 50.0, scales=file.si)
+        swept = sweep.run(SweepPlan(subject, parameter, np.linspace(*ends, 5)))
+        figure = diagram(swept)
+        figure.canvas.draw()
+        lowest = figure.axes[-1]
+        assert lowest.get_xlabel() == label
+        assert not lowest.child_axes  # no second axis
+        scale = 1e3 if parameter != "omega" else 1.0 / (2.0 * np.pi)
+        shown = [t for t in lowest.get_xticklabels() if t.get_text()]
+        assert len(shown) > 2
+        for tick in shown:  # round in the unit that is shown
+            assert float(tick.get_text()) == pytest.approx(scale * tick.get_position()[0])
+            assert len(tick.get_text()) < 6
+        title = figure.get_suptitle()
+        assert "rad/s" not in title
+        assert "e-0" not in title
+        assert "drive frequency" in title
+
+
 def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
     file = parse_model_file(HAMMER)
     values = np.linspace(LAST_OF_THE_FIRST, 61.0, 21)

@@ -129,7 +129,7 @@ def test_the_drawing_shows_the_values() -> None:
         _texts(model_drawing(MODEL))
     )
     shown = _texts(model_drawing(SI))
-    assert {"M₂\n0.75 kg", "K₁ = 20 kN/m", "C₂ = 12.5 N s/m", "B = 150 µm"} <= set(shown)
+    assert {"M₂\n750 g", "K₁ = 20 kN/m", "C₂ = 12.5 N s/m", "B = 0.15 mm"} <= set(shown)
     assert "P₁ sin ΩT, P₁ = 50.25 N" in shown
 
 

@@ -617,3 +617,20 @@ def test_the_board_is_shown_from_both_sides(whole: ReportData, tmp_path: Path) -
     ]
     assert "placed and not routed yet" in page.text
     assert not any(shown.startswith("The board") for shown in words_of(whole).pictures())
+
+
+def test_what_is_not_good_enough_stands_first() -> None:
+    rule = {"id": "swing", "found": "11.3 V", "limit": "at most 11 V", "do": "<b>scale down"}
+    rest = plain_report()
+    data = changed(rest, warnings=("The error is 19 %.",), failed_rules=(rule,))
+    text, page = render_markdown(data), words_of(data).text
+    sections = re.findall("^## (.*)$", text, re.MULTILINE)
+    assert sections[:2] == ["What is not good enough", "In short"]
+    assert "- The error is 19 %.\n\n### Design rules that fail\n" in text
+    assert re.search(
+        r"^\| swing +\| 11.3 V +\| at most 11 V +\| &lt;b>scale down", text, re.MULTILINE
+    )
+    assert page.index("What is not good enough") < page.index("The error is 19")
+    assert page.index("<b>scale down") < page.index("Does the circuit do what the model does?")
+    assert "The circuit does not keep 1 design rule: swing." in text
+    assert "What is not good enough" not in render_markdown(rest)

@@ -70,18 +70,17 @@ def test_every_module_stands_in_a_package() -> None:
 
 @pytest.mark.parametrize("package", ORDER)
 def test_no_package_grows_beyond_a_reader(package: str) -> None:
-    """5500 lines with stubs: past that a package is two."""
+    """7000 lines with stubs: past that a package is two."""
     files = (HOUSE / package).glob("*.py*")
-    assert sum(len(path.read_text("utf-8").splitlines()) for path in files) <= 5500
+    assert sum(len(path.read_text("utf-8").splitlines()) for path in files) <= 7000
 
 
 def test_no_module_grows_beyond_a_sitting() -> None:
-    """450 lines; 600 for compiled kernels."""
+    """1000 lines: a file is one subject, cut at its joints."""
     longer = {
         path.relative_to(HOUSE).as_posix(): count
         for path in HOUSE.rglob("*.py")
-        if (count := len(path.read_text("utf-8").splitlines()))
-        > (600 if path.name.startswith("kernel_") else 450)
+        if (count := len(path.read_text("utf-8").splitlines())) > 1000
     }
     assert longer == {}
 

@@ -7,6 +7,7 @@ import csv
 import importlib
 import inspect
 import json
+import math
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -105,6 +106,26 @@ def test_simulate(model: Path) -> None:
     wanted = table[table.orbit == "wanted"]
     assert list(wanted.response) == list(wanted.expected) == ["1-2-2", "1-1-1"]
     assert wanted.x1_max.to_numpy() == pytest.approx([0.401043, 0.388356], abs=1e-6)  # README.md
+
+
+def test_a_frequency_may_be_one_value_or_several() -> None:
+    """54 Hz and 2π · 54 rad/s are one place, however they are given; what is none says what is."""
+    file = Path(__file__).parents[2] / "examples" / "hammer-base.toml"
+    words: list[dict[str, Any]] = [
+        {"frequency": "54 Hz"},
+        {"frequency": ["54 Hz"]},
+        {"frequency": 54.0},
+        {"omega": 108.0 * math.pi},
+        {"omega": np.array([108.0 * math.pi])},
+    ]
+    answers = [designer.simulate(file, starts=1, **each).answer["responses"] for each in words]
+    assert [len(responses) for responses in answers] == [1] * len(words)
+    assert len({responses[0]["response"] for responses in answers}) == 1
+    for (response,) in answers:
+        assert response["omega"] == pytest.approx(108.0 * math.pi, rel=1e-15)
+    for wrong in ({"omega": None}, {"frequency": b"54 Hz"}, {"omega": [True]}):
+        with pytest.raises(designer.InputError, match="one value or a list of them"):
+            designer.simulate(file, **wrong)
 
 
 def test_bifurcation(model: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -273,3 +274,72 @@ def test_an_inner_layer_of_somebody_s_own_stays_his() -> None:
     assert (found.inner, found.planes) == (("In1.Cu", "In2.Cu"), ("In2.Cu",))
     track = next(p for p in found.pieces if not p.pad)
     assert [track.on(name) for name in found.names] == [False, False, True, False]
+
+
+def edged(*items: str) -> Expression:
+    drawn = "".join(f'({item} (layer "Edge.Cuts"))' for item in items)
+    return read(f'(kicad_pcb (version 20241229) (net 0 ""){drawn})', Path("x.kicad_pcb"))
+
+
+def rectangle(left: float, top: float, right: float, bottom: float) -> str:
+    return f"gr_rect (start {left} {top}) (end {right} {bottom})"
+
+
+def ring(x: float, y: float, radius: float) -> str:
+    return f"gr_circle (center {x} {y}) (end {x + radius} {y})"
+
+
+def test_cut_outs_and_what_lies_in_them() -> None:
+    """Areas by hand: a rectangle, 20 in it alternately cut out and left; beside it one that a line
+    divides."""
+    nested = [rectangle(k, k, 100 - k, 60 - k) for k in range(21)]
+    area = read_copper(edged(*nested)).area
+    assert area.area == pytest.approx(
+        sum((-1) ** k * (100 - 2 * k) * (60 - 2 * k) for k in range(21))
+    )
+    halves = rectangle(0, 0, 5, 10), rectangle(5, 0, 10, 10)
+    assert read_copper(edged(*halves)).area.equals(shapely.box(0, 0, 10, 10))
+    crossed = rectangle(0, 0, 6, 6), rectangle(4, 4, 10, 10)
+    assert read_copper(edged(*crossed)).area.area == pytest.approx(36 + 36 - 4)
+
+
+def test_a_board_of_many_cut_outs() -> None:
+    """Their areas taken away one after the other took a square of their number."""
+    holes = [ring(2 + 4 * (k % 24), 2 + 4 * (k // 24), 1.0) for k in range(500)]
+    area = read_copper(edged(rectangle(0, 0, 100, 100), *holes)).area
+    hole = 36.0 * np.sin(np.pi / 36.0)  # of a circle's 72 chords
+    assert area.area == pytest.approx(1e4 - 500 * hole)
+
+
+@pytest.mark.parametrize(
+    "items",
+    [
+        [ring(20, 20, 9)] * 400,
+        [ring(20 + 1e-4 * k, 20, 9) for k in range(400)],
+        [
+            "gr_poly (pts "
+            + "".join(f"(xy {k * 379 % 997} {k * 7919 % 991})" for k in range(997))
+            + ")"
+        ],
+    ],
+    ids=["equal circles", "nearly equal circles", "a star"],
+)
+def test_an_edge_that_crosses_itself_everywhere(items: list[str]) -> None:
+    """400 equal circles took 2.4 GB."""
+    with pytest.raises(InputError, match=r"x.kicad_pcb: line 1.*meet in more than 10000 places"):
+        read_copper(edged(*items))
+
+
+def test_a_circle_drawn_twice_is_one() -> None:
+    twice = read_copper(edged(ring(20, 20, 9), ring(20, 20, 9))).area
+    assert twice.equals(read_copper(edged(ring(20, 20, 9))).area)
+
+
+def test_a_board_as_large_as_a_field_is_not_routed() -> None:
+    circuit = case(NAME).circuit
+    text = placed()
+    board = read(text)
+    (edge,) = (i for i in board.children if i.name == "gr_rect" and "Edge.Cuts" in str(i))
+    far = text[: edge.offset] + text[edge.offset :].replace("(end ", "(end 9999", 1)
+    with pytest.raises(InputError, match=r"y.kicad_pcb: Edge.Cuts: found a board of .* mm²"):
+        route_board(far, circuit, board_rules(circuit), Path("y.kicad_pcb"))

@@ -13,7 +13,8 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
-from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics.attractors import settle, starts
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless

@@ -1,5 +1,5 @@
-"""Design folders for tests that ask nothing of the ways to start a response, which take longer to
-find than everything else that such a folder holds."""
+"""Design folders for tests that ask nothing of the ways to start a response, nor of the design
+rules, which take longer than everything else that such a folder holds."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from designer.yields.start_recipe import Recipe
 
 
 def without_starts(patched: pytest.MonkeyPatch) -> None:
-    """No way to start any response is sought; ``setup.csv`` says so."""
+    """No way to start any response is sought; ``setup.csv`` says so. No rule is looked at."""
 
     def none(made: Synthesis, jobs: int) -> list[Recipe | None]:
         return [None] * len(made.model_responses)
 
     patched.setattr(design_files, "start_recipes", none)
+    nothing: dict[str, list[str]] = {"warnings": [], "failed_rules": []}
+    patched.setattr(design_files, "findings", lambda _: nothing)
 
 
 def quick_folder(text: str, out: Path) -> Path:

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
-from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics.attractors import settle, starts
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
@@ -23,6 +24,7 @@ from designer.spice.read_orbit import (
     Read,
     Reading,
     clearance_rows,
+    name_in_ngspice,
     read,
 )
 from designer.spice.simulator import Waveforms
@@ -252,3 +254,10 @@ def test_impacts_are_counted_clearance_by_clearance() -> None:
     assert got.impact_clearances.tolist() == orbit.impact_clearances.tolist()
     assert got.impact_sides == pytest.approx(orbit.impact_sides)
     assert got.impact_velocities == pytest.approx(orbit.impact_velocities, abs=5e-3)
+
+
+def test_what_ngspice_does_not_tell_apart_it_calls_aperiodic() -> None:
+    for response in ("aperiodic", "quasi-periodic", "17-1-0", "20-44-44;0-1"):
+        assert name_in_ngspice(response) == "aperiodic"
+    for response in ("16-1-0", "1-2-2;0-1", "grazing", "not settled"):
+        assert name_in_ngspice(response) == response

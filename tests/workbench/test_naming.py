@@ -89,6 +89,56 @@ def test_a_sine_that_drifts_is_no_period() -> None:
         assert named(motion, prediction()).response == response
 
 
+@pytest.mark.parametrize(("drift", "sure"), [(0.0, True), (1.5, False)])
+def test_laps_that_drift_within_the_noise_are_not_sure(drift: float, sure: bool) -> None:
+    """Under three periods of a sine whose height goes up and down by little more than the noise:
+    one period leaves hardly more over than noise does, but it is of one sign for longer."""
+    frequency, noise, rng = stored(1).frequency, 0.06, np.random.default_rng(6)
+    time = np.linspace(0.0, 2.9 / frequency, 10_000)
+    height = 6.0 + drift * noise * np.sin(2.0 * np.pi * 0.19 * frequency * time)
+    volts = height * np.sin(2.0 * np.pi * frequency * time) + noise * rng.normal(size=len(time))
+    record = Record(time, {"CH1": volts}, "made")
+    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    name = named(motion, prediction())
+    assert (name.response.split("-")[0], name.sure) == ("1", sure)
+    assert sure or "laps" in name.reason
+
+
+def corners(points: int, periods: float, noise: float, subharmonic: float) -> Record:
+    """A displacement of one sine and its fifth, and what is beyond two stops, by a converter of 8
+    bits. noise : of each channel's range. subharmonic : height of half the frequency [V]."""
+    frequency, rng = 80.0, np.random.default_rng(1)
+    time = np.linspace(0.0, periods / frequency, points)
+    angle = 2.0 * np.pi * frequency * time
+    x = 6.0 * np.sin(angle) + 2.0 * np.sin(5.0 * angle) + subharmonic * np.sin(angle / 2.0)
+    y = np.where(np.abs(x) > 4.0, x - 4.0 * np.sign(x), 0.0)
+    signals = {}
+    for name, volts in (("CH1", x), ("CH2", y)):
+        noisy = volts + noise * np.ptp(volts) * rng.normal(size=points)
+        step = np.ptp(noisy) * 1.1 / 256.0
+        signals[name] = step * np.round(noisy / step)
+    return Record(time, signals, "made")
+
+
+@pytest.mark.parametrize(
+    ("points", "periods", "noise", "subharmonic", "n"),
+    [(13_000, 12.58, 5e-4, 0.0, "1"), (6000, 5.9, 1e-3, 0.03, "2")],
+)
+def test_steps_of_a_converter_are_no_longer_period(
+    points: int, periods: float, noise: float, subharmonic: float, n: str
+) -> None:
+    """The first was of 5 drive periods, and sure: a longer lap draws some of the rounding. Its
+    noise is too small to carry the signal from step to step, and the samples come nearly at the same
+    times of every third lap: 1 or 3 it may be. A line at half the frequency, of half a hundredth of
+    the peak, is a longer period."""
+    record = corners(points, periods, noise, subharmonic)
+    told = {"v1": "CH1", "fv": "CH2"}
+    name = named(recorded_motion(record, prediction(), frequency=80.0, told=told), prediction())
+    assert name.response.split("-")[0] == n
+    assert ("3 drive periods" in name.reason) == (noise < 1e-3)
+    assert not (name.sure and noise < 1e-3)
+
+
 @pytest.mark.parametrize(
     ("told", "field", "found"),
     [

@@ -51,3 +51,37 @@ def test_a_motion_answers_by_nets_of_the_board() -> None:
     assert motion.has("v1")
     assert not motion.has("vm")
     np.testing.assert_array_equal(motion.signal("v1"), SINE)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.75, 0.9])
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("noise", [0.002, 0.01, 0.02])
+def test_a_channel_that_is_cut_off_is_seen(share: float, before: bool, noise: float) -> None:
+    """By the converter, or before the noise comes in; the noise is what it is elsewhere."""
+    rng = np.random.default_rng(5)
+    peak, level = 3.0, 0.4 + share * 3.0
+    signal = np.minimum(SINE, level) if before else SINE
+    noisy = signal + noise * peak * rng.normal(size=len(TIME))
+    noisy = noisy if before else np.minimum(noisy, level)
+    step = 2.0 * peak / 200
+    record = Record(TIME, {"CH1": step * np.round(noisy / step)}, "here")
+    low, high = record.limits["CH1"]
+    assert low == -np.inf
+    assert high == pytest.approx(level, abs=4.0 * max(noise * peak, step))
+    assert record.clipped == ("CH1",)
+    assert record.noise["CH1"] == pytest.approx(
+        np.hypot(noise * peak, step / np.sqrt(12.0)), rel=0.5
+    )
+
+
+@pytest.mark.parametrize("bits", [6, 8, 12])
+@pytest.mark.parametrize("noise", [0.0, 0.001, 0.01, 0.05])
+def test_round_tops_are_not_cut_off(bits: int, noise: float) -> None:
+    """A sine, one with a flat third harmonic, and pulses, however coarse the converter."""
+    rng, phase = np.random.default_rng(6), 2.0 * np.pi * 150.0 * TIME
+    waves = [np.sin(phase), np.sin(phase) + np.sin(3.0 * phase) / 12.0, np.sin(phase) ** 5]
+    for wave in waves:
+        noisy = wave + noise * rng.normal(size=len(TIME))
+        step = 2.5 / 2**bits
+        record = Record(TIME, {"CH1": step * np.round(noisy / step)}, "here")
+        assert record.clipped == ()

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
+from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
+from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
-from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spice import deck
@@ -49,7 +51,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
     system = Reduction(subject(2).circuit, board).system()
     e = subject(2).excitation
     drive = Excitation(e.frequency, 3.0 * e.amplitude, 0.1 * e.amplitude).drive
-    met = until_strobe(with_drive_states(system, drive), drive, phase)
+    met = until_strobe(Flow(system, drive, fast=False), phase)
     assert met is not None
     state, _, clipped = met
     left = (1.0 - phase / (2.0 * math.pi)) * drive.period
@@ -61,7 +63,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
 def test_at_phase_zero_it_is_the_flow_itself() -> None:
     system = subject(3).system
     drive = subject(3).excitation.drive
-    met = until_strobe(with_drive_states(system, drive), drive, 0.0)
+    met = until_strobe(Flow(system, drive, fast=False), 0.0)
     assert met is not None
     wanted = Flow(system, drive).run(np.zeros(4), 1).strobes[-1]
     np.testing.assert_allclose(met[0], wanted, rtol=1e-10)
@@ -131,7 +133,7 @@ def test_ngspice_ends_where_the_exact_circuit_does(sample: int | None, degrees: 
     nets = known.circuit.state_nets
     waves = open_simulator("shared").run(turned, nets, (periods + 1) / e.frequency)
     phase = math.radians(degrees)
-    met = until_strobe(with_drive_states(system, e.drive), e.drive, phase)
+    met = until_strobe(Flow(system, e.drive, fast=False), phase)
     assert met is not None
     run = Flow(system, e.drive).run(met[0], periods)
     first = (1.0 - degrees / 360.0) / e.frequency
@@ -171,3 +173,36 @@ def test_ngspice_and_the_exact_circuit_agree_on_a_dc_offset() -> None:
     swing = wanted.max() - wanted.min()
     assert abs(centre) > 0.02 * swing
     assert 0.5 * (heard.max() + heard.min()) == pytest.approx(centre, abs=0.004 * swing)
+
+
+@pytest.mark.parametrize("sample", [0, 3])
+def test_the_compiled_way_through_a_sweep_is_the_plain_one(sample: int) -> None:
+    board = draw(subject(2).circuit, SPREAD, 1, sample)
+    ensemble = Ensemble(Boards.of(subject(2).circuit, [board]))
+    system, e = Reduction(subject(2).circuit, board).system(), subject(2).excitation
+    drives = [Excitation(e.frequency * (1.0 + 0.02 * k), e.amplitude).drive for k in (3, 2, 1, 0)]
+    stages = [(drive, 15) for drive in drives] + [(drives[-1], 60)]
+    phases = [0.4, 2.0, 4.5]
+    plain = follow(system, stages, phases)
+    fast = follow(system, stages, phases, partial(ensemble.swept, 0))
+    assert ensemble.swept(0, stages, np.zeros((1, system.size)))[1].all()
+    for one, two in zip(plain, fast, strict=True):
+        assert one is not None
+        assert two is not None
+        np.testing.assert_allclose(two.state, one.state, atol=1e-9 * np.abs(one.state).max())
+        assert two[1:] == one[1:]
+
+
+def test_a_board_that_clips_on_the_way_is_followed_all_the_same() -> None:
+    board = draw(subject(2).circuit, SPREAD, 1, 0)
+    ensemble = Ensemble(Boards.of(subject(2).circuit, [board]))
+    system, e = Reduction(subject(2).circuit, board).system(), subject(2).excitation
+    loud = [(Excitation(e.frequency, 400.0 * e.amplitude).drive, 5), (e.drive, 5)]
+    assert not ensemble.swept(0, loud, np.zeros((1, system.size)))[1].any()
+    (one,) = follow(system, loud, [1.0])
+    (two,) = follow(system, loud, [1.0], partial(ensemble.swept, 0))
+    assert one is not None
+    assert two is not None
+    assert one.clipped
+    np.testing.assert_array_equal(two.state, one.state)
+    assert two[1:] == one[1:]

@@ -25,6 +25,7 @@ from designer.verdicts.verdict import BLOCK, Answer, BoardRow, Question, StudyPl
 from designer.yields.layers import LocalRunner, fill
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import RULES, study_hash
+from tests.shared.resealed import Change, reseal, with_value
 
 
 @pytest.fixture
@@ -278,3 +279,43 @@ def test_blocks_of_another_study_are_ignored_aloud(tmp_path: Path, plan: StudyPl
     (said,) = made("b" * 64)
     assert said == "samples.parquet: 2 blocks of another study ignored, computed again"
     assert made("b" * 64) == []
+
+
+STRANGE: dict[str, Change] = {
+    "a sample of another block": with_value("sample", BLOCK),
+    "a sample below none": with_value("sample", -1),
+    "a sample twice": with_value("sample", 0),
+    "no sample": with_value("sample", None),
+    "a question that is not asked": with_value("question", 1),
+    "a question below none": with_value("question", -1),
+    "an unknown verdict": with_value("verdict", "maybe"),
+    "no verdict": with_value("verdict", None),
+    "an unknown response": with_value("response", "1-2"),
+    "no response": with_value("response", None),
+    "no reason": with_value("reason", None),
+    "no margin": with_value("miss", None),
+    "no periods": with_value("periods", None),
+    "rows without end": lambda rows: rows * 10_000,
+}
+
+
+@pytest.mark.parametrize("what", STRANGE)
+def test_rows_that_no_study_writes(tmp_path: Path, plan: StudyPlan, what: str) -> None:
+    """With a seal that is right: they are said and computed again."""
+    block = next(plan.blocks())
+    _store(tmp_path, plan).put(block, _answers(block))
+    path = tmp_path / _store(tmp_path, plan).name(block)
+    reseal(path, STRANGE[what])
+    notes: list[str] = []
+    assert _store(tmp_path, plan, note=notes.append).read(block) == []
+    assert notes == [f"{path}: damaged, computed again"]
+
+
+def test_rows_in_another_order_are_not_taken(tmp_path: Path, plan: StudyPlan) -> None:
+    """A block is its first samples, question by question: else one would be counted twice."""
+    task = lambda block: lambda jobs, step: _answers(block)  # noqa: E731
+    changes: tuple[Change, ...] = (lambda rows: rows[::-1], lambda rows: rows[1:])
+    for change in changes:
+        made = fill(plan, _store(tmp_path, plan), BLOCK, task, LocalRunner(1), lambda: None)
+        assert made == _answers(range(plan.samples))
+        reseal(tmp_path / _store(tmp_path, plan).name(range(1)), change)

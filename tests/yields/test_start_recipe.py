@@ -15,10 +15,10 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation, Resistor
 from designer.circuit.reduction import Reduction
-from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow
+from designer.model.response_table import HertzResponse
 from designer.spread.spread import draw, draw_many
-from designer.verdicts.verdict import Verdict
+from designer.verdicts.verdict import Question, Verdict
 from designer.yields import start_recipe_search
 from designer.yields.power_up import (
     PowerUp,
@@ -69,6 +69,18 @@ def test_a_recipe_ends_at_the_wanted_setting_in_small_steps(way: RecipeKind) -> 
     assert [d.omega for d, _ in recipe.drives] == pytest.approx(
         [2 * math.pi * e.frequency for e, _ in stages]
     )
+
+
+def test_a_recipe_names_the_frequency_of_a_mechanism() -> None:
+    """ω in rad/s is read in hertz; other models give their own scale (``setup.csv``)."""
+    own = question(1)
+    omega = 72.0 * math.pi
+    spec = HertzResponse(omega, own.spec.expect)
+    found = {r.way: r for r in candidates(replace(own, spec=spec), subject(1).system)}
+    text = found[RecipeKind.FROM_ABOVE].text
+    assert "Hz (39.6 Hz of the mechanism), " in text
+    assert "Hz (36 Hz of the mechanism) in " in text
+    assert "omega" not in text
 
 
 def test_candidates_are_what_their_names_say() -> None:
@@ -136,6 +148,52 @@ def test_only_what_was_tried_is_promised() -> None:
     assert "steps" not in raised
 
 
+@pytest.mark.parametrize("way", list(RecipeKind))
+def test_a_recipe_that_never_worked_is_not_offered(way: RecipeKind) -> None:
+    never = replace(recipes(1)[way], reached=0, trials=12, boards=24, able=3)
+    text = "none: no recipe that was tried led to it from any of 12 switch-on phases"
+    assert never.text == f"{text}; caution: 3 of 24 sample boards can show it at this setting"
+    some = replace(never, board_reached=2, board_trials=9, able=20)
+    assert some.text == f"{text}, and at most at 2 of 9 starts of boards"
+    assert not some.text.startswith("none: the nominal circuit")
+    assert "switch on at" in replace(recipes(1)[RecipeKind.DIRECT], reached=1, trials=12).text
+
+
+@pytest.mark.parametrize("works", [None, RecipeKind.FROM_BELOW])
+def test_only_a_recipe_that_worked_on_the_nominal_board_is_taken(
+    monkeypatch: pytest.MonkeyPatch, works: RecipeKind | None
+) -> None:
+    """Sample boards that all start directly are no reason to offer that, if the nominal one does
+    not; and nothing is, where no recipe works on it."""
+
+    class Ended:
+        def __init__(self, ok: bool) -> None:
+            self.verdict = Verdict.OK if ok else Verdict.LOST
+
+    def ends(
+        ensemble_: Ensemble,
+        starts: list[tuple[int, Question, Recipe, float]],
+        _jobs: int,
+        _known: object,
+    ) -> list[Ended]:
+        alone = len(ensemble_.boards.values["R1"]) == 1
+        return [
+            Ended(
+                recipe.way is works and begun == phase(1)
+                if alone
+                else recipe.way is RecipeKind.DIRECT
+            )
+            for _, _, recipe, begun in starts
+        ]
+
+    monkeypatch.setattr(start_recipe_search, "switched_on", ends)
+    (found,) = find_recipes(plan(3))
+    if works is None:
+        assert found.text.startswith("none: no recipe that was tried led to it from any of 12")
+    else:
+        assert (found.way, found.reached, found.trials) == (works, 1, 12)
+
+
 @pytest.mark.parametrize("value", [300.109685878878, 4.952314987479351, 0.0123456789, 98765.4321])
 def test_a_generator_takes_the_numbers(value: float) -> None:
     for text, digits in ((hertz(value), 6), (volts(value), 5)):
@@ -175,6 +233,22 @@ def test_a_direct_start_is_left_to_chance(p: int, other: str) -> None:
     assert 0.12 <= met.count(other) / len(met) <= 0.40
     for e in ended:
         assert (e.verdict is Verdict.OK) == (e.orbit.response == f"1-{p}-{p}")
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_what_has_come_to_a_known_orbit_settles_on_it(p: int) -> None:
+    """The same ends with the board's own orbit known as by settling every start, those that end on
+    another attractor among them; and a start that is not there yet is no arrival."""
+    short = replace(recipes(p)[RecipeKind.DIRECT], wait=3)
+    for recipe in (recipes(p)[RecipeKind.DIRECT], short):
+        starts = [(0, question(p), recipe, phase(k)) for k in range(24)]
+        plain = switched_on(nominal(p), starts)
+        known = switched_on(nominal(p), starts, 2, [question(p).start] * len(starts))
+        assert [e.verdict for e in known] == [e.verdict for e in plain]
+        assert [e.orbit.response for e in known] == [e.orbit.response for e in plain]
+        assert len({e.verdict for e in plain}) == 2
+        quick = sum(k.orbit is question(p).start for k in known)
+        assert quick == 0 if recipe is short else quick > 8
 
 
 @pytest.mark.parametrize("p", [1, 2])
@@ -250,7 +324,7 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
         board = draw(of.circuit, of.spread, of.seed, row.sample)
         system = Reduction(of.circuit, board).system()
         drive = direct.target.drive
-        met = until_strobe(with_drive_states(system, drive), drive, row.phase)
+        met = until_strobe(Flow(system, drive, fast=False), row.phase)
         assert met is not None
         run = Flow(system, drive).run(met[0], 900)
         counted = period_counts(run.strobes, run.counts)

@@ -590,9 +590,9 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
         (["--cluster", "localhost:8786"], "--cluster"),
         (["--blame-budget", "0"], "--blame-budget"),
         (["--blame-budget", "9", "--no-blame"], "--blame-budget"),
-        (["--seed", "2"], "seed 1"),
-        (["--samples", "13"], "samples 12"),
-        (["--until", "0.5"], "until None"),
+        (["--seed", "2"], "made with --seed 1, asked for 2"),
+        (["--samples", "13"], "made with --samples 12, asked for 13"),
+        (["--until", "0.5"], "made without --until, asked for 0.5"),
     ],
 )
 def test_bad_input_writes_nothing(

@@ -14,7 +14,8 @@ from designer.base.errors import InputError
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import Reduction
-from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics.attractors import settle, starts
+from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.model.response_table import Response

@@ -22,7 +22,7 @@
   const controls = [...document.querySelectorAll(".control")].map((box) => {
     const d = box.dataset;
     const c = { name: d.name, low: +d.low, high: +d.high, own: d.value, log: d.log === "1",
-      unit: d.unit, field: box.querySelector(".number"), slider: box.querySelector(".slider") };
+      unit: d.unit, scale: +d.scale, field: box.querySelector(".number"), slider: box.querySelector(".slider") };
     c.at = (place) => {
       const part = place / STEPS;
       return c.log ? c.low * (c.high / c.low) ** part : c.low + (c.high - c.low) * part;
@@ -37,21 +37,32 @@
       c.at = (place) => recording.omegas[place];
       c.place = nearest;
     }
+    c.written = (text) => (c.scale === 1 || !Number.isFinite(Number(text)) ? short(text)
+      : String(Number((Number(text) * c.scale).toPrecision(7)))); // in the unit that is shown
+    // What the server makes the number of: with its unit, so that 36 Hz stays 36 Hz.
+    c.asText = (shown) => (c.scale === 1 || shown === "" || !Number.isFinite(Number(shown)) ? shown
+      : recording ? String(Number(shown) / c.scale) : `${shown} ${c.unit}`);
+    c.round = (value) => String(Number((value * c.scale).toPrecision(6)));
     c.show = (text) => {
       c.text = text;
-      if (document.activeElement !== c.field) c.field.value = short(text);
+      if (document.activeElement !== c.field) c.field.value = c.written(text);
       const value = Number(text);
       if (Number.isFinite(value)) c.slider.value = c.place(value);
-      c.slider.setAttribute("aria-valuetext", `${short(text)} ${c.unit}`.trim());
+      c.slider.setAttribute("aria-valuetext", `${c.written(text)} ${c.unit}`.trim());
       c.field.removeAttribute("aria-invalid");
     };
+    c.go = (value) => {
+      const shown = c.round(value);
+      c.field.value = shown;
+      c.show(c.scale === 1 ? shown : String(Number(shown) / c.scale));
+      c.text = c.asText(shown);
+      c.asked = c.scale !== 1;
+    };
     c.slider.addEventListener("input", () => {
-      const text = String(Number(c.at(+c.slider.value).toPrecision(6)));
-      c.field.value = text;
-      c.show(text);
+      c.go(c.at(+c.slider.value));
       want();
     });
-    c.field.addEventListener("change", () => { c.text = c.field.value.trim(); c.asked = true; want(); });
+    c.field.addEventListener("change", () => { c.text = c.asText(c.field.value.trim()); c.asked = true; want(); });
     return c;
   });
   const named = Object.fromEntries(controls.map((c) => [c.name, c]));
@@ -129,7 +140,7 @@
           c.asked = false;
           c.text = text;
           c.show(text);
-          if (typing === c.field) c.field.value = short(text);
+          if (typing === c.field) c.field.value = c.written(text);
         }
       }
       for (const c of controls) c.field.removeAttribute("aria-invalid");
@@ -158,7 +169,9 @@
       stripOf = message.id;
       const data = unpacked(message.data);
       const colours = [...data.period].map((n) => (n < 0 ? OPEN : PERIODS[n] ?? PERIODS[0]));
-      stripData = { omega: joined(stripData.omega, data.omega), x: joined(stripData.x, data.x),
+      const along = data.omega.map((omega) => omega * named.omega.scale);
+      const least = data.x.map((x) => x * page.length.scale);
+      stripData = { omega: joined(stripData.omega, along), x: joined(stripData.x, least),
         colour: stripData.colour.concat(colours) };
       later();
     },
@@ -217,11 +230,12 @@
       cursor = null;
       for (const key of ["x", "y"]) {
         for (const end of ["low", "high"]) {
-          by(`map-${key}-${end}`).value = map[`${key}_${end}`] = message[key][end];
+          map[`${key}_${end}`] = message[key][end];
+          by(`map-${key}-${end}`).value = mapShown(key, message[key][end]);
         }
         by(`map-${key}`).value = message[key].name;
         const range = views.map.model[`${key}_range`];
-        range.setv({ start: +message[key].low, end: +message[key].high });
+        range.setv({ start: mapDrawn(key, +message[key].low), end: mapDrawn(key, +message[key].high) });
       }
       mapAsked = mapHeld + JSON.stringify(map); // with the ends that the server chose
       by("map-box").hidden = by("map-away").hidden = false;
@@ -238,10 +252,10 @@
       const { columns, rows } = mapOf, half = message.stride / 2;
       for (const [i, j, response] of message.cells) {
         grid[i * columns + j] = response;
-        cells.left.push(mapValue("x", (j - half) / (columns - 1)));
-        cells.right.push(mapValue("x", (j + half) / (columns - 1)));
-        cells.bottom.push(mapValue("y", (i - half) / (rows - 1)));
-        cells.top.push(mapValue("y", (i + half) / (rows - 1)));
+        cells.left.push(mapDrawn("x", mapValue("x", (j - half) / (columns - 1))));
+        cells.right.push(mapDrawn("x", mapValue("x", (j + half) / (columns - 1))));
+        cells.bottom.push(mapDrawn("y", mapValue("y", (i - half) / (rows - 1))));
+        cells.top.push(mapDrawn("y", mapValue("y", (i + half) / (rows - 1))));
         cells.response.push(response);
       }
       looks = message.looks;
@@ -257,7 +271,8 @@
       if (!message.curves.length && !message.done) return;
       const lines = message.curves.map((curve) => unpacked(curve.data));
       borderLegend = message.legend;
-      fill("borders", { xs: lines.map((each) => each.x), ys: lines.map((each) => each.y),
+      fill("borders", { xs: lines.map((each) => each.x.map((x) => mapDrawn("x", x))),
+        ys: lines.map((each) => each.y.map((y) => mapDrawn("y", y))),
         colour: message.curves.map((each) => each.colour) });
       laterMap();
     },
@@ -303,7 +318,9 @@
   const showPins = () => {
     by("pins").replaceChildren(...pins.map((pin) => {
       const [omega, expect, b] = pin.split("~");
-      return row(`${expect} at ω = ${short(omega)}, b = ${short(b)}`, ["Remove", () => {
+      const { unit, written } = named.omega;
+      const at = unit ? `${written(omega)} ${unit}` : `ω = ${short(omega)}`;
+      return row(`${expect} at ${at}, b = ${short(b)}`, ["Remove", () => {
         pins = pins.filter((each) => each !== pin);
         showPins();
         history.replaceState(null, "", address());
@@ -345,16 +362,23 @@
   let grid = [], cells = {}, looks = {}, mapLegend = [], borderLegend = [], cursor = null, mapTimer = 0;
   const mapPart = (key, value) => (value - mapOf[key].low) / (mapOf[key].high - mapOf[key].low);
   const mapValue = (key, part) => Number(mapOf[key].low) + part * (mapOf[key].high - mapOf[key].low);
+  const mapDrawn = (key, value) => value * named[map[key]].scale;
+  const mapShown = (key, text) => (named[map[key]] && text !== "" ? named[map[key]].written(text) : text);
   const readMap = (text) => {
     const parts = (text ?? "").split("~");
     map = parts.length === MAP_WORDS.length
       ? Object.fromEntries(MAP_WORDS.map((key, k) => [key, parts[k]])) : null;
-    for (const key of map ? MAP_WORDS : []) by(`map-${key.replace("_", "-")}`).value = map[key];
+    for (const key of map ? MAP_WORDS : []) {
+      const side = key.split("_")[0];
+      by(`map-${key.replace("_", "-")}`).value = key === side ? map[key] : mapShown(side, map[key]);
+    }
     mapAsked = "";
     if (!map) mapAway();
   };
-  const typedMap = () => Object.fromEntries(MAP_WORDS.map((key) =>
-    [key, by(`map-${key.replace("_", "-")}`).value.trim()]));
+  const typedMap = () => Object.fromEntries(MAP_WORDS.map((key) => {
+    const typed = by(`map-${key.replace("_", "-")}`).value.trim(), side = key.split("_")[0];
+    return [key, key === side ? typed : named[by(`map-${side}`).value].asText(typed)];
+  }));
   // What a map shows depends on where the other parameters are, and not on the start.
   const held = () => {
     const out = { ...shownView.words };
@@ -389,7 +413,8 @@
   };
   const markHere = () => {
     const { words: at } = shownView;
-    fill("here", mapOf ? { x: [+at[mapOf.x.name]], y: [+at[mapOf.y.name]] } : { x: [], y: [] });
+    fill("here", mapOf ? { x: [mapDrawn("x", +at[mapOf.x.name])], y: [mapDrawn("y", +at[mapOf.y.name])] }
+      : { x: [], y: [] });
   };
   const laterMap = () => { mapTimer ||= setTimeout(showMap, 150); };
   const showMap = () => {
@@ -419,18 +444,18 @@
     const { columns, rows } = mapOf;
     const response = responseAt(Math.round(mapPart("y", y) * (rows - 1)),
       Math.round(mapPart("x", x) * (columns - 1)));
-    by("map-at").textContent = `${mapOf.x.label} = ${rounded(x)}, ${mapOf.y.label} = ${rounded(y)}: ${response}`;
+    const [across, up] = [named[mapOf.x.name].round(x), named[mapOf.y.name].round(y)];
+    by("map-at").textContent = `${mapOf.x.label} = ${across}, ${mapOf.y.label} = ${up}: ${response}`;
   };
-  const rounded = (value) => String(Number(value.toPrecision(6)));
   const goToPoint = (x, y) => {
-    named[mapOf.x.name].show(rounded(x));
-    named[mapOf.y.name].show(rounded(y));
+    named[mapOf.x.name].go(x);
+    named[mapOf.y.name].go(y);
     want();
   };
   const pointOf = (event) => {
     const view = views.map, area = view.el.getBoundingClientRect();
-    const x = view.frame.x_scale.invert(event.clientX - area.left);
-    const y = view.frame.y_scale.invert(event.clientY - area.top);
+    const x = view.frame.x_scale.invert(event.clientX - area.left) / named[mapOf.x.name].scale;
+    const y = view.frame.y_scale.invert(event.clientY - area.top) / named[mapOf.y.name].scale;
     const inside = [["x", x], ["y", y]].every(([key, value]) => {
       const part = mapPart(key, value);
       return part >= 0 && part <= 1;
@@ -451,7 +476,7 @@
       const place = Math.round(mapPart(key, at[k]) * steps) + fast * move[k];
       return mapValue(key, Math.min(steps, Math.max(0, place)) / steps);
     });
-    fill("cursor", { x: [cursor[0]], y: [cursor[1]] });
+    fill("cursor", { x: [mapDrawn("x", cursor[0])], y: [mapDrawn("y", cursor[1])] });
     tellAt(...cursor);
   };
   const wireMap = () => {
@@ -516,15 +541,21 @@
     }
   };
   const draw = (message) => {
-    for (const [name, data] of Object.entries(message.data)) fill(name, unpacked(data));
-    fill("stops", { at: message.stops });
-    const omega = Number(message.words.omega);
+    for (const [name, data] of Object.entries(message.data)) {
+      const { t, ...lengths } = unpacked(data);
+      const drawn = Object.entries(lengths).map(([key, each]) => [key, each.map((x) => x * page.length.scale)]);
+      fill(name, { ...(t ? { t } : {}), ...Object.fromEntries(drawn) });
+    }
+    fill("stops", { at: message.stops.map((x) => x * page.length.scale) });
+    const omega = Number(message.words.omega) * named.omega.scale;
     fill("now", { at: [omega] });
     const range = views.strip.model.x_range;
     if (!recording) range.setv({ start: omega * 0.84, end: omega * 1.16 });
-    axisLabel(views.portrait.model, "below", message.axes.x);
-    axisLabel(views.portrait.model, "left", message.axes.v);
-    axisLabel(views.trace.model, "left", message.axes.x);
+    const { unit } = page.length;
+    axisLabel(views.portrait.model, "below", message.axes.x + (unit && ` [${unit}]`));
+    axisLabel(views.portrait.model, "left", message.axes.v + (unit && ` [${unit}/s]`));
+    axisLabel(views.trace.model, "left", message.axes.x + (unit && ` [${unit}]`));
+    axisLabel(views.strip.model, "left", "least x" + (unit && ` [${unit}]`));
   };
   const axisLabel = (plot, place, text) => {
     const axis = plot[place][0];
@@ -555,7 +586,7 @@
     const area = view.el.getBoundingClientRect();
     const x = view.frame.x_scale.invert(event.clientX - area.left);
     if (!Number.isFinite(x) || x <= 0) return;
-    named[name].show(String(Number(x.toPrecision(6))));
+    named[name].go(x / named[name].scale);
     want();
   };
   const embed = async () => {

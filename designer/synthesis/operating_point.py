@@ -4,6 +4,11 @@ Over the orbits of the wanted responses on the exact circuit, their starts from 
 with one op-amp stuck at a rail. All of it is linear in state and drive within a mode, so a value on
 a strobe is exact; strobes lie 0.1 rad of the fastest motion apart (``output_loads.RESOLUTION``), so
 a smooth peak between them is missed by at most 0.13 %.
+
+A slope counts where the section's loop is closed. While one diode of a rectifier has let go and the
+other has not taken over, nothing closes it: for some nanoseconds of the exact circuit the output
+crosses two drops with the open-loop gain, and a strobe may fall there. That is no motion that an
+output is asked to follow; a real op-amp crosses at its own pace.
 """
 
 from __future__ import annotations
@@ -14,12 +19,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.catalog.design_rules import BY_ID
 from designer.circuit.board_values import Board, nominal_board
+from designer.circuit.feedback_loops import feedback_share
 from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Solution
 from designer.circuit.reduction import Reduction
+from designer.dynamics.piecewise_linear import ModeKey
 from designer.synthesis.output_loads import REST, Run, Sampled
 
+CLOSED = BY_ID["feedback"].limit or 0.0
+"""Share of its output that closes a section's loop, at least."""
 STUCK = 1e3
 """Offset [V] that drives a section to its rail whatever its inputs do."""
 
@@ -43,7 +53,7 @@ class Operating:
     low: dict[str, Peak] = field(default_factory=dict)
     """Lowest voltage of each net [V]."""
     slew: dict[str, Peak] = field(default_factory=dict)
-    """Largest slope of each section's output [V/s]."""
+    """Largest slope of each section's output while its loop is closed [V/s]."""
     across: dict[str, Peak] = field(default_factory=dict)
     """Largest magnitude of the voltage over each capacitor and resistor [V]."""
     power: dict[str, Peak] = field(default_factory=dict)
@@ -58,11 +68,18 @@ class Operating:
 
 def operating(reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str]) -> Operating:
     """What the circuit meets over these runs; one that does not come to its end is left out."""
+    return _operating(reduction, runs, left_out, speed=True)
+
+
+def _operating(
+    reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str], *, speed: bool
+) -> Operating:
+    """speed : whether slopes are looked at, which takes as long as all else on a strobe."""
     out = Operating(left_out=dict(left_out))
     for run in runs:
         try:
             sampled = Sampled(reduction, run)
-            _add(out, reduction.circuit, sampled, run.name)
+            _add(out, reduction.circuit, sampled, run.name, speed=speed)
         except ArithmeticError as error:
             out.left_out[run.name] = str(error)
             continue
@@ -71,7 +88,8 @@ def operating(reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str
 
 
 def stuck(circuit: Circuit, run: Run) -> Operating:
-    """The same with each section in turn stuck at each rail of the supply, from rest.
+    """The same, but for slopes, with each section in turn stuck at each rail of the supply, from
+    rest.
 
     run : whose drive is on meanwhile.
     """
@@ -81,8 +99,8 @@ def stuck(circuit: Circuit, run: Run) -> Operating:
             board = _stuck(circuit, section.name, sign)
             name = f"{section.name} at the {rail} rail"
             there = replace(run, name=name, start=np.zeros(len(circuit.states)), periods=REST)
-            point = operating(Reduction(circuit, board), [there], {})
-            for kind in ("high", "low", "slew", "across", "power", "source"):
+            point = _operating(Reduction(circuit, board), [there], {}, speed=False)
+            for kind in ("high", "low", "across", "power", "source"):
                 _raise_peaks(getattr(out, kind), getattr(point, kind).items())
             out.runs += point.runs
             out.left_out |= point.left_out
@@ -98,7 +116,7 @@ def _stuck(circuit: Circuit, name: str, sign: float) -> Board:
     )
 
 
-def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str) -> None:
+def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str, *, speed: bool) -> None:
     nets = [*circuit.nets, GROUND]
     voltage = _values(sampled, lambda s: np.array([s.voltage[n] for n in nets]))
     at = {net: voltage[:, i] for i, net in enumerate(nets)}
@@ -114,33 +132,43 @@ def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str) -> None:
         _raise_peaks(out.across, [(c.name, Peak(float(np.abs(volts).max()), run))])
     sections = circuit.sections
     current = _values(sampled, lambda s: np.array([s.output[a.name] for a in sections]))
-    speed = _rates(sampled, lambda s: np.array([s.voltage[a.output] for a in sections]))
     for i, section in enumerate(sections):
         _raise_peaks(out.source, [(section.name, Peak(float(np.abs(current[:, i]).max()), run))])
-        _raise_peaks(out.slew, [(section.name, Peak(float(np.abs(speed[:, i]).max()), run))])
+    if not speed:
+        return
+    slope = _rates(sampled, lambda s: np.array([s.voltage[a.output] for a in sections]), circuit)
+    for i, section in enumerate(sections):
+        _raise_peaks(out.slew, [(section.name, Peak(float(np.abs(slope[:, i]).max()), run))])
 
 
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
     """(k, q) values of these rows (q, n + 2) on the strobes."""
     inputs = np.column_stack([sampled.x, sampled.u, np.ones(len(sampled.u))])
-    return _by_mode(sampled, rows, inputs)
+    return _by_mode(sampled, lambda key: rows(sampled.reduction.solution(key)), inputs)
 
 
-def _rates(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
-    """(k, q) derivatives of these rows on the strobes [1/s]."""
+def _rates(sampled: Sampled, rows: Callable[[Solution], Array], circuit: Circuit) -> Array:
+    """(k, sections) derivatives of these rows, one a section, on the strobes [1/s]; 0 where the
+    section's loop is open."""
     drive = sampled.flow.drive
     time = sampled.step * np.arange(len(sampled.x))
     moving = drive.amplitude * drive.omega * np.cos(drive.omega * time)
-    return _by_mode(sampled, rows, np.column_stack([sampled.slope, moving, np.zeros(len(time))]))
+
+    def closed(key: ModeKey) -> Array:
+        shares = [abs(feedback_share(circuit, section, key)) for section in circuit.sections]
+        loop = (np.array(shares) >= CLOSED)[:, None]
+        return np.asarray(loop * rows(sampled.reduction.solution(key)))
+
+    return _by_mode(sampled, closed, np.column_stack([sampled.slope, moving, np.zeros(len(time))]))
 
 
-def _by_mode(sampled: Sampled, rows: Callable[[Solution], Array], inputs: Array) -> Array:
+def _by_mode(sampled: Sampled, rows: Callable[[ModeKey], Array], inputs: Array) -> Array:
     out: Array | None = None
     for i, key in enumerate(sampled.keys):
         inside = sampled.at == i
         if not inside.any():
             continue
-        value = inputs[inside] @ rows(sampled.reduction.solution(key)).T
+        value = inputs[inside] @ rows(key).T
         if out is None:
             out = np.empty((len(inputs), value.shape[1]))
         out[inside] = value

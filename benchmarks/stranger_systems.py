@@ -1,0 +1,284 @@
+"""Systems that no example names: drawn from a seed, each a model file with one wanted response.
+
+What is drawn is without units: masses and springs within a factor of 4, damping ratios of joints
+0.04 to 0.3, gaps of 0.1 to 0.6 of what the drive moves the masses by, stops of 4 to 30 of the
+springs. Then it is written in plain numbers, or in the SI units of a size that machines have.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.step_budget import Budget
+from designer.model.driven import model_flow
+from designer.model.model_file import ModelFile, parse_model_file
+
+SHAPES = (
+    ((1, 1), 6), ((1, 2), 1), ((1, 3), 1), ((2, 1), 5), ((2, 2), 4), ((2, 3), 1),
+    ((3, 1), 3), ((3, 2), 3), ((3, 3), 1), ((4, 1), 2), ((4, 2), 2), ((4, 3), 1),
+)  # fmt: skip
+"""Masses and clearances, and how often of thirty; every thirty systems in a row have each so
+often."""
+FREQUENCIES, STEPS = 12, 3_000_000
+"""Drive frequencies that a response is looked for at; steps of the engine that each may take."""
+MOST_PERIODS, APERIODIC = 8, 0.15
+"""Longest period of a wanted response; share of the aperiodic motions that are taken, with any
+n-p-q wanted."""
+WORD = {True: "upper", False: "lower"}
+Joint = tuple[str, str]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Size:
+    """Units that a kind of machine is of: what 1 of the drawn numbers is. hertz : range of 1/2π of
+    the drawn unit of time; None: plain numbers."""
+
+    name: str
+    length: tuple[float, float]
+    mass: tuple[float, float]
+    hertz: tuple[float, float] | None
+
+
+SIZES = (
+    (Size("plain numbers", (1.0, 1.0), (1.0, 1.0), None), 4),
+    (Size("mm, kg", (2e-4, 5e-3), (0.1, 20.0), (4.0, 200.0)), 3),
+    (Size("µm, mg", (2e-7, 2e-5), (1e-8, 1e-5), (500.0, 5e4)), 2),
+    (Size("m, t", (5e-3, 0.5), (3e2, 5e4), (0.1, 4.0)), 1),
+)
+"""Sizes, and how often of ten."""
+
+
+@dataclass(frozen=True)
+class Stranger:
+    """A drawn system."""
+
+    number: int
+    """Its number in the population of the seed."""
+    masses: int
+    clearances: int
+    kinds: tuple[str, ...]
+    """What is unusual of it: "one-sided", "unequal", "preloaded", "between masses", "constant
+    force", "base"."""
+    size: str
+    """Of which size it is written."""
+    text: str
+    """The model file."""
+
+    @property
+    def name(self) -> str:
+        return f"{self.number:04d}"
+
+
+def draw(seed: int, number: int) -> Stranger:
+    """The system of this number; every number is drawn for itself."""
+    shape = _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
+    size = _one_of(SIZES, np.random.default_rng([seed, number // 10, 2]), number % 10)
+    rng = np.random.default_rng([seed, number])
+    while True:  # a drawn system may be refused as a model, or never meet a stop
+        drawn = _Drawn(rng, *shape, size)
+        text = drawn.with_response(f"Stranger {seed}-{number}")
+        if text is not None:
+            return Stranger(number, *shape, drawn.kinds, size.name, text)
+
+
+def _one_of(choices: Sequence[tuple[T, int]], rng: np.random.Generator, place: int) -> T:
+    """The choice at a place of a pack that was shuffled."""
+    pack = [choice for choice, count in choices for _ in range(count)]
+    return pack[int(rng.permutation(len(pack))[place])]
+
+
+class _Drawn:
+    """One draw of the elements, without a response yet."""
+
+    def __init__(self, rng: np.random.Generator, masses: int, clearances: int, size: Size) -> None:
+        self._rng, self._size = rng, size
+        self.kinds: tuple[str, ...] = ()
+        self._kinds: set[str] = set()
+        self._names = [f"m{i + 1}" for i in range(masses)]
+        self._mass = np.exp(rng.uniform(-math.log(2.0), math.log(2.0), masses))
+        self._springs = dict(self._joints(0.4))
+        self._dampers = {
+            pair: 2.0 * rng.uniform(0.04, 0.3) * math.sqrt(k * self._reduced(pair))
+            for pair, k in self._springs.items()
+            if "ground" in pair or rng.uniform() < 0.7
+        }
+        self._draw_drive()
+        self._flexibility = np.linalg.inv(self._matrix(self._springs))
+        self._reach = np.abs(self._flexibility) @ np.maximum(self._force, 0.0)
+        self._gaps = [self._gap(k) for k in range(clearances)]
+        self.kinds = tuple(sorted(self._kinds))
+        length, mass = (_log_uniform(rng, *span) for span in (size.length, size.mass))
+        second = 1.0
+        if size.hertz is not None:
+            second = 1.0 / (2.0 * math.pi * _log_uniform(rng, *size.hertz))
+        self._units = {
+            "kg": mass, "m": length, "N": mass * length / second**2,
+            "N/m": mass / second**2, "N s/m": mass / second,
+        }  # fmt: skip
+        self._second = second
+
+    def _joints(self, more: float) -> Iterator[tuple[Joint, float]]:
+        """A spring from each mass to one before it, the first to ground; others to ground too now
+        and then."""
+        for i, name in enumerate(self._names):
+            other = self._names[int(self._rng.integers(i))] if i else "ground"
+            yield (name, other), self._stiffness()
+            if i and self._rng.uniform() < more:
+                yield (name, "ground"), self._stiffness()
+
+    def _stiffness(self) -> float:
+        return _log_uniform(self._rng, 0.5, 2.0)
+
+    def _reduced(self, pair: Joint) -> float:
+        masses = [self._mass[self._names.index(n)] for n in pair if n != "ground"]
+        return float(1.0 / sum(1.0 / m for m in masses))
+
+    def _matrix(self, joints: dict[Joint, float]) -> Array:
+        out = np.zeros((len(self._names), len(self._names)))
+        for pair, value in joints.items():
+            row = np.array([float(n == pair[0]) - float(n == pair[1]) for n in self._names])
+            out += value * np.outer(row, row)
+        return out
+
+    def _draw_drive(self) -> None:
+        """A moving base in a quarter; else a force on any mass, now and then on two. A third have
+        constant forces."""
+        rng, n = self._rng, len(self._names)
+        self._constant = np.zeros(n)
+        self._amplitude = np.zeros(n)
+        self._base = 0.0
+        if rng.uniform() < 0.25:
+            self._base = float(rng.uniform(0.5, 1.5))
+            self._kinds.add("base")
+            self._force = self._base * self._mass
+        else:
+            for mass in rng.permutation(n)[: 2 if rng.uniform() < 0.2 else 1]:
+                self._amplitude[mass] = rng.uniform(0.5, 1.5) * rng.choice([1.0, 1.0, -1.0])
+            self._force = np.abs(self._amplitude)
+        if rng.uniform() < 1.0 / 3.0:
+            mass = int(rng.integers(n))
+            self._constant[mass] = rng.uniform(0.05, 0.5) * self._force.max() * rng.choice([-1, 1])
+            self._kinds.add("constant force")
+
+    def _gap(self, number: int) -> dict[str, object]:
+        """A clearance: what stands in it, its gaps and its stops, in drawn units."""
+        rng, n = self._rng, len(self._names)
+        i = int(rng.integers(n))
+        other = "ground"
+        if n > 1 and rng.uniform() < 0.35:
+            other = self._names[int(rng.choice([j for j in range(n) if j != i]))]
+            self._kinds.add("between masses")
+        reach = float(max(self._reach[i], 0.3 * self._reach.max()))
+        own = float(self._matrix(self._springs)[i, i])
+
+        def gap() -> float:
+            return reach * float(rng.uniform(0.1, 0.6))
+
+        def stop() -> float:
+            return own * _log_uniform(rng, 4.0, 30.0)
+
+        out: dict[str, object] = {"name": "ABC"[number], "between": (self._names[i], other)}
+        kind = rng.choice(["one-sided", "equal", "unequal", "preloaded"], p=[0.35, 0.3, 0.25, 0.1])
+        if kind != "equal":
+            self._kinds.add(str(kind))
+        if kind == "one-sided":
+            return out | {WORD[bool(rng.uniform() < 0.5)]: gap(), "stiffness": stop()}
+        if kind == "equal":
+            width = gap()
+            return out | {"upper": width, "lower": width, "stiffness": stop()}
+        if kind == "preloaded":
+            side = bool(rng.uniform() < 0.5)
+            held = -reach * float(rng.uniform(0.05, 0.3))
+            out |= {WORD[side]: held, "stiffness": stop()}
+            return out | ({WORD[not side]: 1.5 * reach - held} if rng.uniform() < 0.3 else {})
+        out |= {"upper": gap(), "lower": gap(), "upper_stiffness": stop()}
+        return out | {"lower_stiffness": stop()}
+
+    def with_response(self, title: str) -> str | None:
+        """The file with a response that the model shows from rest, in which a stop is hit; None
+        where there is none, or where the model is refused."""
+        rng, elements = self._rng, self._elements(title)
+        own = np.sqrt(np.linalg.eigvals(self._matrix(self._springs) / self._mass[:, None]).real)
+        for _ in range(FREQUENCIES):
+            omega = float(rng.choice(own)) * _log_uniform(rng, 0.6, 1.6)
+            key: tuple[str, object] = ("omega", float(f"{omega:.4g}"))
+            if self._size.hertz is not None:
+                key = "frequency", f"{omega / (2.0 * math.pi * self._second):.4g} Hz"
+            response = _table("[[response]]", [key])
+            try:
+                modelfile = parse_model_file(elements + response)
+            except InputError:
+                return None
+            orbit = _from_rest(modelfile)
+            if orbit.status is OrbitStatus.PERIODIC and orbit.n <= MOST_PERIODS and _hits(orbit):
+                return elements + _table("[[response]]", [key, ("expect", str(orbit.counts))])
+            if orbit.status is OrbitStatus.APERIODIC and rng.uniform() < APERIODIC:
+                return elements + response
+        return None
+
+    def _elements(self, title: str) -> str:
+        """The file without its response."""
+        lines = ["format = 2\n", f'title = "{title}"\n']
+        for name, mass in zip(self._names, self._mass, strict=True):
+            lines.append(_table("[[mass]]", [("name", name), ("mass", self._value(mass, "kg"))]))
+        for kind, key, unit, joints in (
+            ("spring", "stiffness", "N/m", self._springs),
+            ("damper", "damping", "N s/m", self._dampers),
+        ):
+            for pair, value in joints.items():
+                joint = ("between", list(pair)), (key, self._value(value, unit))
+                lines.append(_table(f"[[{kind}]]", joint))
+        for gap in self._gaps:
+            keys = [(k, self._of_gap(k, value)) for k, value in gap.items()]
+            lines.append(_table("[[clearance]]", keys))
+        for name, *values in zip(self._names, self._amplitude, self._constant, strict=True):
+            forces = zip(("amplitude", "constant"), values, strict=True)
+            keys = [(k, self._value(float(v), "N")) for k, v in forces if v]
+            if keys:
+                lines.append(_table("[[force]]", [("on", name), *keys]))
+        if self._base:
+            lines.append(_table("[base]", [("amplitude", self._value(self._base, "m"))]))
+        lines.append(_table("[circuit]", [("dead_zone", "rectifier")]))
+        return "".join(lines)
+
+    def _of_gap(self, key: str, value: object) -> object:
+        if isinstance(value, float):
+            return self._value(value, "N/m" if key.endswith("stiffness") else "m")
+        return list(value) if isinstance(value, tuple) else value
+
+    def _value(self, drawn: float, unit: str) -> object:
+        """As a file has it: three digits, with a unit where it is of a size."""
+        digits = f"{drawn * self._units[unit]:.3g}"
+        return float(digits) if self._size.hertz is None else f"{digits} {unit}"
+
+
+def _table(head: str, keys: Sequence[tuple[str, object]]) -> str:
+    lines = [f"{key} = {json.dumps(value)}" for key, value in keys]
+    return "\n".join(["", head, *lines, ""])
+
+
+def _from_rest(modelfile: ModelFile) -> Orbit:
+    (wanted,) = modelfile.responses
+    assert wanted.omega is not None
+    flow = model_flow(modelfile.model, wanted.omega)
+    return settle(flow, np.zeros(flow.system.size), budget=Budget(STEPS))
+
+
+def _hits(orbit: Orbit) -> bool:
+    """Whether it hits a stop, deeper than a touch."""
+    return any(p + q for p, q in orbit.counts.impacts) and bool(np.isfinite(orbit.radius))
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))

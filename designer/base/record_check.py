@@ -1,0 +1,69 @@
+"""Whether the values of a record are of the types that its class states.
+
+What is stored may come from anyone, with a seal that is right: a value of another type would be met
+far from the file, by whoever computes with it.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Mapping
+from enum import Enum
+from functools import cache
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+Record = TypeVar("Record")
+_KINDS = {"f": "fiu", "i": "iu", "u": "iu", "c": "cfiu", "b": "b"}
+"""Kinds of arrays that stand for each kind."""
+_hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+
+
+def checked_record(kind: type[Record], values: Mapping[str, Any]) -> Record:
+    """The record of a dataclass with these values.
+
+    Raises
+    ------
+    TypeError : a value is not of its field's type, is missing, or has no field.
+    """
+    hints = _hints(kind)
+    for name, value in values.items():
+        if name in hints and not fits(value, hints[name]):
+            raise TypeError(f"{name}: {type(value).__name__} for {hints[name]}")
+    return kind(**values)
+
+
+def fits(value: object, kind: Any) -> bool:
+    """Whether a value is of the type of an annotation. A whole number is a float too; a truth value
+    is neither."""
+    if kind is Any:
+        return True
+    if kind is None or kind is type(None):
+        return value is None
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        return any(fits(value, each) for each in inner)
+    if origin is Literal:
+        return value in inner
+    if origin is tuple:
+        return isinstance(value, tuple) and _fit_each(value, inner)
+    if origin is Mapping:
+        return isinstance(value, Mapping) and all(
+            fits(key, inner[0]) and fits(each, inner[1]) for key, each in value.items()
+        )
+    if origin is np.ndarray:
+        scalar = get_args(inner[1])[0]
+        kinds = _KINDS[np.dtype(scalar).kind]
+        return isinstance(value, np.ndarray) and value.dtype.kind in kinds
+    if kind is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if kind in (int, bool, str) or issubclass(kind, Enum):
+        return type(value) is kind
+    return isinstance(value, kind)
+
+
+def _fit_each(values: tuple[object, ...], kinds: tuple[Any, ...]) -> bool:
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        return all(fits(each, kinds[0]) for each in values)
+    return len(values) == len(kinds) and all(map(fits, values, kinds))

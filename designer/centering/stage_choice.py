@@ -1,0 +1,156 @@
+"""Which stage makes the clearance, where the model file states none.
+
+Both are designed, and a few boards of each are asked what they show. The stage whose boards keep
+the responses is taken; where the boards cannot tell the two apart, one that fails no design rule of
+the circuit, then the smaller one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import get_args
+
+from designer.base.errors import InputError, Unreachable
+from designer.base.progress import doing, part
+from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.design_rule import FAIL
+from designer.check import checked_design, synthesis_result
+from designer.check.synthesis_result import Synthesis, with_stage
+from designer.circuit.ensemble import Ensemble
+from designer.design_rules import run_rules
+from designer.design_rules.subject import RuleSubject
+from designer.dynamics.orbit import OrbitStatus
+from designer.model.circuit_table import DeadZone
+from designer.model.find_responses import matches
+from designer.model.model_file import ModelFile
+from designer.spread.spread import draw_many
+from designer.synthesis.part_checks import stage_refusal
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Verdict
+from designer.yields.study import plan_study
+
+BOARDS = 64
+"""Boards of each stage that are asked."""
+STREAM = "stage:"
+"""Stream of these boards, which no study draws."""
+GOOD = 0.01
+"""Largest coefficient error of a stage that is as good as another one."""
+
+
+@dataclass(frozen=True)
+class StageForecast:
+    """What is foretold of a design with one of the stages."""
+
+    synthesis: Synthesis
+    """The design."""
+    kept: int | None
+    """Of ``BOARDS`` boards, those that keep the response that the fewest keep; None without a
+    response that the model shows with a period."""
+    failed: tuple[str, ...]
+    """Rules of the circuit that fail."""
+
+    @property
+    def kind(self) -> DeadZone:
+        """The stage."""
+        kind = self.synthesis.modelfile.circuit.dead_zone
+        assert kind is not None
+        return kind
+
+    @property
+    def words(self) -> str:
+        """It in words."""
+        boards = "" if self.kept is None else f"{self.kept} of {BOARDS} boards keep the responses, "
+        rules = f"{', '.join(self.failed)} fails" if self.failed else "no rule fails"
+        parts = len(self.synthesis.design.circuit.values)
+        error = self.synthesis.design.errors.max_error
+        return f"{self.kind}: {boards}{rules}, largest error {100 * error:.2g} %, {parts} parts"
+
+    def better_than(self, other: StageForecast) -> bool:
+        """Whether it is to be taken: by what its boards keep, if that differs by more than chance;
+        else by the rules, the error and the number of parts."""
+        if self.kept is not None and other.kept is not None:
+            one, two = self.kept / BOARDS, other.kept / BOARDS
+            chance = math.sqrt((one * (1.0 - one) + two * (1.0 - two)) / BOARDS)
+            if abs(one - two) > 2.0 * chance:
+                return one > two
+        return self._rank < other._rank
+
+    @property
+    def _rank(self) -> tuple[bool, bool, int]:
+        design = self.synthesis.design
+        return bool(self.failed), design.errors.max_error > GOOD, len(design.circuit.values)
+
+
+def synthesise(modelfile: ModelFile, catalog: Catalog | None = None, *, jobs: int = 1) -> Synthesis:
+    """``check.synthesis_result.synthesise`` of all responses, with the better stage where the model
+    file states none and both make its clearances.
+
+    Raises
+    ------
+    InputError, Unreachable, ResponseNotFound : as there; of the stage that is built without a
+        choice where neither can be.
+    """
+    catalog = load_catalog() if catalog is None else catalog
+    clearances = modelfile.model.second_order().clearances
+    able: list[DeadZone] = [
+        kind for kind in get_args(DeadZone) if stage_refusal(clearances, kind) is None
+    ]
+    if modelfile.circuit.dead_zone is not None or not clearances or len(able) < 2:
+        return synthesis_result.synthesise(modelfile, catalog, all_found=True)
+    forecasts: list[StageForecast] = []
+    refusals: list[InputError] = []
+    for kind in able:
+        with part(f"with the {kind} stage"):
+            try:
+                made = synthesis_result.synthesise(
+                    with_stage(modelfile, kind), catalog, all_found=True
+                )
+                forecasts.append(forecast(made, jobs))
+            except Unreachable as error:
+                refusals.append(error)
+    if not forecasts:
+        raise refusals[0]
+    return chosen(forecasts)
+
+
+def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:
+    """The design of the better one, with the reason."""
+    first, *rest = forecasts
+    for other in rest:
+        first = other if other.better_than(first) else first
+    others = [f.words for f in forecasts if f is not first]
+    beside = "; ".join(others) or "no parts were found for the other stage"
+    return replace(first.synthesis, stage_reason=f"{first.words}; {beside}")
+
+
+def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
+    """What a few boards of a design show, and which rules its circuit fails."""
+    doing("boards of the stage")
+    design = synthesis.design
+    checked = [
+        c
+        for c in checked_design.check(design, synthesis.model_responses, None)
+        if c.model.orbit.status is OrbitStatus.PERIODIC
+    ]
+    there = [c for c in checked if matches(c.circuit, c.model.spec)]
+    kept = None if not checked else 0
+    if checked and len(there) == len(checked):
+        plan = plan_study(
+            synthesis.modelfile, design, there, synthesis.catalog, samples=BOARDS, seed=0
+        )
+        drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(BOARDS), STREAM)
+        sample = Ensemble(plan.modelled(drawn), jobs=jobs)
+        counts = []
+        for question in plan.questions:
+            asked = question, question.excitation, question.start.start
+            cases: list[Case] = [(i, *asked) for i in range(BOARDS)]
+            answers = settled(sample, cases, jobs)
+            counts.append(sum(verdict is Verdict.OK for _, verdict, _ in answers))
+        kept = min(counts)
+    try:
+        outcomes = run_rules.on_circuit(RuleSubject.of(synthesis), synthesis.modelfile.rules)
+    except InputError:  # no board can be made of it, which its own checks say
+        outcomes = ()
+    return StageForecast(synthesis, kept, tuple(o.rule.id for o in outcomes if o.status == FAIL))

@@ -1,0 +1,83 @@
+"""What is not good enough about a design, for the JSON object of ``design.json``.
+
+The rules are those of the verb ``rules`` on the circuit, judged by the same code; those on a board
+need one. Nothing here changes the design, and nothing refuses it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from designer.base.errors import InputError
+from designer.base.si_unit import drive_text
+from designer.catalog.design_rule import FAIL, RuleOutcome
+from designer.check import checked_design
+from designer.check.synthesis_result import Synthesis
+from designer.design_rules import run_rules
+from designer.design_rules.subject import RuleSubject
+from designer.report import words
+from designer.report.design_tables import spring_of
+from designer.synthesis.parts_choice import ways_to_less_error
+
+FINDINGS = {"warnings", "failed_rules"}
+"""The keys."""
+LARGE = 0.01
+"""A largest coefficient error above this is said first."""
+
+
+def findings(synthesis: Synthesis) -> dict[str, Any]:
+    """``warnings`` and ``failed_rules`` by the keys of docs/contract.md.
+
+    A design without responses, or one that no board can be made of, has no rule that fails for
+    want of something to look at; the latter is a warning.
+    """
+    warnings = [*_error(synthesis), *_responses(synthesis)]
+    failed: list[RuleOutcome] = []
+    try:
+        subject = RuleSubject.of(synthesis)
+    except InputError as error:
+        warnings.append(f"The design rules were not looked at: {error}")
+    else:
+        limits = synthesis.modelfile.rules
+        failed = [o for o in run_rules.on_circuit(subject, limits) if o.status == FAIL]
+    if failed:
+        warnings.append(_rules([o.rule.id for o in failed]))
+    return {"warnings": warnings, "failed_rules": [o.as_dict() for o in failed]}
+
+
+def _error(synthesis: Synthesis) -> Iterator[str]:
+    """A largest coefficient error that is too large, and what lowers it."""
+    design, spec = synthesis.design, synthesis.modelfile.circuit
+    worst = design.errors.max_error
+    if worst <= LARGE:
+        return
+    errors = design.errors.errors
+    worst_name = max(errors, key=lambda each: abs(errors[each]))
+    name = words.coefficient(worst_name, spring_of(design.model))
+    text = (
+        f"The largest coefficient error is {words.error(worst)} ({name}), above {100 * LARGE:g} %."
+    )
+    if design.certificate.lower_bound > LARGE:
+        least = words.error(design.certificate.lower_bound)
+        text += f" No choice within the model file's limits has less than {least}."
+    yield f"{text} What may lower it: {', '.join(ways_to_less_error(spec))}."
+
+
+def _responses(synthesis: Synthesis) -> Iterator[str]:
+    """Wanted responses that the model shows and the nominal circuit does not."""
+    found, si = synthesis.model_responses, synthesis.modelfile.si
+    for checked in checked_design.check(synthesis.design, found, None):
+        wanted = checked.model
+        if wanted.found and not checked.agrees:
+            at = drive_text(wanted.omega, None if si is None else si.hertz(wanted.omega))
+            name = wanted.expected or wanted.orbit.response
+            shown = words.orbit(checked.circuit)
+            yield f"The nominal circuit does not show {name} at {at}: it shows {shown}."
+
+
+def _rules(ids: Sequence[str]) -> str:
+    names = " and ".join(filter(None, (", ".join(ids[:-1]), ids[-1])))
+    if len(ids) == 1:
+        return f"A design rule fails on the circuit: {names}."
+    return f"{len(ids)} design rules fail on the circuit: {names}."

@@ -1,0 +1,281 @@
+"""Parts at scales that were chosen first: points of the box, rounded to what can be bought.
+
+Every coefficient has a resistor of its own, so at any scales that keep the conditions the values
+are known but for rounding. Corners of the box near its best point are mixed, and each mixture is
+rounded and descended from (``kernel_rounding``). Up to a tenth of the resistors' grade an error is
+worth nothing behind the parts' own: then the highest thresholds count, then the fewest values.
+Lower thresholds are tried only where the error is not good enough. The number of descents is
+limited and the draws follow from it, so the same order has the same answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.progress import best_so_far, doing
+from designer.circuit.scale_fit import minimax
+from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
+from designer.synthesis.attempt import Attempt, Order, attempt, completed
+from designer.synthesis.dead_zone_target import DeadZone
+from designer.synthesis.kernel_rounding import Rounding, descend
+from designer.synthesis.limits import ConditionLimits
+from designer.synthesis.scale_box import Conflict, ScaleBox
+from designer.synthesis.scale_program import ScaleProgram
+
+NEAR, FAR = (0.05, 0.2), (0.7, 6.0)
+"""Of the logarithm of the thresholds: how far below their best the points lie, in turn; further
+only for an error that is not good enough."""
+CORNERS, DESCENTS, BATCHES = 30, 100, 4
+"""Corners of the box at each loss; mixtures of them that are descended from at a time, and how
+often, unless one is good."""
+LOOKED_AT = 20
+"""Choices of a batch whose least error is computed: those that a descent leaves with the least."""
+DRAWS = 4096
+"""Numbers that one descent draws from."""
+MIXED = 0.3
+"""Parameter of the Dirichlet distribution of a mixture: most of it is a few corners."""
+KEPT = 1e-6
+"""Of a logarithm: a limit that is missed by no more is kept."""
+ALIKE = 0.02
+"""Of the logarithm of the thresholds: choices no further apart are as good."""
+TRIED = 6
+"""Choices of which a circuit is made, until one can be."""
+GOAL, ENOUGH = 0.1, 0.5
+"""Of the resistors' grade: an error up to the first is worth nothing more; one up to the second is
+worth no lower thresholds."""
+CLOSE = 1.05
+"""Of a choice's error: that of its circuit, which has constants and nets that the program leaves
+out."""
+
+
+@dataclass(frozen=True)
+class RoundedChoice:
+    """A choice of scales and parts."""
+
+    z: Array
+    """The scales and free parts."""
+    rounded: Array
+    """(rows,) logarithms of the resistors that follow, as they are bought."""
+    error: float
+    """The least that the largest error can be made by the scales."""
+    worth: float
+    """``ScaleBox.worth`` of it."""
+    kinds: int
+    """Distinct values."""
+
+
+@dataclass(frozen=True)
+class ScaleAttempt:
+    """An attempt with the scales that it was made at."""
+
+    made: Attempt
+    """The attempt."""
+    z: Array
+    """The scales and free parts."""
+    words: str
+    """What is proved of the thresholds."""
+
+
+@dataclass
+class ScaleChoice:
+    """The choice of scales and parts for one order, within limits."""
+
+    order: Order
+    """What is to be built, and from what."""
+    within: ConditionLimits
+    """The side conditions."""
+    candidates: list[RoundedChoice] = field(default_factory=list)
+    """Choices that keep all limits which are known before the circuit is made."""
+
+    @cached_property
+    def program(self) -> ScaleProgram:
+        return ScaleProgram.of(self.order, self.within)
+
+    @cached_property
+    def box(self) -> ScaleBox:
+        return ScaleBox(self.program)
+
+    @property
+    def goal(self) -> float:
+        """The error that is aimed at."""
+        return self._at_most(GOAL)
+
+    def _at_most(self, share: float) -> float:
+        """This share of the resistors' grade, or what the model file accepts, if that is less."""
+        spec = self.order.spec
+        return min(share * spec.resistor_grade, spec.max_error or np.inf)
+
+    def conflicts(self) -> list[Conflict]:
+        """The limits that leave no scales; none where there are some."""
+        return self.box.conflicts()
+
+    def circuits(self, before: Array | None = None) -> Iterator[ScaleAttempt | Shortfall]:
+        """Circuits of the best choices, the best one first; what leaves none, where there is none.
+        before : scales whose choice nearly kept the limits."""
+        if self.box.best() is None:
+            return iter([Shortfall("side conditions", True)])
+        if before is not None:
+            self._descend([before] * 4, 0)
+        for number, loss in enumerate((*NEAR, *FAR)):
+            enough = self._at_most(GOAL if loss in NEAR else ENOUGH)
+            if self._least <= enough:
+                break
+            corners = np.array(self.box.points(CORNERS, loss, seed=number))
+            for batch in range(BATCHES):
+                known = f", so far an error of {self._least:.2%}" if self.candidates else ""
+                doing(f"scales and parts, range {number + 1}, part {batch + 1} of {BATCHES}{known}")
+                random = np.random.default_rng((number, batch))
+                shares = random.dirichlet(np.full(len(corners), MIXED), DESCENTS)
+                self._descend(list(shares @ corners), 1 + number * BATCHES + batch)
+                if self.candidates:
+                    best_so_far(f"scales and parts with an error of {self._least:.2g}", step=True)
+                if self._least <= self.goal:
+                    break
+        return self._circuits()
+
+    def _circuits(self) -> Iterator[ScaleAttempt | Shortfall]:
+        """A circuit of each of the best candidates, as they are ranked; one whose error is not that
+        of its candidate comes last."""
+        why = Shortfall("coefficients", False)
+        worse: list[ScaleAttempt] = []
+        there = False
+        for candidate in list(self._ranked())[:TRIED]:
+            made = self.circuit_of(candidate)
+            if isinstance(made, Shortfall):
+                why = made
+                continue
+            own = ScaleAttempt(made, candidate.z, self._words(candidate))
+            if made.errors.max_error <= max(self.goal, CLOSE * candidate.error):
+                there = True
+                yield own
+            else:
+                worse.append(own)
+        yield from sorted(worse, key=lambda each: each.made.errors.max_error)
+        if not (there or worse):
+            yield why
+
+    def _descend(self, starts: Sequence[Array], seed: int) -> None:
+        """Choices near these points."""
+        rounding = self._rounding()
+        random = np.random.default_rng((seed, len(starts), 1))
+        found: list[tuple[float, Array, Array, Array]] = []
+        broken = []
+        for start in starts:
+            z, _ = descend(rounding, start, random.random(DRAWS))
+            over = (rounding.limits @ z + rounding.limit_constants).max()
+            sums = [s for s in self.program.sums if s.at(z) > KEPT]
+            broken += [s.tangent(z) for s in sums]
+            if over <= KEPT and not sums:
+                logs = rounding.rows @ z + rounding.constants
+                rounded = self._rounded(logs)
+                errors = _held(rounding, (rounded - logs)[:, None])[:, 0]
+                found.append((float(np.abs(errors).max()), z, rounded, errors))
+        self.box.cuts += broken[: len(self.program.sums)]
+        for error, z, rounded, errors in sorted(found, key=lambda own: own[0])[:LOOKED_AT]:
+            least = error if error <= self.goal else self._fitted(rounding, errors)
+            self.candidates.append(self._candidate(z, rounded, least))
+
+    def _fitted(self, rounding: Rounding, errors: Array) -> float:
+        """The largest error at the scales that make that of the coefficients least; constant forces
+        are read at these."""
+        scales = [k for k, values in enumerate(self.program.lists) if not len(values)]
+        columns = _held(rounding, -rounding.rows[:, scales])
+        own = np.array([not row.constant for row in self.program.rows])
+        fitted = errors + columns @ minimax(errors[own], columns[own])
+        return float(np.abs(fitted).max())
+
+    @property
+    def _least(self) -> float:
+        return min((c.error for c in self.candidates), default=np.inf)
+
+    def _rounded(self, logs: Array) -> Array:
+        """(rows,) the values nearest to these logarithms."""
+        pairs = zip(self.program.rows, logs.tolist(), strict=True)
+        return np.array([row.values[np.argmin(np.abs(row.values - log))] for row, log in pairs])
+
+    def _candidate(self, z: Array, rounded: Array, error: float) -> RoundedChoice:
+        own = z[[k for k, values in enumerate(self.program.lists) if len(values)]]
+        kinds = len(np.unique(np.round(np.concatenate([rounded, own]), 9)))
+        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds)
+
+    def _ranked(self) -> Iterator[RoundedChoice]:
+        """The candidates, the best one first."""
+        good = [c for c in self.candidates if c.error <= self.goal]
+        if good:
+            top = max(c.worth for c in good)
+            first = [c for c in good if c.worth >= top - ALIKE]
+            yield from sorted(first, key=lambda c: (c.kinds, c.error))
+            good = [c for c in good if c.worth < top - ALIKE]
+            yield from sorted(good, key=lambda c: -c.worth)
+        rest = [c for c in self.candidates if c.error > self.goal]
+        yield from sorted(rest, key=lambda c: c.error)
+
+    def _rounding(self) -> Rounding:
+        program, bounds = self.program, [*self.program.bounds, *self.box.cuts]
+        return Rounding(
+            rows=np.array([row.log.weights for row in program.rows]),
+            constants=np.array([row.log.constant for row in program.rows]),
+            sizes=np.array([row.size for row in program.rows]),
+            held=np.array([float(row.held) for row in program.rows]),
+            lead=program.lead,
+            row_values=np.concatenate([row.values for row in program.rows]),
+            row_first=np.cumsum([0, *(len(row.values) for row in program.rows)]),
+            limits=np.array([b.log.weights for b in bounds]),
+            limit_constants=np.array([b.log.constant for b in bounds]),
+            values=np.concatenate(program.lists),
+            first=np.cumsum([0, *(len(values) for values in program.lists)]),
+        )
+
+    def circuit_of(self, candidate: RoundedChoice) -> Attempt | Shortfall:
+        """The circuit of a choice, with what is sized afterwards."""
+        values = self.program.values(candidate.z, candidate.rounded)
+        targets = Targets.of(self.order.model)
+        linear = self._linear(targets, values)
+        within = self.within
+        if self.program.lead < 0:  # nothing but the swing sets the amplitude
+            top = max(log.at(candidate.z) for log in self.program.levels)
+            within = replace(within, swing=float(np.exp(top)))
+        if self.order.stage.kind != "rectifier":
+            return attempt(self.order, self.within, linear)
+        own = {name: v for name, v in values.items() if name not in linear.values}
+        stages = None
+        if own:
+            errors = candidate.error
+            stages = DeadZone(
+                values=own,
+                errors={"stages": errors},
+                threshold=float("nan"),
+                bound=0.0,
+                proved=False,
+                proof="chosen with the linear block, at scales that keep the side conditions",
+                solver="HiGHS for the scales, descents for the values",
+            )
+        return completed(self.order, within, linear, stages)
+
+    def _linear(self, targets: Targets, values: dict[str, float]) -> LinearBlock:
+        own = {name: values[name] for name in targets.parts}
+        return LinearBlock(own, np.nan, np.nan, 0.0, False, "", "descents from points of the box")
+
+    def _words(self, candidate: RoundedChoice) -> str:
+        """What is proved of the thresholds."""
+        lows = self.program.thresholds
+        best = self.box.best()
+        if not lows or best is None:
+            return ""
+        low, high = (float(np.exp(min(log.at(z) for log in lows))) for z in (candidate.z, best))
+        return (
+            f"thresholds: the lowest is {low:.3g} V; the linear program of the scales, with the "
+            f"limits of this search, allows {high:.3g} V"
+        )
+
+
+def _held(rounding: Rounding, errors: Array) -> Array:
+    """(rows, k) errors of coefficients from those of resistors: thresholds and constant forces
+    count beside the threshold that sets the amplitude."""
+    first = errors[rounding.lead] if rounding.lead >= 0 else np.zeros(errors.shape[1])
+    return np.asarray(rounding.sizes[:, None] * (errors - rounding.held[:, None] * first))

@@ -1,0 +1,536 @@
+"""All values of a circuit and all its side conditions, in logarithms of scales and free parts.
+
+What may be chosen at will, the vector z, holds logarithms: the time scale, the volts of each state
+per unit, the capacitors; of each rectifying stage the force resistor and the input resistor of each
+half, and between two masses two resistors of the difference amplifier. Every other resistor that a
+coefficient depends on follows as a sum of these (``Row``); what is bought is the value nearest to
+it. Ranges, swing, levels and what a stage puts out are linear in z; loads, noise gains and
+bandwidth are sums of exponentials of it, read from the circuit's nets (``ExponentialSum``). So the
+box of what may be chosen is convex.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.units import format_quantity
+from designer.catalog.diode_curve import diode_model
+from designer.circuit.build import constant_resistor
+from designer.circuit.dead_zone_parts import HalfNames, half_parts
+from designer.circuit.dead_zone_place import DeadZonePlace
+from designer.circuit.netlist import Circuit, Section
+from designer.linear_network.linear_terms import Targets
+from designer.model.find_responses import Reach
+from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.synthesis.attempt import BASE, Order
+from designer.synthesis.further_stages import LIFT, MOST_DIFFERENCE, idle_shares
+from designer.synthesis.limits import (
+    GENERATOR_PEAK,
+    LEAST_SIGNAL,
+    LOAD,
+    ConditionLimits,
+    bandwidth_limit,
+    depth,
+)
+from designer.synthesis.part_checks import nearest
+from designer.synthesis.stop_halves import INPUTS
+
+STILL = 1e-6
+"""Peaks below this share of the largest count as so much: those of a state that hardly moves."""
+
+
+@dataclass(frozen=True)
+class StatedLimit:
+    """A number that a side condition or the model file sets."""
+
+    condition: str
+    """The side condition, or the key of the table [circuit]."""
+    what: str
+    """What is limited, in words."""
+    value: float
+    """The number."""
+    unit: str = ""
+    """Its unit; none for a ratio."""
+    least: bool = False
+    """Whether it is a limit from below."""
+
+    def told(self, value: float) -> str:
+        """The limit in words, at this value."""
+        number = format_quantity(value, self.unit, 3)
+        return f"{self.what} {'>=' if self.least else '<='} {number} ({self.condition})"
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A logarithm that is linear in z: weights @ z + constant."""
+
+    weights: Array
+    """(z,) change with z."""
+    constant: float = 0.0
+    """Where z is 0."""
+
+    def __add__(self, other: Affine | float) -> Affine:
+        if isinstance(other, Affine):
+            return Affine(self.weights + other.weights, self.constant + other.constant)
+        return Affine(self.weights, self.constant + float(other))
+
+    def __neg__(self) -> Affine:
+        return Affine(-self.weights, -self.constant)
+
+    def __sub__(self, other: Affine | float) -> Affine:
+        return self + (-other)
+
+    def at(self, z: Array) -> float:
+        """Its value."""
+        return float(self.weights @ z + self.constant)
+
+
+@dataclass(frozen=True)
+class LinearBound:
+    """A logarithm that may not exceed 0, and the limit that it keeps."""
+
+    log: Affine
+    """The logarithm."""
+    limit: StatedLimit
+    """What it keeps."""
+
+
+@dataclass(frozen=True)
+class ExponentialSum:
+    """Exponentials of logarithms whose sum may not exceed 1, and the limit that this keeps."""
+
+    logs: tuple[Affine, ...]
+    """The logarithms of its terms."""
+    limit: StatedLimit
+    """What it keeps."""
+
+    def at(self, z: Array) -> float:
+        """Logarithm of the sum: above 0 the limit is not kept."""
+        return float(np.logaddexp.reduce([log.at(z) for log in self.logs]))
+
+    def tangent(self, z: Array) -> LinearBound:
+        """A bound that every z keeps which keeps the sum: it touches the sum at this z."""
+        logs = np.array([log.at(z) for log in self.logs])
+        total = float(np.logaddexp.reduce(logs))
+        weights = np.exp(logs - total) @ np.array([log.weights for log in self.logs])
+        return LinearBound(Affine(weights, total - float(weights @ z)), self.limit)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A resistor that follows from z."""
+
+    names: tuple[str, ...]
+    """Parts that have this value."""
+    log: Affine
+    """Its logarithm [ohm]."""
+    values: Array
+    """Logarithms of the values that it may have, ascending."""
+    size: float = 1.0
+    """Error of a coefficient for an error of its logarithm."""
+    held: bool = False
+    """Whether its error counts beside that of the threshold which sets the amplitude: that of a
+    threshold or of a constant force does."""
+    constant: bool = False
+    """Whether it makes a constant force, which no scale is fitted to."""
+
+
+@dataclass(frozen=True)
+class ScaleProgram:
+    """What may be chosen, what follows from it, and what both have to keep."""
+
+    lists: tuple[Array, ...]
+    """Logarithms of the values of each entry of z, ascending; empty where it is any number."""
+    shared: Mapping[str, int]
+    """Place in z of each part that is chosen at will."""
+    rows: tuple[Row, ...]
+    """The resistors that follow."""
+    bounds: tuple[LinearBound, ...]
+    """What is linear."""
+    sums: tuple[ExponentialSum, ...]
+    """What is not."""
+    thresholds: tuple[Affine, ...]
+    """Of each gap: the voltage [V] at which its half conducts."""
+    levels: tuple[Affine, ...]
+    """Of each state: its peak [V]."""
+    outputs: tuple[Affine, ...]
+    """Of each half: the stage's output at the deepest contact [V]."""
+
+    @classmethod
+    def of(cls, order: Order, within: ConditionLimits) -> ScaleProgram:
+        """What is ordered, within these limits."""
+        return _Maker(order, within).program()
+
+    @property
+    def lead(self) -> int:
+        """Place among the rows of the threshold that sets the amplitude; -1 without one."""
+        places = [k for k, row in enumerate(self.rows) if row.held and not row.constant]
+        return places[0] if places else -1
+
+    def values(self, z: Array, rounded: Array) -> dict[str, float]:
+        """The values [ohm, F] by part. rounded : (rows,) logarithms of the rows' values."""
+        out = {name: float(np.exp(z[k])) for name, k in self.shared.items()}
+        for row, log in zip(self.rows, rounded.tolist(), strict=True):
+            out |= dict.fromkeys(row.names, float(np.exp(log)))
+        return out
+
+
+def halves(clearance: Clearance) -> list[tuple[int, ...]]:
+    """The sides whose halves are sized together: both, where the stops are alike."""
+    stops = [stop for _, stop in clearance.sides]
+    sides = [side for side, _ in clearance.sides]
+    alike = all(stop == stops[0] for stop in stops)
+    return [tuple(sides)] if alike else [(side,) for side in sides]
+
+
+def penetration(reach: Reach, side: int, peak: float) -> float:
+    """Deepest penetration of the stop on this side, in model units."""
+    return depth(Reach(reach.on(side)), peak)
+
+
+class _Maker:
+    """Writes the program."""
+
+    def __init__(self, order: Order, within: ConditionLimits) -> None:
+        self.order, self.within = order, within
+        self.system: SecondOrderSystem = order.model.second_order()
+        self.targets = Targets.of(order.model)
+        self.states = 2 * self.system.size
+        rectifies = order.stage.kind == "rectifier"
+        every = order.stage.places(self.system.clearances)
+        self.places: tuple[DeadZonePlace, ...] = every if rectifies else ()
+        self.constants = np.flatnonzero(self.system.constant).tolist() if rectifies else []
+        self.heavy = order.resistors[order.resistors >= within.load]
+        peaks = order.peaks.states
+        self.peaks = np.log(np.maximum(peaks, STILL * peaks.max()))
+        self.lists: list[Array] = [np.zeros(0)] * (1 + self.states)
+        self.shared: dict[str, int] = {}
+        self._choose()
+        self.rows: list[Row] = []
+        self.bounds: list[LinearBound] = []
+        self.thresholds: list[Affine] = []
+        self.outputs: list[Affine] = []
+        self.lifts: dict[str, Affine] = {}
+
+    def program(self) -> ScaleProgram:
+        self._ranges()
+        self._scales()
+        self._integrators()
+        gaps = [stop.gap for place in self.places for _, stop in place.clearance.sides if stop.gap]
+        self.lead = abs(gaps[0]) if gaps else None
+        for place in self.places:
+            self._stage(place)
+        for mass in self.constants:
+            self._constant(mass)
+        self._generator()
+        levels = [self.volts(i) + self.peaks[i] for i in range(self.states)]
+        return ScaleProgram(
+            tuple(self.lists),
+            self.shared,
+            tuple(self.rows),
+            tuple(self.bounds),
+            tuple(self._sums()),
+            tuple(self.thresholds),
+            tuple(levels),
+            tuple(self.outputs),
+        )
+
+    # What is chosen at will
+
+    def _choose(self) -> None:
+        inputs = self.heavy[(self.heavy >= INPUTS[0]) & (self.heavy <= INPUTS[1])]
+        inputs = inputs if len(inputs) else self.heavy
+
+        def free(names: Sequence[str], values: Array) -> None:
+            self.shared |= dict.fromkeys(names, len(self.lists))
+            self.lists.append(np.log(np.sort(values)))
+
+        for state in range(self.states):
+            free([f"C{state + 1}"], self.order.capacitors)
+        for place in self.places:
+            free([place.part("R50")], self.heavy)
+            for sides in halves(place.clearance):
+                free([half_parts(place.index, side).source for side in sides], inputs)
+            if place.clearance.other is not None:
+                free([place.part("R220")], inputs)
+                free([place.part("R222")], self.heavy)
+
+    def _unit(self, place: int) -> Affine:
+        return Affine(np.eye(len(self.lists))[place])
+
+    @property
+    def time(self) -> Affine:
+        """Of the time scale [s]."""
+        return self._unit(0)
+
+    def volts(self, state: int) -> Affine:
+        """Of a state's volts per unit."""
+        return self._unit(1 + state)
+
+    def part(self, name: str) -> Affine:
+        """Of a part's value, if that is chosen at will."""
+        return self._unit(self.shared[name])
+
+    def rate(self, mass: int) -> Affine:
+        """Of what a resistor from a mass's displacement into its velocity is, times the coefficient
+        that it makes (``CircuitScales.rates``)."""
+        x, v = 2 * mass, 2 * mass + 1
+        return self.time + self.volts(x) - self.volts(v) - self.part(f"C{v + 1}")
+
+    # What is kept
+
+    def _keep(self, log: Affine, limit: StatedLimit) -> None:
+        """This logarithm stays on its side of the limit's value."""
+        if 0.0 < limit.value < np.inf:
+            over = log - float(np.log(limit.value))
+            self.bounds.append(LinearBound(-over if limit.least else over, limit))
+
+    def _scales(self) -> None:
+        """The time scale and the volts of the states."""
+        low, high = self.order.spec.frequency
+        frequency = -self.time + float(np.log(self.system.own_frequency / (2.0 * np.pi)))
+        self._keep(frequency, StatedLimit("frequency", "the band's low end", low, "Hz", least=True))
+        self._keep(frequency, StatedLimit("frequency", "the band's high end", high, "Hz"))
+        self._keep(
+            self.time,
+            StatedLimit("bandwidth", "least time scale", self.within.seconds[0], "s", least=True),
+        )
+        levels = [self.volts(i) + self.peaks[i] for i in range(self.states)]
+        swing = StatedLimit("swing", "peak of a state", self.within.swing, "V")
+        ratio = StatedLimit("level", "ratio of two peaks", self.within.level)
+        share = StatedLimit("level", "ratio of a peak to that at the clearance", self.within.share)
+        own = 2 * self.system.clearances[0].mass if self.system.clearances else 0
+        for level in levels:
+            self._keep(level, swing)
+            self._keep(level - levels[own], share)
+        pairs = [*zip(levels[0::2], levels[1::2], strict=True), *combinations(levels[1::2], 2)]
+        for one, other in pairs:
+            self._keep(one - other, ratio)
+            self._keep(other - one, ratio)
+        if "level" in self.within.conditions:
+            least = LEAST_SIGNAL * self.order.opamp.offset_limit
+            self._keep(
+                levels[own], StatedLimit("level", "peak at the clearance", least, "V", least=True)
+            )
+
+    def _ranges(self) -> None:
+        """Of the parts that are chosen at will."""
+        for name, place in self.shared.items():
+            own = np.exp(self.lists[place][[0, -1]])
+            key, unit = ("capacitor_range", "F") if name[0] == "C" else ("resistor_range", "Ω")
+            low, high = (float(end) for end in own)
+            self._keep(self._unit(place), StatedLimit(key, "the least", low, unit, least=True))
+            self._keep(self._unit(place), StatedLimit(key, "the largest", high, unit))
+
+    def _row(
+        self,
+        names: Sequence[str],
+        log: Affine,
+        size: float = 1.0,
+        signal: tuple[float, float] = (0.0, np.inf),
+        *,
+        held: bool = False,
+        constant: bool = False,
+    ) -> None:
+        """A resistor that follows. signal : the range [ohm] that the condition resistors sets."""
+        every = self.order.resistors
+        low, high = float(every[0]), float(every[-1])
+        for key, least, most in (
+            ("resistor_range", low, high),
+            ("load", self.within.load, np.inf),
+            ("resistors", *signal),
+        ):
+            self._keep(log, StatedLimit(key, names[0], least, "Ω", least=True))
+            self._keep(log, StatedLimit(key, names[0], most, "Ω"))
+        own = every[(every >= max(self.within.load, signal[0])) & (every <= signal[1])]
+        values = np.log(own if len(own) else every)
+        self.rows.append(Row(tuple(names), log, values, size, held, constant))
+
+    # What follows
+
+    def _integrators(self) -> None:
+        """The linear block."""
+        terms = zip(self.targets.entries, self.targets.resistors, self.targets.wanted, strict=True)
+        for (a, b), name, wanted in terms:
+            log = self.time + self.volts(b) - self.volts(a) - self.part(f"C{a + 1}")
+            self._row([name], log - float(wanted), signal=self.within.signal)
+        if not self.places and self.system.clearances:
+            self._leave_room()
+
+    def _leave_room(self) -> None:
+        """For the stop's resistor beside that of its mass's stiffness, where the stage is sized
+        afterwards."""
+        clearance = self.system.clearances[0]
+        mu = max(self.system.relative_stiffness(stop) for stop in self.system.clearances)
+        bounds = self.within.bounds(mu, self.order.peaks, self.order.resistors, clearance.mass)
+        log = next(row.log for row in self.rows if row.names == (self.order.stiffness,))
+        self._keep(log, StatedLimit("load", "the stop's resistor", bounds.stop, "Ω", least=True))
+
+    def _stage(self, place: DeadZonePlace) -> None:
+        """The rectifier of one clearance, with the amplifiers around it."""
+        clearance, index = place.clearance, place.index
+        mass, stops = clearance.mass, dict(clearance.sides)
+        swing, peaks = self.within.swing, self.order.peaks
+        reach = peaks.reach(index)
+        gain = Affine(np.zeros(len(self.lists)))
+        if clearance.other is not None:
+            gain = self._difference(place, reach)
+        force = self.part(place.part("R50"))
+        more = 1.0 if "swing" in self.within.conditions else self.order.output.limit / swing
+        diode, reference = self.order.stage.diode, self.order.stage.reference
+        assert diode is not None
+        assert reference is not None
+        drop = diode_model(diode).drop
+        idle = idle_shares(clearance, reach)
+        room = sum(stop.gap for stop in stops.values())
+        own = self.volts(2 * mass) + gain
+        for sides in halves(clearance):
+            side, stop = sides[0], stops[sides[0]]
+            names = [half_parts(index, each) for each in sides]
+            source = self.part(names[0].source)
+            # Slope of fv over the force resistor that makes the stop's stiffness.
+            stiffness = -self.rate(mass) + float(np.log(stop.stiffness / self.system.mass[mass]))
+            feedback = source + force + stiffness - gain
+            self._row([n.feedback for n in names], feedback)
+            deepest = max(penetration(reach, each, reach.peak) for each in sides)
+            fv = feedback - source + own + float(np.log(deepest))
+            self.outputs.append(fv)
+            limit = more * swing - drop
+            self._keep(fv, StatedLimit("swing", f"output of {place.output}", limit, "V"))
+            if side in idle:
+                lifted = LIFT * self.order.output.limit * min(idle[side], 1.0) + 2.0 * drop
+                what = f"output of {place.output} beside its idle half"
+                self._keep(fv, StatedLimit("swing", what, lifted, "V"))
+            if stop.gap:
+                threshold = own + float(np.log(abs(stop.gap)))
+                self.thresholds.append(threshold)
+                log = source - threshold + float(np.log(reference.voltage))
+                self._row([n.threshold for n in names], log, held=True)
+            if len(idle) > 1:
+                self._lift(names, sides, own + float(np.log(room)), idle)
+        if clearance.other is not None:
+            self._reaction(place)
+
+    def _lift(
+        self,
+        names: Sequence[HalfNames],
+        sides: Sequence[int],
+        both: Affine,
+        idle: Mapping[int, float],
+    ) -> None:
+        """The clamps' resistors, as ``further_stages.lifts`` has them; both : thresholds [V]."""
+        limit = float(np.log(LIFT * self.order.output.limit))
+        for half, side in zip(names, sides, strict=True):
+            most = float(np.log(max(1.0, idle[-side])))
+            self.lifts[half.lift] = self.part(half.source) + limit - both - most
+
+    def _difference(self, place: DeadZonePlace, reach: Reach) -> Affine:
+        """The amplifier of a clearance between two masses; its gain."""
+        clearance = place.clearance
+        assert clearance.other is not None
+        x, y = 2 * clearance.mass, 2 * clearance.other
+        source, feedback = (self.part(place.part(name)) for name in ("R220", "R222"))
+        gain = feedback - source
+        self._row([place.part("R221")], source + self.volts(y) - self.volts(x))
+        what = f"gain of the difference in clearance {clearance.name}"
+        self._keep(gain, StatedLimit("stage", what, MOST_DIFFERENCE))
+        if reach.peak > 0.0:
+            peak = gain + self.volts(x) + float(np.log(reach.peak))
+            what = f"difference in clearance {clearance.name}"
+            self._keep(peak, StatedLimit("swing", what, self.within.swing, "V"))
+        return gain
+
+    def _reaction(self, place: DeadZonePlace) -> None:
+        """The stop's force on the other of two masses."""
+        one, two = place.clearance.mass, place.clearance.other
+        assert two is not None
+        inertia = float(np.log(self.system.mass[two] / self.system.mass[one]))
+        log = self.part(place.part("R50")) - self.rate(one) + self.rate(two) + inertia
+        log = log - self.volts(2 * two) + self.volts(2 * one)
+        self._row([place.part("R51")], log)
+
+    def _current(self, force: float, mass: int) -> Affine:
+        """Into the velocity of a mass that makes this force [A]."""
+        own = abs(force) / float(self.system.mass[mass])
+        return self.volts(2 * mass) - self.rate(mass) + float(np.log(own))
+
+    def _constant(self, mass: int) -> None:
+        """A constant force."""
+        force, reference = float(self.system.constant[mass]), self.order.stage.reference
+        assert reference is not None
+        unit = np.abs(self.system.drive_force(self.system.own_frequency)).max()
+        if self.lead is not None:
+            unit = self.system.stiffness[mass, mass] * self.lead
+        log = -self._current(force, mass) + float(np.log(reference.voltage))
+        size = abs(force) / float(unit) if unit > 0.0 else 1.0
+        self._row([constant_resistor(mass)], log, size, held=True, constant=True)
+
+    def _generator(self) -> None:
+        """Its amplitude, with the least resistor that it can have."""
+        if "generator" not in self.within.conditions:
+            return
+        forces = self.system.drive_force(self.system.own_frequency)
+        least = float(np.log(self.order.resistors[0]))
+        limit = StatedLimit("generator", "amplitude", GENERATOR_PEAK, "V")
+        for mass in np.flatnonzero(forces).tolist():
+            volts = self._current(float(forces[mass]), mass) + least
+            self._keep(volts + float(np.log(self.order.largest)), limit)
+
+    # What the nets say
+
+    def _sums(self) -> Iterator[ExponentialSum]:
+        """Load, noise gain and bandwidth of every stage, by its parts; what is sized afterwards is
+        left out."""
+        o = self.order
+        circuit = o.build(defaultdict(lambda: 1.0))
+        known = {name: log for row in self.rows for name, log in self._named(row)}
+        known |= self.lifts | {name: self._unit(place) for name, place in self.shared.items()}
+        light = o.resistors[o.resistors >= self.within.load]
+        base = nearest(light if len(light) else o.resistors, BASE)
+        nothing = Affine(np.zeros(len(self.lists)), float(np.log(base)))
+        known |= dict.fromkeys(o.inverters, nothing)
+        frequency = -self.time + float(np.log(max(o.peaks.fastest, 1e-300) / (2.0 * np.pi)))
+        for section in circuit.sections:
+            yield from self._stage_sums(circuit, section, known, frequency)
+
+    def _named(self, row: Row) -> Iterator[tuple[str, Affine]]:
+        for name in row.names:
+            yield name, row.log
+
+    def _stage_sums(
+        self, circuit: Circuit, section: Section, known: Mapping[str, Affine], frequency: Affine
+    ) -> Iterator[ExponentialSum]:
+        where, conditions = section.name, self.within.conditions
+        outputs = circuit.output_nets(section)
+        there = [r for r in circuit.resistors if r.name in known]
+        loads = [known[r.name] for r in there if outputs & set(r.nets)]
+        if "load" in conditions and loads:
+            limit = StatedLimit("load", f"load of {where}", LOAD, "Ω", least=True)
+            yield ExponentialSum(tuple(-log + float(np.log(LOAD)) for log in loads), limit)
+        node = section.inverting
+        at = [r for r in there if node in r.nets]
+        hertz = bandwidth_limit(self.order.opamp)
+        product = StatedLimit("bandwidth", f"noise gain times frequency of {where}", hertz, "Hz")
+        most = -float(np.log(hertz))
+        store = [c for c in circuit.capacitors if node in c.nets]
+        if store:
+            own = self.part(store[0].name) + float(np.log(2.0 * np.pi))
+            logs = [-known[r.name] - own + most for r in at]
+            if "bandwidth" in conditions:
+                yield ExponentialSum((frequency + most, *logs), product)
+            return
+        back = [r for r in at if (set(r.nets) - {node}) & outputs]
+        if len(back) != 1:
+            return
+        gains = [known[back[0].name] - known[r.name] for r in at]
+        if np.isfinite(self.within.noise_gain):
+            limit = StatedLimit("noise_gain", f"noise gain of {where}", self.within.noise_gain)
+            yield ExponentialSum(tuple(log - float(np.log(limit.value)) for log in gains), limit)
+        if "bandwidth" in conditions:
+            yield ExponentialSum(tuple(log + frequency + most for log in gains), product)

@@ -1,0 +1,98 @@
+"""The stage that is built where the model file states none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from designer.catalog.catalog import load_catalog
+from designer.centering import stage_choice
+from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast
+from designer.check import checked_design
+from designer.check.synthesis_result import Synthesis, with_stage
+from designer.circuit.dead_zone_parts import stage_kind
+from designer.dynamics.counts import Counts
+from designer.model.model_file import parse_model_file
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import Verdict
+from designer.yields.study import plan_study
+from tests.shared.system_text import clearance, system_text, table
+
+CATALOG = load_catalog()
+CHAIN = (
+    {"a": 0.12, "b": 0.10, "tip": 0.08},
+    {("a", "ground"): 2e4, ("b", "a"): 1.6e4, ("tip", "b"): 1.2e4},
+    {("a", "ground"): 4.0, ("b", "a"): 3.0, ("tip", "b"): 3.0},
+    table("force", on="tip", amplitude=3.0),
+)
+ONE = (
+    {"a": 1.0},
+    {("a", "ground"): 1.0},
+    {("a", "ground"): 0.1},
+    table("force", on="a", amplitude=1.0),
+)
+STIFF = system_text(
+    *CHAIN,
+    clearance("A", "tip", "ground", upper=1e-3, stiffness=1.5e5),
+    table("response", omega=226.2),
+)
+"""A stiff stop on one side: offsets and the leftover slope spoil the saturating stage."""
+
+
+def test_the_stage_is_taken_whose_boards_keep_the_response() -> None:
+    """Its reason names both, and a study of other boards bears it out."""
+    modelfile = parse_model_file(STIFF)
+    made = stage_choice.synthesise(modelfile, CATALOG, jobs=2)
+    assert made.modelfile.circuit.dead_zone == "rectifier"
+    assert made.stage_reason.startswith("rectifier: ")
+    assert "; saturation: " in made.stage_reason
+    kept = {}
+    for kind in ("rectifier", "saturation"):
+        stated = with_stage(modelfile, kind)
+        other = made if kind == "rectifier" else stage_choice.synthesise(stated, CATALOG)
+        assert other.modelfile.circuit.dead_zone == kind
+        checked = checked_design.check(other.design, other.model_responses, None)
+        plan = plan_study(stated, other.design, checked, CATALOG, samples=40, seed=11)
+        answers = exact_rung.block(plan, range(40), 2)
+        kept[kind] = sum(answer.verdict is Verdict.OK for answer in answers)
+    assert kept["rectifier"] > kept["saturation"]
+
+
+def test_a_stage_that_alone_makes_the_clearances_is_no_choice() -> None:
+    unequal = clearance("A", "a", "ground", upper=0.5, lower=0.3, stiffness=9.0)
+    modelfile = parse_model_file(system_text(*ONE, unequal, table("response", omega=1.3)))
+    system = modelfile.model.second_order()
+    assert stage_kind(modelfile.circuit, system.clearances) == "rectifier"
+    assert stage_kind(modelfile.circuit, ()) == "saturation"
+    made = stage_choice.synthesise(modelfile, CATALOG)
+    assert (made.modelfile.circuit.dead_zone, made.stage_reason) == ("rectifier", "")
+
+
+@pytest.fixture(scope="module")
+def plain() -> Synthesis:
+    even = clearance("A", "a", "ground", upper=0.5, lower=0.5, stiffness=9.0)
+    text = system_text(*ONE, even, table("response", omega=1.3))
+    return stage_choice.synthesise(with_stage(parse_model_file(text), "rectifier"), CATALOG)
+
+
+def test_boards_decide_before_rules_and_rules_before_parts(plain: Synthesis) -> None:
+    def told(kept: int | None, *failed: str) -> StageForecast:
+        return StageForecast(plain, kept, failed)
+
+    assert told(BOARDS, "swing").better_than(told(BOARDS // 2))
+    assert not told(BOARDS // 2).better_than(told(BOARDS, "swing"))
+    assert told(BOARDS - 1).better_than(told(BOARDS, "swing"))  # one board is chance
+    assert told(None).better_than(told(None, "swing"))
+    assert not told(BOARDS).better_than(told(BOARDS))
+    assert chosen([told(10), told(60)]).stage_reason.startswith("rectifier: 60 of 64 boards")
+
+
+def test_a_response_that_the_nominal_circuit_does_not_show_is_kept_by_no_board(
+    plain: Synthesis,
+) -> None:
+    seen = forecast(plain, 2)
+    assert seen.kept == BOARDS
+    (response,) = plain.model_responses
+    wanted = replace(response, spec=replace(response.spec, expect=Counts(5, ((2, 2),))))
+    assert forecast(replace(plain, model_responses=(wanted,))).kept == 0
