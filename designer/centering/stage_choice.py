@@ -48,8 +48,6 @@ class StageForecast:
     kept: int | None
     """Of ``BOARDS`` boards, those that keep the response that the fewest keep; None without a
     response that the model shows with a period."""
-    failed: tuple[str, ...]
-    """Rules of the circuit that fail."""
 
     @property
     def kind(self) -> DeadZone:
@@ -57,6 +55,11 @@ class StageForecast:
         kind = self.synthesis.modelfile.circuit.dead_zone
         assert kind is not None
         return kind
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Rules of the circuit that fail."""
+        return tuple(o.rule.id for o in self.synthesis.outcomes or () if o.status == FAIL)
 
     @property
     def words(self) -> str:
@@ -152,5 +155,5 @@ def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
     try:
         outcomes = run_rules.on_circuit(RuleSubject.of(synthesis), synthesis.modelfile.rules)
     except InputError:  # no board can be made of it, which its own checks say
-        outcomes = ()
-    return StageForecast(synthesis, kept, tuple(o.rule.id for o in outcomes if o.status == FAIL))
+        return StageForecast(synthesis, kept)
+    return StageForecast(replace(synthesis, outcomes=outcomes), kept)

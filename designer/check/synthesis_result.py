@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from designer.base.frames import table_html
 from designer.base.progress import note, seeking
 from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.design_rule import RuleOutcome
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.circuit.design import Design, settings
@@ -38,6 +39,8 @@ class Synthesis:
     """Wall time [s]."""
     stage_reason: str = ""
     """Why the circuit has its dead-zone stage, where the model file states none."""
+    outcomes: tuple[RuleOutcome, ...] | None = None
+    """What the design rules of its circuit say, where they were judged already."""
 
     def _repr_html_(self) -> str:
         responses = self.model_responses

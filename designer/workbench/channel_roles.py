@@ -128,11 +128,14 @@ def _recognised(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, s
     It is sure where every other one explains clearly less: a channel that could be any net, for
     nothing tests it or needs it, is one of which another assignment explains as much.
     """
-    every = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= FITS]
-    every.sort(key=lambda each: -each.told)
+    loose = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= LOOSE]
+    loose.sort(key=lambda each: -each.told)
+    every = [each for each in loose if not each.misfit >= FITS]
     if not every or not every[0].told > LITTLE:
         return _by_shapes(balance, shown)
-    best, others = every[0], every[1:]
+    # One that hardly fits is not taken, but rules out that another is sure.
+    best = every[0]
+    others = [each for each in loose if each is not best]
     example = _example(dict(zip(best.nets, shown, strict=True)))
     if len(shown) == 1:
         return best, "one channel alone may show another net", example

@@ -55,7 +55,8 @@ def fitted(
         if (side * (displacement - end) > 0.02 * abs(end)).any()
     ]
     first = np.array([stop.inside[0], stop.inside[1]])
-    start = np.concatenate([first, *([[stop.ends[side], stop.gains[side]] for side in sides])])
+    begun = [[_first_end(displacement, output, stop, side), stop.gains[side]] for side in sides]
+    start = np.concatenate([first, *begun])
     scale = math.hypot(errors[1], errors[0] * max(map(abs, stop.gains.values()), default=1.0))
 
     def value(parameters: Array) -> Array:
@@ -89,3 +90,15 @@ def fitted(
             end_errors[side] = math.sqrt(float(covariance[place, place]))
     inside = (float(solved.x[0]), float(solved.x[1]))
     return DeadZoneCurve(ends, end_errors, inside, gains, misfit)
+
+
+def _first_end(displacement: Array, output: Array, stop: PredictedStop, side: int) -> float:
+    """About where a stop is [V]: as far before the furthest displacement as the output is high
+    there, by the nominal gain; the nominal stop where it is not.
+
+    A search that begins at the nominal stop overshoots where a scope's zero has moved a shallow
+    contact, and a stop that the motion does not reach leaves it nowhere to go.
+    """
+    at = int(np.argmax(side * displacement))
+    depth = (output[at] - stop.inside[0] - stop.inside[1] * displacement[at]) / stop.gains[side]
+    return float(displacement[at] - depth) if side * depth > 0.0 else stop.ends[side]

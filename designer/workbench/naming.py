@@ -70,8 +70,9 @@ FLAT = 0.15
 CORNER, BEYOND = 0.03, 0.1
 """Of a channel that is cut off: how far from there its curve is round, of its range; and how far
 beyond a stop it has to reach, of the stop."""
-FEWEST_FREE = 0.1
-"""Of the curve: what has to be left to fit a stage."""
+FEWEST_FREE, POOR = 0.1, 0.05
+"""Of the curve: what has to be left to fit a stage; and of its output's range, by how much it may
+be off the lines of one."""
 SURELY = 2.0
 """Times the noise that a curve leaves over of a motion that surely does not repeat."""
 STRETCHES, FEWEST_ALIKE, MOST_OF_IT, COLOURED = 16, 4, 0.9, 0.15
@@ -487,7 +488,8 @@ def _zones(
         errors = moved[1], float(curve.error[output])
         dof = float(curve.knots.min()) * float(free.mean())
         shape = fitted(moved[0][free], curve.curve[free, output], errors, stop, dof)
-        yield stop.clearance, shape
+        if shape.misfit < POOR * np.ptp(wave):
+            yield stop.clearance, shape
 
 
 def _tells(

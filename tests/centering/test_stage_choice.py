@@ -7,6 +7,8 @@ from dataclasses import replace
 import pytest
 
 from designer.catalog.catalog import load_catalog
+from designer.catalog.design_rule import Finding, judged
+from designer.catalog.design_rules import BY_ID
 from designer.centering import stage_choice
 from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast
 from designer.check import checked_design
@@ -78,12 +80,13 @@ def plain() -> Synthesis:
 
 def test_boards_decide_before_rules_and_rules_before_parts(plain: Synthesis) -> None:
     def told(kept: int | None, *failed: str) -> StageForecast:
-        return StageForecast(plain, kept, failed)
+        outcomes = tuple(judged(BY_ID[name], [Finding(1e9, "v1")]) for name in failed)
+        return StageForecast(replace(plain, outcomes=outcomes), kept)
 
-    assert told(BOARDS, "swing").better_than(told(BOARDS // 2))
-    assert not told(BOARDS // 2).better_than(told(BOARDS, "swing"))
-    assert told(BOARDS - 1).better_than(told(BOARDS, "swing"))  # one board is chance
-    assert told(None).better_than(told(None, "swing"))
+    assert told(BOARDS, "offset-force").better_than(told(BOARDS // 2))
+    assert not told(BOARDS // 2).better_than(told(BOARDS, "offset-force"))
+    assert told(BOARDS - 1).better_than(told(BOARDS, "offset-force"))  # one board is chance
+    assert told(None).better_than(told(None, "offset-force"))
     assert not told(BOARDS).better_than(told(BOARDS))
     assert chosen([told(10), told(60)]).stage_reason.startswith("rectifier: 60 of 64 boards")
 

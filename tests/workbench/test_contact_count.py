@@ -103,3 +103,16 @@ def test_the_stops_are_where_the_output_turns() -> None:
         assert curve.gains[side] == pytest.approx(off.gains[side], rel=0.01)
     inside = np.abs(moved) < 4.0
     assert np.abs(curve.excess(moved, output)[inside]).max() < 6.0 * ERROR
+
+
+def test_a_stop_that_a_shallow_contact_hardly_reaches_is_found() -> None:
+    """Where a scope's zero has moved it: the search went past the motion's reach and stayed there,
+    with a slope of the wrong sign."""
+    nominal = PredictedStop("A", "fv", {"v1": 1.0}, {1: 9.54}, (0.0, 0.0), {1: 6.07})
+    real = PredictedStop("A", "fv", {"v1": 1.0}, {1: 9.98}, (0.0, 0.0), {1: 5.83})
+    phase = 2.0 * np.pi * np.arange(1024) / 1024.0
+    moved = 2.4 + 8.0 * np.sin(phase) - 0.02 * np.sin(2.0 * phase)
+    curve = fitted(moved, real.output_of(moved), (1e-2, 1e-3), nominal, 64.0)
+    assert curve.ends[1] == pytest.approx(9.98, abs=1e-4)
+    assert curve.gains[1] == pytest.approx(5.83, rel=1e-3)
+    assert curve.misfit < 1e-3

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,8 +13,8 @@ from scipy.integrate import solve_ivp
 from benchmarks.exact_records import ExactRecord, drawn_records
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.force_balance import ForceBalance, _linear
+from designer.workbench.channel_roles import _recognised, recorded_motion
+from designer.workbench.force_balance import Balance, ForceBalance, _linear
 from designer.workbench.naming import named
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
@@ -109,6 +111,29 @@ def test_corners_without_noise_are_no_longer_period() -> None:
     assert truth.clean
     name = named(recorded_motion(truth.record, prediction(), told=truth.told), prediction())
     assert (name.response, name.sure) == (truth.response, True)
+
+
+def test_what_hardly_fits_is_not_taken_but_leaves_nothing_sure() -> None:
+    """Of three channels one way explains most, and misses the greatest misfit by a little; one that
+    explains less was then the only one, and sure."""
+
+    class Given:
+        """Two ways, whatever the channels are."""
+
+        def __init__(self, misfit: float) -> None:
+            self.misfit = misfit
+
+        def assignments(self, most: int) -> Iterator[Balance]:
+            assert most > 0
+            yield Balance(("fv", "v3", "v1"), self.misfit, 15.7, True, 193.4)
+            yield Balance(("fv", "vg", "v3"), 1.1, 11.3, True, 193.4)
+
+    shown = ["CH1", "CH2", "CH3"]
+    best, doubt, _ = _recognised(cast(ForceBalance, Given(5.2)), shown)
+    assert best.nets == ("fv", "vg", "v3")
+    assert "v3=CH2" in doubt
+    best, doubt, _ = _recognised(cast(ForceBalance, Given(50.0)), shown)
+    assert (best.nets, doubt) == (("fv", "vg", "v3"), "")
 
 
 def test_without_what_tells_the_drive_nothing_is_sure() -> None:

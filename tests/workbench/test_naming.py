@@ -128,9 +128,9 @@ def test_steps_of_a_converter_are_no_longer_period(
     points: int, periods: float, noise: float, subharmonic: float, n: str
 ) -> None:
     """The first was of 5 drive periods, and sure: a longer lap draws some of the rounding. Its
-    noise is too small to carry the signal from step to step, and the samples come nearly at the same
-    times of every third lap: 1 or 3 it may be. A line at half the frequency, of half a hundredth of
-    the peak, is a longer period."""
+    noise is too small to carry the signal from step to step, and the samples come nearly at the
+    same times of every third lap: 1 or 3 it may be. A line at half the frequency, of half a
+    hundredth of the peak, is a longer period."""
     record = corners(points, periods, noise, subharmonic)
     told = {"v1": "CH1", "fv": "CH2"}
     name = named(recorded_motion(record, prediction(), frequency=80.0, told=told), prediction())
