@@ -10,6 +10,7 @@ from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import Excitation
+from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.kernels.kernel_boards import POINTS
@@ -129,8 +130,12 @@ def waveform_error(waveform: Array, wanted: Array) -> float:
 
 def _nominal_displacement(plan: StudyPlan, question: Question) -> Array:
     """Empty where the nominal circuit has no answer; then no board has a waveform error."""
-    system = Ensemble(plan.nominal()).reduction(0).system()
+    reduction, orbit = Ensemble(plan.nominal()).reduction(0), question.start
     try:
-        return displacement(Flow(system, question.excitation.drive), question.start)
+        flow = Flow(reduction.system(), question.excitation.drive)
+        if orbit.start.shape != (flow.system.size,):  # op-amps that lag have states of their own
+            orbit = settle(flow, reduction.state(orbit.start))
+        periodic = orbit.status is OrbitStatus.PERIODIC
+        return displacement(flow, orbit) if periodic else np.zeros(0)
     except ArithmeticError:
         return np.zeros(0)

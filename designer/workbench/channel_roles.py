@@ -95,7 +95,7 @@ def recorded_motion(
         net_of = {channel: net for net, channel in told.items()}
         best, doubt, remedy = balance.balance([net_of[c] for c in shown]), "", ""
     else:
-        best, doubt, remedy = _recognised(balance, shown)
+        best, doubt, remedy = _recognised(balance, shown, prediction.generator)
         if best.nets == (prediction.generator,):
             found = f"{shown[0]}, a sine as the generator's"
             expected = f"a net of the board as well, or --channels, such as v1={shown[0]}"
@@ -120,13 +120,17 @@ def recorded_motion(
     return replace(motion, doubt=doubt, remedy=remedy)
 
 
-def _recognised(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, str, str]:
+def _recognised(
+    balance: ForceBalance, shown: Sequence[str], generator: str
+) -> tuple[Balance, str, str]:
     """The assignment that obeys the equations and explains most of the channels by each other, with
     what speaks against it; one of no nets where they leave it open, with the frequency of a channel
     that is a sine.
 
     It is sure where every other one explains clearly less: a channel that could be any net, for
-    nothing tests it or needs it, is one of which another assignment explains as much.
+    nothing tests it or needs it, is one of which another assignment explains as much. A channel
+    that is a sine is taken for the generator's where that fits, however much it explains as a
+    displacement: in a linear part of the board, far from the stops, that is one as well.
     """
     loose = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= LOOSE]
     loose.sort(key=lambda each: -each.told)
@@ -139,12 +143,31 @@ def _recognised(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, s
     example = _example(dict(zip(best.nets, shown, strict=True)))
     if len(shown) == 1:
         return best, "one channel alone may show another net", example
+    sine_as = _with_generator(balance, best, every, generator)
+    if sine_as is not None:
+        place = sine_as.nets.index(generator)
+        doubt = f"{shown[place]}, a sine as the generator's, may be {best.nets[place]} as well"
+        return sine_as, doubt, _example(dict(zip(sine_as.nets, shown, strict=True)))
     if others and best.told - others[0].told < CLEARER:
         if not best.whole:
             return _by_shapes(balance, shown)
         other = ", ".join(f"{net}={c}" for net, c in zip(others[0].nets, shown, strict=True))
         return best, f"its channels may be {other} as well", example
     return best, "", ""
+
+
+def _with_generator(
+    balance: ForceBalance, best: Balance, every: Sequence[Balance], generator: str
+) -> Balance | None:
+    """The same assignment with a channel that is a sine as the generator's, if it is among every
+    one that fits."""
+    for each in every:
+        differing = [k for k, net in enumerate(each.nets) if net != best.nets[k]]
+        if [each.nets[k] for k in differing] == [generator] and math.isfinite(
+            balance.sine_of_all(differing)
+        ):
+            return each
+    return None
 
 
 def _by_shapes(balance: ForceBalance, shown: Sequence[str]) -> tuple[Balance, str, str]:

@@ -398,6 +398,10 @@ def _without_period(
     elif left < SURELY:
         reason = f"what the best curve leaves over is {left:.2g} times the noise"
         remedy = "less noise, or a channel over more of its screen"
+    elif n := _hidden_period(samples, motion):
+        laps = f"laps of {n} drive periods" if n > 1 else "single drive periods"
+        reason = f"{laps} differ by no more than a curve through so few samples is off"
+        remedy = "more samples a drive period"
     else:
         reason, remedy = motion.doubt, motion.remedy
     return NamedMotion(
@@ -415,6 +419,23 @@ def _without_period(
         moving=moving,
         dead_zones={},
     )
+
+
+def _hidden_period(samples: Samples, motion: RecordedMotion) -> int:
+    """The least n whose laps differ by no more than a curve with as many knots is off a record that
+    is not laid on itself: at corners between few samples that is far more than the noise. 0 where
+    there is none."""
+    whole = int(motion.periods) + 2  # a period more, in which the curve closes
+    knots = _room(samples, whole, KNOTS[-1:])
+    alone = fold(samples, motion.frequency, whole, knots[0])
+    room = SURELY * np.maximum(alone.left, samples.noise)
+    for n in range(1, MAX_PERIOD + 1):
+        at = _at_period(samples, motion, knots, n).frequency
+        curve = fold(samples, at, n, knots[0])
+        between = _between_laps(samples, at, left_over(samples, at, curve), n)
+        if (np.minimum(curve.left, between) < room).all():
+            return n
+    return 0
 
 
 def _settles(samples: Samples, frequency: float) -> bool:
@@ -594,7 +615,9 @@ def _by_output(
     flat = output[np.abs(output - np.median(output)) < FLAT * np.ptp(output)]
     level = float(np.median(flat))
     ripple = float(np.median(np.abs(flat - level))) / NORMAL
-    error = math.hypot(noise, ripple) / abs(stop.gains[side])
+    # What leaks through an open stage is no contact, however fine the scope sees it.
+    corner = KINK * abs(stop.ends[side])
+    error = math.hypot(math.hypot(noise, ripple) / abs(stop.gains[side]), corner)
     depth = side * (output - level) / stop.gains[side]
     return ContactEvidence(None, math.inf, depth, error, error)
 

@@ -377,6 +377,7 @@ saturation = 13.0
 resistors = "E24"
 resistor_grade = 0.01
 capacitor_grade = 0.01
+dead_zone = "saturation"
 """
 )
 WITHOUT = ("place", "trim", "dead zone", "op-amp")

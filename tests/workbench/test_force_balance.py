@@ -129,11 +129,38 @@ def test_what_hardly_fits_is_not_taken_but_leaves_nothing_sure() -> None:
             yield Balance(("fv", "vg", "v3"), 1.1, 11.3, True, 193.4)
 
     shown = ["CH1", "CH2", "CH3"]
-    best, doubt, _ = _recognised(cast(ForceBalance, Given(5.2)), shown)
+    best, doubt, _ = _recognised(cast(ForceBalance, Given(5.2)), shown, "vg")
     assert best.nets == ("fv", "vg", "v3")
     assert "v3=CH2" in doubt
-    best, doubt, _ = _recognised(cast(ForceBalance, Given(50.0)), shown)
+    best, doubt, _ = _recognised(cast(ForceBalance, Given(50.0)), shown, "vg")
     assert (best.nets, doubt) == (("fv", "vg", "v3"), "")
+
+
+@pytest.mark.parametrize("third", [0.0, 0.15])
+def test_a_sine_that_could_be_a_displacement_is_the_generator_but_not_sure(third: float) -> None:
+    """As a displacement it was sure, for so it explained another channel as well; with a third
+    harmonic it cannot be the generator's."""
+
+    class Given(ForceBalance):
+        """Two ways, whatever the channels are."""
+
+        def assignments(self, most: int) -> Iterator[Balance]:
+            assert most > 0
+            yield Balance(("fv", "v3"), 0.7, 20.6, True, 83.1)
+            yield Balance(("fv", "vg"), 0.1, 12.4, False, 83.1)
+
+    time = np.linspace(0.0, 0.1, 4000)
+    angle = 2.0 * np.pi * 83.1 * time
+    wave = np.sin(angle) + third * np.sin(3.0 * angle)
+    values = np.column_stack([np.maximum(np.abs(wave) - 0.5, 0.0), wave])
+    balance = Given(prediction(), time, values, np.zeros(values.shape, dtype=bool))
+    best, doubt, remedy = _recognised(balance, ["CH1", "CH2"], "vg")
+    if third:
+        assert (best.nets, doubt, remedy) == (("fv", "v3"), "", "")
+    else:
+        assert best.nets == ("fv", "vg")
+        assert "CH2, a sine as the generator's, may be v3 as well" in doubt
+        assert "vg=CH2" in remedy
 
 
 def test_without_what_tells_the_drive_nothing_is_sure() -> None:

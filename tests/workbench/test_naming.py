@@ -139,6 +139,26 @@ def test_steps_of_a_converter_are_no_longer_period(
     assert not (name.sure and noise < 1e-3)
 
 
+@pytest.mark.parametrize("n", [5, 0])
+def test_corners_between_few_samples_are_not_surely_aperiodic(n: int) -> None:
+    """Straight lines between 11 corners a drive period, 60 samples, no noise. No curve follows the
+    corners, so laps of 5 drive periods left far more than noise, and that was surely aperiodic.
+    Corners that never come again, n = 0, are."""
+    frequency, periods, samples, rng = 80.0, 40, 60.37, np.random.default_rng(2)
+    place, laps = np.sort(rng.uniform(size=11)), np.arange(periods + 1)
+    height = 6.0 * np.sin(2.0 * np.pi * place) + rng.normal(size=(n or len(laps), 11))
+    cycles = 1.0 + np.arange(int((periods - 1) * samples)) / samples
+    corner = (laps[:, None] + place).ravel(), height[laps % len(height)].ravel()
+    record = Record(cycles / frequency, {"CH1": np.interp(cycles, *corner)}, "made")
+    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    # What is doubtful of its drive is left out here.
+    name = named(replace(motion, doubt="", remedy=""), prediction())
+    assert (name.response, name.sure) == ("aperiodic", not n)
+    if n:
+        assert f"laps of {n} drive periods" in name.reason
+        assert name.would_tell == "more samples a drive period"
+
+
 @pytest.mark.parametrize(
     ("told", "field", "found"),
     [
