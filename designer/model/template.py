@@ -186,11 +186,10 @@ expect = "1-1-1"
 
 """
     + _CIRCUIT.replace(
-        '"saturation"        # the stage that makes the clearance; or "rectifier"\n',
-        '"rectifier"         # makes any stops; "saturation": one clearance with equal ones\n',
+        "saturation = 13.0               # V; ", "# saturation = 13.0             # V; "
+    ).replace(
+        "where omega = 1 may lie", "where the first mass's own frequency may lie on the board"
     )
-    .replace("saturation = 13.0               # V; ", "# saturation = 13.0             # V; ")
-    .replace("where omega = 1 may lie", "where the first mass's own frequency may lie on the board")
 )
 """A file of format 2."""
 

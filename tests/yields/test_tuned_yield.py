@@ -51,12 +51,12 @@ def test_a_board_that_works_needs_nothing() -> None:
 
 
 def test_a_constant_force_is_cured_at_the_first_try() -> None:
-    """The board's only defect is a DC force of 4 % of the drive; the opposite one takes it away."""
+    """The board's only defect is a DC force of 5 % of the drive; the opposite one takes it away."""
     p = 7
     asked = question(p)
     gain = sum(1.0 / r.value for r in subject(p).circuit.resistors if "s2" in r.nets)
     lever = subject(p).circuit.values["R6"] * gain
-    ratio = 0.04
+    ratio = 0.05
     board = shifted(p, ratio * asked.excitation.amplitude / lever, "U2C")
     boards = ensemble([board], p)
     (lost,) = boards.settle([0], [asked.excitation.drive], asked.start.start[None, :])
