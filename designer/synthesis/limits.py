@@ -39,6 +39,8 @@ INVERTER_GAIN = 2.0
 """Noise gain of an inverter, which every circuit has."""
 VOLTAGES = ("swing_v", "guaranteed_swing_v", "rectifier_fv_v", "generator_peak_v")
 """Checks that smaller voltages bring inside their limits."""
+STEEP = 2.0
+"""Most that voltages are lowered by in one round: a limit that falls with the current may be 0."""
 MARGIN = 1e-3
 """How much further than the excess a limit is tightened."""
 
@@ -106,7 +108,7 @@ class ConditionLimits:
         for check in broken:
             by = check.excess * (1.0 + MARGIN)
             if check.quantity in VOLTAGES:
-                out = replace(out, swing=out.swing / by)
+                out = replace(out, swing=out.swing / min(by, STEEP))
             elif check.quantity == "signal_level_ratio":
                 out = replace(out, level=out.level / by)
             elif check.quantity == "signal_share_ratio":
