@@ -120,8 +120,10 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     if upgrades.opamp is not None:
         circuit["opamp"] = upgrades.opamp
         circuit.pop("saturation", None)
-    if upgrades.dead_zone is not None:
-        circuit["dead_zone"] = upgrades.dead_zone
+    # A stage that was chosen for the file is the one that is cured: it is not chosen again.
+    zone = upgrades.dead_zone or modelfile.circuit.dead_zone
+    if zone is not None:
+        circuit["dead_zone"] = zone
     if upgrades.reference is not None:
         circuit["reference"] = upgrades.reference
     for number, place in upgrades.places.items():

@@ -32,13 +32,15 @@ from designer.centering.cure_upgrade import (
     upgraded_file,
     with_same_parts,
 )
-from designer.check.synthesis_result import Synthesis
+from designer.check.synthesis_result import Synthesis, with_stage
+from designer.model.circuit_table import DeadZone
 from designer.model.model_file import parse_model_file
 from designer.spread.part_grades import bought
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
 from tests.shared import paper_cases
 from tests.shared.mechanism_file import HAMMER
+from tests.shared.model_text import SMALL
 
 CATALOG = load_catalog()
 
@@ -218,3 +220,12 @@ def test_a_folder_of_ones_own_replaces_single_prices(tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         load_catalog(tmp_path)
     assert refused.value.field == "price[1].price_class"
+
+
+@pytest.mark.parametrize("kind", ["saturation", "rectifier"])
+def test_a_stage_that_was_chosen_for_the_file_stays(kind: DeadZone) -> None:
+    """A file that states no stage is cured with the one that its design has."""
+    unstated = parse_model_file(SMALL + "[[response]]\nomega = 0.85\n")
+    assert unstated.circuit.dead_zone is None
+    cured = upgraded_file(with_stage(unstated, kind), Upgrades(opamp="OPA4192"))
+    assert (cured.circuit.opamp, cured.circuit.dead_zone) == ("OPA4192", kind)
