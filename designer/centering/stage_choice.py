@@ -65,7 +65,9 @@ class StageForecast:
     def words(self) -> str:
         """It in words."""
         boards = "" if self.kept is None else f"{self.kept} of {BOARDS} boards keep the responses, "
-        rules = f"{', '.join(self.failed)} fails" if self.failed else "no rule fails"
+        rules = "no rule fails"
+        if self.failed:
+            rules = f"{', '.join(self.failed)} {'fail' if len(self.failed) > 1 else 'fails'}"
         parts = len(self.synthesis.design.circuit.values)
         error = self.synthesis.design.errors.max_error
         return f"{self.kind}: {boards}{rules}, largest error {100 * error:.2g} %, {parts} parts"
@@ -86,9 +88,15 @@ class StageForecast:
         return bool(self.failed), design.errors.max_error > GOOD, len(design.circuit.values)
 
 
-def synthesise(modelfile: ModelFile, catalog: Catalog | None = None, *, jobs: int = 1) -> Synthesis:
-    """``check.synthesis_result.synthesise`` of all responses, with the better stage where the model
-    file states none and both make its clearances.
+def synthesise(
+    modelfile: ModelFile,
+    catalog: Catalog | None = None,
+    *,
+    all_found: bool = True,
+    jobs: int = 1,
+) -> Synthesis:
+    """``check.synthesis_result.synthesise``, with the better stage where the model file states none
+    and both make its clearances.
 
     Raises
     ------
@@ -101,14 +109,14 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None, *, jobs: in
         kind for kind in get_args(DeadZone) if stage_refusal(clearances, kind) is None
     ]
     if modelfile.circuit.dead_zone is not None or not clearances or len(able) < 2:
-        return synthesis_result.synthesise(modelfile, catalog, all_found=True)
+        return synthesis_result.synthesise(modelfile, catalog, all_found=all_found)
     forecasts: list[StageForecast] = []
     refusals: list[InputError] = []
     for kind in able:
         with part(f"with the {kind} stage"):
             try:
                 made = synthesis_result.synthesise(
-                    with_stage(modelfile, kind), catalog, all_found=True
+                    with_stage(modelfile, kind), catalog, all_found=all_found
                 )
                 forecasts.append(forecast(made, jobs))
             except Unreachable as error:

@@ -138,11 +138,13 @@ def simulate(
     rung: Rung = "ideal",
     starts: int = DRAWN_STARTS,
     seed: int = SEED,
+    choose: Callable[[ModelFile], Synthesis] = synthesise,
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
-    synthesis : of this model file; made where the engine needs one and None is given. traces :
+    synthesis : of this model file; made by ``choose`` where the engine needs one and None is given.
+    traces :
     keep the orbits and their mirror twins as traces too. rung : the op-amps' model in ngspice.
     starts, seed : of the initial states that are drawn to see which attractors coexist
     (``check.coexistence``); ngspice has none.
@@ -171,14 +173,14 @@ def simulate(
     if engine != "ngspice":
         one = partial(_on_model, modelfile, traces, sampling)
         if engine == "circuit":
-            synthesis = synthesis or synthesise(modelfile)
+            synthesis = synthesis or choose(modelfile)
             one = partial(_on_circuit, synthesis, bool(omegas), traces, sampling)
         engine_name = "model" if engine == "model" else "exact circuit"
         step = progress.stage(f"responses of the {engine_name}", len(specs))
         return tuple(_timed(step, one, spec) for spec in specs)
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
-        synthesis = synthesis or synthesise(modelfile)
+        synthesis = synthesis or choose(modelfile)
         return _in_ngspice(synthesis, specs, bool(omegas), pool, progress, traces, rung)
 
 

@@ -11,8 +11,9 @@ from designer.base.defaults import SAMPLES, SEED
 from designer.base.environment import spawn_context
 from designer.base.errors import InputError
 from designer.base.units import format_quantity
+from designer.centering import stage_choice
 from designer.check import checked_design
-from designer.check.synthesis_result import Synthesis, synthesise
+from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import settings
 from designer.dynamics.orbit import OrbitStatus
 from designer.explorer.place import ModelPlace
@@ -38,7 +39,9 @@ class PartsProcess:
 
     def __call__(self, modelfile: ModelFile) -> Synthesis:
         """``synthesise`` of the file, in that process."""
-        future: Future[Synthesis] = self._pool.submit(synthesise, modelfile)
+        future: Future[Synthesis] = self._pool.submit(
+            stage_choice.synthesise, modelfile, all_found=False
+        )
         return future.result()
 
     def close(self) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from designer.base.errors import DesignerError
 from designer.base.progress import Progress
+from designer.centering import stage_choice
 from designer.check import checked_design
-from designer.check.synthesis_result import synthesise
 from designer.dynamics.orbit import OrbitStatus
 from designer.explorer.wire import Message
 from designer.jobs.options import Options
@@ -60,7 +60,7 @@ def yields(modelfile: ModelFile, options: Options, progress: Progress) -> Record
 
 def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> RecordedYields:
     progress.stage("parts for the wanted responses")
-    synthesis = synthesise(modelfile)
+    synthesis = stage_choice.synthesise(modelfile, all_found=False, jobs=options.workers)
     design, responses = synthesis.design, synthesis.model_responses
     checked = checked_design.check(design, responses, None)
     asked = [each for each in checked if each.circuit.status is OrbitStatus.PERIODIC]

@@ -123,6 +123,7 @@ def simulate(
         rung=rung,
         starts=starts,
         seed=seed,
+        choose=_chosen,
     )
     settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
     origin = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
@@ -133,6 +134,13 @@ def simulate(
         units = units_of(modelfile.si, modelfile.model)
         answer["files"] = simulate_plots.write(Path(plots), names, simulated, overwrite, units)
     return SimulationResult(plain(answer), simulated)
+
+
+def _chosen(modelfile: ModelFile) -> Synthesis:
+    """Parts as ``synthesise`` chooses them, whatever the model shows."""
+    from designer.centering import stage_choice
+
+    return stage_choice.synthesise(modelfile, all_found=False)
 
 
 def _several(name: str, given: object, example: str) -> list[float | str]:

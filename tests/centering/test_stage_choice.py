@@ -15,6 +15,7 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.dynamics.counts import Counts
+from designer.jobs.simulate_job import simulate
 from designer.model.model_file import parse_model_file
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import Verdict
@@ -99,3 +100,19 @@ def test_a_response_that_the_nominal_circuit_does_not_show_is_kept_by_no_board(
     (response,) = plain.model_responses
     wanted = replace(response, spec=replace(response.spec, expect=Counts(5, ((2, 2),))))
     assert forecast(replace(plain, model_responses=(wanted,))).kept == 0
+
+
+def test_other_verbs_show_the_circuit_that_is_synthesised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``simulate`` on the circuit of a file without a stage has the stage that is chosen."""
+    asked: list[str] = []
+
+    def forecast_of(made: Synthesis, _jobs: int = 1) -> StageForecast:
+        asked.append(str(made.modelfile.circuit.dead_zone))
+        return StageForecast(made, BOARDS if asked[-1] == "rectifier" else 0)
+
+    monkeypatch.setattr(stage_choice, "forecast", forecast_of)
+    even = clearance("A", "a", "ground", upper=0.5, lower=0.5, stiffness=9.0)
+    text = system_text(*ONE, even, table("response", omega=1.3))
+    found = simulate(parse_model_file(text), engine="circuit", starts=1)
+    assert sorted(asked) == ["rectifier", "saturation"]
+    assert found.answer["responses"][0]["response"] == "1-1-1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from designer import InputError, parse_model_file, synthesise, tolerance
-from designer.check.synthesis_result import synthesise as choose
+from designer.centering.stage_choice import synthesise as choose
 from designer.explorer.board_box import PartsProcess, board_box, expected
 from designer.explorer.place import read_place
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE

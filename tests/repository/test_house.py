@@ -46,6 +46,7 @@ LAZY = {
         ("folders.json_answers", "circuit.design"),
         ("folders.json_answers", "model.mechanics"),
         ("folders.origin", "spice.batch_backend"),
+        ("jobs.simulate_job", "centering.stage_choice"),
         ("jobs.study_stage", "jobs.dask_runner"),
     },
 }
