@@ -36,6 +36,7 @@ from matplotlib.lines import Line2D
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.stranger_systems import Stranger, draw
 from designer.base.plain_json import dumps
+from designer.circuit.coefficients import LARGE_ERROR
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "strangers"
@@ -44,8 +45,6 @@ FILES = ("README.md", "strangers.json", "strangers.png", "strangers.svg")
 SEED, COUNT, SECONDS, BOARDS, SEARCHED = 1, 100, 120, 200, 60
 """Defaults: of the population; CPU seconds of ``synthesise``; boards; CPU seconds of the other
 search after a refusal."""
-GOOD = 0.01
-"""Largest coefficient error that counts as an answer."""
 SOON, LATE = 20.0, 60.0
 """CPU seconds in which 95 and 99 of 100 are to be answered."""
 GRACE = 5
@@ -179,7 +178,7 @@ def _json(text: str) -> dict[str, Any] | None:
 def _answer(answer: Mapping[str, Any]) -> dict[str, Any]:
     error, certificate = answer["max_error"], answer["certificate"]
     return {
-        "outcome": ANSWERED if error < GOOD else INEXACT,
+        "outcome": ANSWERED if error < LARGE_ERROR else INEXACT,
         "max_error": error,
         "worst": max(answer["errors"], key=lambda name: abs(answer["errors"][name])),
         "certificate": certificate["status"],
@@ -446,8 +445,10 @@ def picture(rows: Sequence[Row], seconds: float) -> Figure:
         )
     axes.set(xscale="log", yscale="log", xlabel="CPU seconds of synthesise")
     axes.set(ylabel="largest coefficient error", ylim=(NO_ERROR / 2, 2 * top))
-    axes.axhline(GOOD, color="0.6", lw=0.8)
-    axes.text(1.0, GOOD, "1 % ", ha="right", va="bottom", transform=axes.get_yaxis_transform())
+    axes.axhline(LARGE_ERROR, color="0.6", lw=0.8)
+    axes.text(
+        1.0, LARGE_ERROR, "1 % ", ha="right", va="bottom", transform=axes.get_yaxis_transform()
+    )
     axes.text(1.0, top / 2, "no circuit ", ha="right", transform=axes.get_yaxis_transform())
     for mark in (SOON, LATE):
         axes.axvline(mark, color="0.6", lw=0.8)

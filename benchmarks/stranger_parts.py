@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 
-from benchmarks.bench_strangers import GOOD
 from designer.base.arrays import Array
 from designer.catalog.catalog import load_catalog
 from designer.check.synthesis_result import with_stage
+from designer.circuit.coefficients import LARGE_ERROR
 from designer.linear_network.linear_terms import Shortfall
 from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile, read_model_file
@@ -58,7 +58,9 @@ def search(modelfile: ModelFile, seconds: float, seed: int = 1) -> dict[str, obj
                     break
                 attempt = choice.circuit_of(RoundedChoice(z, rounded, 0.0, 0.0, 0))
                 made += 1
-                if isinstance(attempt, Shortfall) or attempt.errors.max_error >= min(best, GOOD):
+                if isinstance(attempt, Shortfall) or attempt.errors.max_error >= min(
+                    best, LARGE_ERROR
+                ):
                     continue
                 design = verified(order, attempt, responses, order.spec.active_conditions)
                 if all(check.holds for check in design.checks):

@@ -137,7 +137,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
             check_board(modelfile, catalog, spec)
         except Unreachable as error:
             short.append(error)
-        if choice == DesignChoice.of(modelfile.circuit):
+        if choice == DesignChoice.of(modelfile):
             circuit = unit_circuit(modelfile.model, spec, catalog)
             check_names(modelfile, circuit, catalog)
     if len(short) == len(wanted):
@@ -169,7 +169,7 @@ class _Hunt:
     @property
     def _most_designs(self) -> int:
         """How many designs are made, at most, before real op-amps are asked."""
-        choice = DesignChoice.of(self.modelfile.circuit)
+        choice = DesignChoice.of(self.modelfile)
         every = topologies(self.modelfile, self.catalog)
         number = len(every) + (choice not in every)
         if any(open_in(spec) for spec in self.modelfile.responses):
@@ -211,7 +211,7 @@ class _Hunt:
 
     def _topology(self, middle: tuple[ModelResponse, ...]) -> tuple[Candidate | None, Candidate]:
         """The match design, if there is one, and the best of all op-amps and dead zones."""
-        file_choice = DesignChoice.of(self.modelfile.circuit)
+        file_choice = DesignChoice.of(self.modelfile)
         start: Candidate | None = None
         best: Candidate | None = None
         for choice in topologies(self.modelfile, self.catalog):

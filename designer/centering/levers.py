@@ -9,6 +9,7 @@ from typing import Any
 
 from designer.base.errors import InputError
 from designer.catalog.catalog import Catalog
+from designer.circuit.dead_zone_parts import stage_kind
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.model_file import ModelFile
 from designer.synthesis.limits import NO_AIMS, Aims
@@ -39,9 +40,11 @@ class DesignChoice:
     """What is aimed at inside the side conditions."""
 
     @classmethod
-    def of(cls, spec: CircuitSpec) -> DesignChoice:
-        """What the model file says."""
-        return cls(spec.opamp, spec.dead_zone or "saturation", spec.frequency)
+    def of(cls, modelfile: ModelFile) -> DesignChoice:
+        """What the model file says; a stage that it does not state is one that it can have."""
+        spec = modelfile.circuit
+        kind = stage_kind(spec, modelfile.model.second_order().clearances)
+        return cls(spec.opamp, kind, spec.frequency)
 
     def spec(self, base: CircuitSpec) -> CircuitSpec:
         """The table ``[circuit]`` of a design made so; the match decides over its parts."""
@@ -85,7 +88,7 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
     ------
     InputError : an op-amp that the catalogue does not have.
     """
-    file_choice, spec = DesignChoice.of(modelfile.circuit), modelfile.search
+    file_choice, spec = DesignChoice.of(modelfile), modelfile.search
     for name in spec.opamps:
         try:
             catalog.opamp(name, modelfile.circuit.supply)

@@ -8,6 +8,7 @@ the circuit, then the smaller one.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import get_args
@@ -18,6 +19,7 @@ from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.design_rule import FAIL
 from designer.check import checked_design, synthesis_result
 from designer.check.synthesis_result import Synthesis, with_stage
+from designer.circuit.coefficients import LARGE_ERROR
 from designer.circuit.ensemble import Ensemble
 from designer.design_rules import run_rules
 from designer.design_rules.subject import RuleSubject
@@ -35,8 +37,6 @@ BOARDS = 64
 """Boards of each stage that are asked."""
 STREAM = "stage:"
 """Stream of these boards, which no study draws."""
-GOOD = 0.01
-"""Largest coefficient error of a stage that is as good as another one."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class StageForecast:
     @property
     def _rank(self) -> tuple[bool, bool, int]:
         design = self.synthesis.design
-        return bool(self.failed), design.errors.max_error > GOOD, len(design.circuit.values)
+        return bool(self.failed), design.errors.max_error > LARGE_ERROR, len(design.circuit.values)
 
 
 def synthesise(
@@ -110,6 +110,7 @@ def synthesise(
     ]
     if modelfile.circuit.dead_zone is not None or not clearances or len(able) < 2:
         return synthesis_result.synthesise(modelfile, catalog, all_found=all_found)
+    began = time.perf_counter()
     forecasts: list[StageForecast] = []
     refusals: list[InputError] = []
     for kind in able:
@@ -123,7 +124,7 @@ def synthesise(
                 refusals.append(error)
     if not forecasts:
         raise refusals[0]
-    return chosen(forecasts)
+    return replace(chosen(forecasts), seconds=time.perf_counter() - began)
 
 
 def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:

@@ -19,6 +19,7 @@ from .build import (
 )
 from .coefficients import (
     EXACT as EXACT,
+    LARGE_ERROR as LARGE_ERROR,
     CoefficientErrors as CoefficientErrors,
     coefficient_errors as coefficient_errors,
 )

@@ -23,6 +23,8 @@ from designer.circuit.reduction import Reduction
 from designer.circuit.scale_fit import minimax
 from designer.model.mechanics import SecondOrderSystem, state_names
 
+LARGE_ERROR = 0.01
+"""A largest coefficient error above this is said first, and makes a stage worse than another."""
 EXACT = 1e-6
 """What a coefficient error means: one up to this is none ("exact"), two that differ by no more are
 equal, one this close to its lower bound is proved, a condition that costs less does not bind."""

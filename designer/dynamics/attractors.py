@@ -11,7 +11,7 @@ quasi-periodic, weakly chaotic, or not settled.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,6 +76,10 @@ ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
 
 
+Finder = Callable[[Flow, FlowResult], tuple[Orbit | None, int]]
+"""The orbit that a run has arrived at, if any, and the drive periods that finding it cost."""
+
+
 def settle(
     flow: Flow,
     x: Array,
@@ -117,15 +121,10 @@ def _arrive(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
     """What the start leads to, as far as chaos that is no transient."""
     spent = 0
     for stage, periods in enumerate(STAGES):
-        run = flow.run(x, periods, mode=mode)
-        spent += len(run.strobes) - 1
-        if run.status is not FlowStatus.DONE:
-            return _stopped(flow, run, spent, budget)
+        found, run, spent = _further(flow, x, mode, periods, spent, budget, _polish)
+        if found is not None:
+            return found
         x, mode = run.strobes[-1], run.mode
-        orbit, cost = _polish(flow, run)
-        spent += cost
-        if orbit is not None:
-            return replace(orbit, periods=spent)
         if stage >= 3:
             growth = lyapunov(flow, x, mode, FIRST)
             spent, x, mode = spent + FIRST, growth.start, growth.mode
@@ -139,15 +138,10 @@ def _arrive(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
             if orbit is not None:
                 return replace(orbit, periods=spent)
     for last in (False, True):
-        run = flow.run(x, LAST, mode=mode)
-        spent += len(run.strobes) - 1
-        if run.status is not FlowStatus.DONE:
-            return _stopped(flow, run, spent, budget)
+        found, run, spent = _further(flow, x, mode, LAST, spent, budget, _regular)
+        if found is not None:
+            return found
         x, mode = run.strobes[-1], run.mode
-        orbit, cost = _regular(flow, run)
-        spent += cost
-        if orbit is not None:
-            return replace(orbit, periods=spent)
         if not run.counts.any() and _decays(flow, mode):
             break
         if not last:  # a growth too small to be seen at once
@@ -160,6 +154,28 @@ def _arrive(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         "very slow, or of more than two frequencies"
     )
     return _unperiodic(OrbitStatus.NOT_SETTLED, growth, spent, why)
+
+
+def _further(
+    flow: Flow,
+    x: Array,
+    mode: ModeKey | None,
+    periods: int,
+    spent: int,
+    budget: Budget,
+    find: Finder,
+) -> tuple[Orbit | None, FlowResult, int]:
+    """More drive periods: what ends the search, if anything does, the run, and all that was spent.
+
+    find : looks for the orbit that the run has arrived at.
+    """
+    run = flow.run(x, periods, mode=mode)
+    spent += len(run.strobes) - 1
+    if run.status is not FlowStatus.DONE:
+        return _stopped(flow, run, spent, budget), run, spent
+    orbit, cost = find(flow, run)
+    spent += cost
+    return None if orbit is None else replace(orbit, periods=spent), run, spent
 
 
 def _stopped(flow: Flow, run: FlowResult, spent: int, budget: Budget) -> Orbit:
@@ -218,15 +234,11 @@ def _watched(flow: Flow, orbit: Orbit, periods: int, budget: Budget) -> Orbit | 
     has ended on, or not chaotic any more. The drive periods are those of the watch alone."""
     x, mode, spent = orbit.start, orbit.mode or None, 0
     while spent < periods:
-        run = flow.run(x, min(LOOK, periods - spent), mode=mode)
-        spent += len(run.strobes) - 1
-        if run.status is not FlowStatus.DONE:
-            return _stopped(flow, run, spent, budget)
-        x, mode = run.strobes[-1], run.mode
-        found, cost = _polish(flow, run)
-        spent += cost
+        length = min(LOOK, periods - spent)
+        found, run, spent = _further(flow, x, mode, length, spent, budget, _polish)
         if found is not None:
-            return replace(found, periods=spent)
+            return found
+        x, mode = run.strobes[-1], run.mode
     growth = lyapunov(flow, x, mode, min(FIRST, periods), FAINTEST)
     spent += BLOCK * len(growth.rates)
     if growth.sign > 0:

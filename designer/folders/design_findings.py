@@ -14,6 +14,7 @@ from designer.base.si_unit import drive_text
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
+from designer.circuit.coefficients import LARGE_ERROR
 from designer.design_rules import run_rules
 from designer.design_rules.subject import RuleSubject
 from designer.report import words
@@ -22,8 +23,6 @@ from designer.synthesis.parts_choice import ways_to_less_error
 
 FINDINGS = {"warnings", "failed_rules"}
 """The keys."""
-LARGE = 0.01
-"""A largest coefficient error above this is said first."""
 
 
 def findings(synthesis: Synthesis) -> dict[str, Any]:
@@ -52,15 +51,16 @@ def _error(synthesis: Synthesis) -> Iterator[str]:
     """A largest coefficient error that is too large, and what lowers it."""
     design, spec = synthesis.design, synthesis.modelfile.circuit
     worst = design.errors.max_error
-    if worst <= LARGE:
+    if worst <= LARGE_ERROR:
         return
     errors = design.errors.errors
     worst_name = max(errors, key=lambda each: abs(errors[each]))
     name = words.coefficient(worst_name, spring_of(design.model))
     text = (
-        f"The largest coefficient error is {words.error(worst)} ({name}), above {100 * LARGE:g} %."
+        f"The largest coefficient error is {words.error(worst)} ({name}), "
+        f"above {100 * LARGE_ERROR:g} %."
     )
-    if design.certificate.lower_bound > LARGE:
+    if design.certificate.lower_bound > LARGE_ERROR:
         least = words.error(design.certificate.lower_bound)
         text += f" No choice within the model file's limits has less than {least}."
     yield f"{text} What may lower it: {', '.join(ways_to_less_error(spec))}."

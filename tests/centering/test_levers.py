@@ -36,18 +36,27 @@ BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
 
 def test_the_file_s_own_choice_is_first() -> None:
     found = topologies(BOTH, catalog())
-    assert found[0] == DesignChoice.of(BOTH.circuit)
+    assert found[0] == DesignChoice.of(BOTH)
     assert [c.dead_zone for c in found] == ["saturation", "rectifier"]
     wider = replace(BOTH, search=replace(BOTH.search, opamps=("TL074H", "TL074C")))
     found = topologies(wider, catalog())
     assert len(found) == 4
-    assert found[0] == DesignChoice.of(BOTH.circuit)
+    assert found[0] == DesignChoice.of(BOTH)
 
 
 def test_a_dead_zone_that_cannot_make_the_clearances_is_no_choice() -> None:
     unequal = clearance("A", "m1", "ground", upper=0.5, lower=0.6, stiffness=5.0)
     asked = parse_model_file(chain_text(1, unequal, '[circuit]\ndead_zone = "rectifier"\n'))
     assert [c.dead_zone for c in topologies(asked, catalog())] == ["rectifier"]
+
+
+def test_a_stage_that_is_not_stated_is_one_that_the_search_can_begin_with() -> None:
+    for lower, kind in ((0.6, "rectifier"), (0.5, "saturation")):
+        stops = clearance("A", "m1", "ground", upper=0.5, lower=lower, stiffness=5.0)
+        asked = parse_model_file(chain_text(1, stops))
+        assert asked.circuit.dead_zone is None
+        assert DesignChoice.of(asked).dead_zone == kind
+        assert topologies(asked, catalog())[0].dead_zone == kind
 
 
 def test_an_unknown_op_amp_is_refused() -> None:
@@ -59,7 +68,7 @@ def test_an_unknown_op_amp_is_refused() -> None:
 
 @pytest.mark.parametrize("lever", LEVERS[2:])
 def test_a_variant_moves_one_lever(lever: str) -> None:
-    own = DesignChoice.of(BOTH.circuit)
+    own = DesignChoice.of(BOTH)
     found = list(variants(own, lever))
     assert found
     for other in found:
@@ -259,7 +268,7 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:
-    own = DesignChoice.of(BOTH.circuit)
+    own = DesignChoice.of(BOTH)
     low, high = own.frequency
     found = list(slower(own, high, low))
     for before, after in itertools.pairwise((high, *(c.frequency[1] for c in found))):

@@ -237,7 +237,7 @@ def test_forty_boards_of_each_response_confirm_even_where_some_have_no_answer() 
 def test_a_resolved_file_says_what_was_open() -> None:
     asked_file = parse_model_file(asked(OPEN, more=MORE))
     synthesis = made()
-    found = resolved(asked_file, synthesis, DesignChoice.of(asked_file.circuit), Path("model.toml"))
+    found = resolved(asked_file, synthesis, DesignChoice.of(asked_file), Path("model.toml"))
     (response,) = found.responses
     assert response.omega == synthesis.model_responses[0].omega
     assert response.b == synthesis.model_responses[0].b
