@@ -87,7 +87,17 @@ def runs(case: Case) -> tuple[FlowResult, FlowResult]:
     return got, want
 
 
+def at_rest_in_a_clearance(case: Case) -> bool:
+    """Whether a clearance's displacement turns at the very start, so that a tie decides."""
+    v = case.start[1::2]
+    return any(
+        abs(v[c.mass] - (0.0 if c.other is None else v[c.other])) < 1e-9
+        for c in case.system.clearances
+    )
+
+
 def compare(case: Case) -> None:
+    assume(not at_rest_in_a_clearance(case))
     got, want = runs(case)
     assert got.status is want.status is FlowStatus.DONE
     assume(want.tangencies == got.tangencies == 0)
