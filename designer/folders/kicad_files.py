@@ -106,6 +106,8 @@ def _untouched(folder: Folder, ending: str) -> str | None:
     name = next((n for n in listed if n.startswith(FOLDER) and n.endswith(ending)), None)
     if name is None:
         return None
-    path = folder / name
-    same = path.is_file() and file_hash(name, path.read_bytes()) == listed[name][1]
-    return name if same else None
+    path, digest = folder / name, listed[name][1]
+    if not path.is_file():
+        return None
+    # No digest: the tool was about to write it anew and was killed.
+    return name if digest in (None, file_hash(name, path.read_bytes())) else None

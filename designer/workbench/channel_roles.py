@@ -9,7 +9,7 @@ phase.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from designer.workbench.drive_estimate import (
 from designer.workbench.folding import POINTS, Samples, best_knots, fold, samples_of
 from designer.workbench.force_balance import Balance, ForceBalance
 from designer.workbench.prediction import (
+    LEVEL,
     POINTS as WAVE_POINTS,
     SAME_FREQUENCY,
     BoardPrediction,
@@ -96,10 +97,7 @@ def recorded_motion(
         best, doubt, remedy = balance.balance([net_of[c] for c in shown]), "", ""
     else:
         best, doubt, remedy = _recognised(balance, shown, prediction.generator)
-        if best.nets == (prediction.generator,):
-            found = f"{shown[0]}, a sine as the generator's"
-            expected = f"a net of the board as well, or --channels, such as v1={shown[0]}"
-            raise InputError(record.source, "its channels", found, expected)
+        _not_alone(record, best.nets, shown[0], prediction)
     nets = dict(told) if told else dict(zip(best.nets, shown, strict=False))
     drive = best.frequency
     if best.misfit > LOOSE and prediction.generator not in nets:
@@ -114,10 +112,25 @@ def recorded_motion(
     samples = samples_of(record, shown, drive)
     if not nets:
         nets = _found(record, samples, shown, drive, prediction)
+        _not_alone(record, nets, shown[0], prediction)
         doubt = doubt or "its channels were recognised by their shapes alone"
         remedy = remedy or _example(nets)
+    if not told and not doubt and (other := _cut_as_an_output(record, nets, prediction)):
+        channel, output = other
+        doubt = f"{channel}, which is cut off where {output} rests, may be {output}"
+        remedy = _example({**{n: c for n, c in nets.items() if c != channel}, output: channel})
     motion = _motion(record, samples, shown, nets, prediction.generator, drive)
     return replace(motion, doubt=doubt, remedy=remedy)
+
+
+def _not_alone(
+    record: Record, nets: Iterable[str], channel: str, prediction: BoardPrediction
+) -> None:
+    """InputError for a record that shows nothing but the generator."""
+    if tuple(nets) == (prediction.generator,):
+        found = f"{channel}, which is like the generator"
+        expected = f"a net of the board as well, or --channels, such as v1={channel}"
+        raise InputError(record.source, "its channels", found, expected)
 
 
 def _recognised(
@@ -154,6 +167,21 @@ def _recognised(
         other = ", ".join(f"{net}={c}" for net, c in zip(others[0].nets, shown, strict=True))
         return best, f"its channels may be {other} as well", example
     return best, "", ""
+
+
+def _cut_as_an_output(
+    record: Record, nets: Mapping[str, str], prediction: BoardPrediction
+) -> tuple[str, str] | None:
+    """A channel taken for a displacement that is cut off where a dead zone's output that was not
+    recognised rests inside its clearance, and that output: in contact it follows the displacement.
+    """
+    for net, channel in nets.items():
+        room = LEVEL * record.span[channel]
+        for stop in prediction.stops:
+            near = any(abs(end - stop.inside[0]) <= room for end in record.limits[channel])
+            if near and stop.output not in nets and net in stop.displacement:
+                return channel, stop.output
+    return None
 
 
 def _with_generator(

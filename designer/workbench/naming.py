@@ -65,8 +65,9 @@ SCOPE_GAIN = 0.03
 KINK = 5e-4
 """Of the peak: the least error of a threshold that is a corner only on paper, and of a curve
 through such corners."""
-FLAT = 0.15
-"""Of the output's range: how far from its median it is still inside the clearance."""
+FLAT, FEWEST_FLAT = 0.15, 0.1
+"""Of the output's range: how far from its level it is still inside the clearance; and share of a
+lap that it is there at least."""
 CORNER, BEYOND = 0.03, 0.1
 """Of a channel that is cut off: how far from there its curve is round, of its range; and how far
 beyond a stop it has to reach, of the stop."""
@@ -607,12 +608,14 @@ def _by_output(
     curve: Fold, nets: Sequence[str], stop: PredictedStop, side: int
 ) -> ContactEvidence | None:
     """By the output of the dead zone alone: what it shows beyond its level inside the clearance,
-    where it stays about half of the time, and beyond what it varies there."""
+    and beyond what it varies there. None where it does not stay near that level."""
     if stop.output not in nets:
         return None
     place = nets.index(stop.output)
     output, noise = curve.curve[:, place], float(curve.error[place])
-    flat = output[np.abs(output - np.median(output)) < FLAT * np.ptp(output)]
+    flat = output[np.abs(output - stop.inside[0]) < FLAT * np.ptp(output)]
+    if len(flat) < FEWEST_FLAT * len(output):
+        return None
     level = float(np.median(flat))
     ripple = float(np.median(np.abs(flat - level))) / NORMAL
     # What leaks through an open stage is no contact, however fine the scope sees it.

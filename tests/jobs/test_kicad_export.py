@@ -272,6 +272,18 @@ def test_the_sheet_takes_the_gate_s_settings_unless_somebody_changed_it(
     assert sheet.read_text() == "first at the gate"
     assert net.read_text() == "net"
     assert Folder(folder.path).changed("kicad") is None
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    sheet_before, texts["kicad/a.kicad_sch"] = sheet.read_text(), "second"
+    monkeypatch.setattr(folder, "write", killed)
+    with pytest.raises(KeyboardInterrupt):
+        kicad_files.settle(folder, made, None)  # type: ignore[arg-type]
+    assert sheet.read_text() == sheet_before
+    folder = Folder(folder.path)
+    kicad_files.settle(folder, made, None)  # type: ignore[arg-type]
+    assert sheet.read_text() == "second at the gate"
     sheet.write_text("by hand")
     kicad_files.settle(folder, made, None)  # type: ignore[arg-type]
     assert sheet.read_text() == "by hand"

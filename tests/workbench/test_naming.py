@@ -180,6 +180,14 @@ def test_what_cannot_be_is_refused(told: dict[str, str], field: str, found: str)
     assert found in str(error.value)
 
 
+def test_one_channel_that_is_like_the_generator_is_refused() -> None:
+    """``v1``, cut off at 0, is: nothing was left to be named."""
+    truth = stored(3)
+    alone = {"CH1": np.maximum(truth.record.signals["CH1"], 0.0)}
+    with pytest.raises(InputError, match="--channels, such as v1=CH1"):
+        recorded_motion(Record(truth.record.time, alone, "made"), prediction())
+
+
 def test_channels_that_look_like_nothing_are_asked_for() -> None:
     truth, rng = stored(2), np.random.default_rng(9)
     time = truth.record.time
