@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.centering.cure_result_json import words
 from designer.centering.cure_trial import Cure, Trial
+from designer.model.model_file import ModelFile
 
 MEASURED, PREDICTED = "#0072b2", "#e69f00"
 FAR = 2.0
@@ -50,7 +51,7 @@ def front_chart(cure: Cure) -> Figure:
     top.set_title(f"{cure.base.modelfile.title}: yield {over}", loc="left")
     top.grid(color=GRID, lw=0.7)
     top.legend(loc="lower right")
-    _listed(bottom, front)
+    _listed(bottom, front, cure.base.modelfile)
     return figure
 
 
@@ -83,11 +84,11 @@ def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[floa
     return min(*lowest, 100.0 * cure.target - 1.0)
 
 
-def _listed(axes: Axes, front: Sequence[Trial]) -> None:
+def _listed(axes: Axes, front: Sequence[Trial], file: ModelFile) -> None:
     """What each number stands for."""
     axes.set_axis_off()
     for number, t in enumerate(front):
-        text = "; ".join(words(t.upgrades)) or "as it is"
+        text = "; ".join(words(t.upgrades, file)) or "as it is"
         text = text if len(text) <= MOST_WORDS else text[: MOST_WORDS - 1] + "…"
         axes.text(
             0.0, 1.0 - (number + 0.5) / max(len(front), 1), f"{number}  {t.price:.2f} euro: {text}",

@@ -9,16 +9,19 @@ from designer.base.csv_tables import csv_text
 from designer.base.plain_json import FORMAT
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
+from designer.model.model_file import ModelFile
+from designer.model.si_units import hertz_json
 
 COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
 
 
 def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
     """Everything that was found. Prices are over the design as it is, in euro."""
-    best = cure.best
+    best, file = cure.best, cure.base.modelfile
     responses = [
         {
             "omega": r.omega,
+            **hertz_json(r.omega, file.si),
             "b": r.b,
             "expected": r.expected,
             "before": before.as_dict(),
@@ -39,18 +42,21 @@ def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict
         "price": best.price,
         "branch": best.branch,
         "upgrades": best.upgrades.as_dict(),
-        "said": words(best.upgrades),
+        "said": words(best.upgrades, file),
         "responses": responses,
-        "rounds": [_trial(t) for t in cure.rounds],
-        "front": [_trial(t) for t in cure.front],
-        "refused": [{"upgrades": words(r.upgrades), "why": r.why} for r in cure.refused],
+        "rounds": [_trial(t, file) for t in cure.rounds],
+        "front": [_trial(t, file) for t in cure.front],
+        "refused": [{"upgrades": words(r.upgrades, file), "why": r.why} for r in cure.refused],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
 
 
-def words(upgrades: Upgrades) -> list[str]:
-    """Each upgrade in a few words, the same grade of several parts together."""
+def words(upgrades: Upgrades, file: ModelFile) -> list[str]:
+    """Each upgrade in a few words, the same grade of several parts together.
+
+    file : the model file that is cured.
+    """
     phrases = []
     if upgrades.opamp is not None:
         phrases.append(f"op-amp {upgrades.opamp}")
@@ -63,7 +69,7 @@ def words(upgrades: Upgrades) -> list[str]:
         phrases.append(f"{100.0 * grade:g} % {' '.join(names)}")
     phrases += [f"array {n.family} for {' '.join(n.parts)}" for n in upgrades.networks]
     for number, place in sorted(upgrades.places.items()):
-        phrases.append(f"response {number + 1} at ω = {place.omega:g}, b = {place.b:g}")
+        phrases.append(f"response {number + 1} at {file.drive_text(place.omega)}, b = {place.b:g}")
     if upgrades.trimmer:
         phrases.append("trimmer fitted, set once on each board")
     if upgrades.trim is not None:
@@ -84,18 +90,18 @@ def front_csv(cure: Cure) -> str:
                 "low": f"{low:.5g}",
                 "high": f"{high:.5g}",
                 "samples": str(t.worst.counts.samples),
-                "upgrades": "; ".join(words(t.upgrades)),
+                "upgrades": "; ".join(words(t.upgrades, cure.base.modelfile)),
                 "failed": str(t.worst.counts.failed),
             }
         )
     return csv_text(COLUMNS, rows)
 
 
-def _trial(t: Trial) -> dict[str, Any]:
+def _trial(t: Trial, file: ModelFile) -> dict[str, Any]:
     return {
         "branch": t.branch,
         "price": t.price,
-        "said": words(t.upgrades),
+        "said": words(t.upgrades, file),
         "upgrades": t.upgrades.as_dict(),
         "predicted": list(t.predicted),
         "measured": [m.as_dict() for m in t.measured],

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from designer.base.si_unit import drive_text
+
 
 def text(answer: Mapping[str, Any]) -> str:
     """The answer, yields before and after, rounds and the front, as lines of text.
@@ -41,7 +43,8 @@ def text(answer: Mapping[str, Any]) -> str:
 def _responses(answer: Mapping[str, Any]) -> list[str]:
     out = []
     for r in answer["responses"]:
-        name = f"ω = {r['omega']:g} {r['expected'] or ''}".strip()
+        place = drive_text(r["omega"], r.get("frequency_hz"))
+        name = f"{place} {r['expected'] or ''}".strip()
         out.append(f"{name:<19} {_yield(r['before']):<23} {_yield(r['after'])}")
         if r["limit"]:
             out.append(f"    {r['limit']}")

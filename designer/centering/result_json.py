@@ -14,6 +14,8 @@ from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import RUNG, STRETCH
+from designer.model.model import SiScales
+from designer.model.si_units import mechanism_json
 from designer.verdicts.cross_check import CrossCheck
 from designer.verdicts.verdict import Answer, Verdict
 
@@ -22,6 +24,7 @@ Rank = tuple[float, float] | None
 
 def search_json(result: SearchResult) -> dict[str, Any]:
     """``search.json``: the levers, what each contributed, what was tried, what is predicted."""
+    si = result.synthesis.modelfile.si
     return {
         "format": 1,
         "seed": result.seed,
@@ -32,8 +35,8 @@ def search_json(result: SearchResult) -> dict[str, Any]:
         "places_tried": result.places,
         "objective": _rank(result.final.rank),
         "choice": _choice(result.final.choice),
-        "start": None if result.start is None else _candidate(result.start),
-        "final": _candidate(result.final),
+        "start": None if result.start is None else _candidate(result.start, si),
+        "final": _candidate(result.final, si),
         "steps": [
             {
                 "lever": s.lever,
@@ -125,7 +128,7 @@ def _choice(choice: DesignChoice) -> dict[str, Any]:
     }
 
 
-def _candidate(candidate: Candidate) -> dict[str, Any]:
+def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
     return {
         "max_error": candidate.design.errors.max_error,
         "threshold_v": candidate.design.errors.scales.threshold,
@@ -133,6 +136,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "responses": [
             {
                 "omega": r.omega,
+                **mechanism_json(r.omega, si),
                 "b": r.b,
                 "expected": r.expected,
                 "distance": s.distance if math.isfinite(s.distance) else None,

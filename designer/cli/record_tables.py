@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from designer.cli.console import say, table
-from designer.cli.tables import YES_NO
+from designer.cli.tables import YES_NO, drive_cells
 
 
 def benched(answer: Mapping[str, Any]) -> None:
@@ -17,8 +17,8 @@ def benched(answer: Mapping[str, Any]) -> None:
         (
             {
                 "record": r["file"],
-                "ω": f"{r['omega']:.4g}",
-                "drive": f"{r['frequency_hz']:.5g} Hz",
+                **drive_cells(r, rows),
+                "generator": f"{r['frequency_hz']:.5g} Hz",
                 "shows": r["response"],
                 "sure": YES_NO[r["sure"]],
                 "wanted there": r["wanted"] or "-",
@@ -63,7 +63,7 @@ def _fitted(board: Mapping[str, Any]) -> None:
     advised = (
         {
             "wanted": a["expected"],
-            "ω": f"{a['omega']:.4g}",
+            **drive_cells(a, board["advice"]),
             "shows as set": next(iter(a["shown"])),
             "advice": a["words"],
             "then, % of boards": f"{100 * a['share']:.0f}",

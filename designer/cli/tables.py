@@ -210,7 +210,7 @@ def searched(answer: Mapping[str, Any]) -> None:
         (
             {
                 "response": name,
-                "ω": f"{place['omega']:.5g}",
+                **drive_cells(place, search["final"]["responses"]),
                 "b": f"{place['b']:.4g}",
                 "distance": _sigmas(place["distance"]),
                 "predicted": f"{place['predicted_yield']:.4f}",
@@ -342,12 +342,19 @@ def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
 def response_cells(
     row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz"
 ) -> dict[str, str]:
-    """The first cells of a response: its frequency and the wanted n-p-q; ω not where it is in
-    rad/s. key : of the mechanism's frequency."""
+    """The first cells of a response: its frequency and the wanted n-p-q. key : of the mechanism's
+    frequency."""
+    return {**drive_cells(row, rows, key), "expected": row["expected"] or "-"}
+
+
+def drive_cells(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "mechanism_hz"
+) -> dict[str, str]:
+    """The frequency of one of these rows; ω not where it is in rad/s. key : as above."""
     mechanism = _mechanism(row, rows, key)
     if mechanism and all(is_angular(r["omega"], r[key]) for r in rows):
-        return {**mechanism, "expected": row["expected"] or "-"}
-    return {"ω": f"{row['omega']:g}", **mechanism, "expected": row["expected"] or "-"}
+        return mechanism
+    return {"ω": f"{row['omega']:g}", **mechanism}
 
 
 def _head(row: Mapping[str, Any]) -> str:

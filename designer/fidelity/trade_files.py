@@ -23,10 +23,13 @@ from designer.base.figure_style import (
 )
 from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table, table_of
 from designer.base.plain_json import FORMAT, plain
+from designer.base.si_unit import drive_text
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import RUNGS, VENDOR
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
+from designer.model.model import SiScales
+from designer.model.si_units import hertz_json
 
 NONE = "–"
 UNITS = (
@@ -59,9 +62,16 @@ _LOOKS = {
 
 
 def trade_json(
-    result: Trade, provenance: Mapping[str, Any], seconds: float, title: str
+    result: Trade,
+    provenance: Mapping[str, Any],
+    seconds: float,
+    title: str,
+    si: SiScales | None = None,
 ) -> dict[str, Any]:
-    """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``."""
+    """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``.
+
+    si : each row of a response also gets ``frequency_hz``, of the mechanism's force.
+    """
     boards = [r.boards for r in result.responses]
     document = {
         "format": FORMAT,
@@ -76,6 +86,9 @@ def trade_json(
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
+    of_a_response = (row for rows in document.values() if isinstance(rows, list) for row in rows)
+    for row in of_a_response:
+        row |= hertz_json(row["omega"], None if row["omega"] is None else si)
     return dict(plain(document))
 
 
@@ -155,7 +168,7 @@ def _cheapest(c: Cheapest) -> dict[str, Any]:
 
 def name(row: Mapping[str, Any]) -> str:
     """A response as people are told of it: its number, ω and b."""
-    return f"{row['number']}: ω = {row['omega']:g}, b = {row['b']:g}"
+    return f"{row['number']}: {drive_text(row['omega'], row.get('frequency_hz'))}, b = {row['b']:g}"
 
 
 def sheet(answer: Mapping[str, Any]) -> str:

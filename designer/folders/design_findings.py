@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from designer.base.errors import InputError
-from designer.base.si_unit import drive_text
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
@@ -68,13 +67,12 @@ def _error(synthesis: Synthesis) -> Iterator[str]:
 
 def _responses(synthesis: Synthesis) -> Iterator[str]:
     """Wanted responses that the model shows and the nominal circuit does not."""
-    found, si = synthesis.model_responses, synthesis.modelfile.si
+    found, file = synthesis.model_responses, synthesis.modelfile
     for checked in checked_design.check(synthesis.design, found, None):
         wanted = checked.model
         if wanted.found and not checked.agrees:
-            at = drive_text(wanted.omega, None if si is None else si.hertz(wanted.omega))
             name = wanted.expected or wanted.orbit.response
-            shown = words.orbit(checked.circuit)
+            at, shown = file.drive_text(wanted.omega), words.orbit(checked.circuit)
             yield f"The nominal circuit does not show {name} at {at}: it shows {shown}."
 
 

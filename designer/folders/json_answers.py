@@ -39,6 +39,7 @@ def synthesis_json(
     out where there are none.
     """
     from designer.circuit.design import settings
+    from designer.model.si_units import mechanism_json
 
     errors, circuit = design.errors, design.circuit
     return {
@@ -67,7 +68,7 @@ def synthesis_json(
             {
                 "omega": s.omega,
                 "frequency_hz": s.frequency_hz,
-                **_mechanism(s.omega, modelfile.si),
+                **mechanism_json(s.omega, modelfile.si),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
                 "expected": r.expected,
@@ -86,11 +87,6 @@ def synthesis_json(
 
 def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, float]]:
     return {name: {"asked": g.wanted, "bought": g.bought} for name, g in better.items()}
-
-
-def _mechanism(omega: float, si: SiScales | None) -> dict[str, float]:
-    """What a generator's frequency stands for in the mechanism, Hz."""
-    return {} if si is None else {"mechanism_hz": si.hertz(omega)}
 
 
 def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
@@ -120,6 +116,8 @@ def simulate_json(
     si: SiScales | None = None,
 ) -> dict[str, Any]:
     """What ``simulate`` prints; with ``si`` also what that is in SI units."""
+    from designer.model.si_units import hertz_json
+
     masses = simulated[0].masses if simulated else ()
     return {
         "format": FORMAT,
@@ -183,11 +181,6 @@ def _by_state(values: Array) -> dict[str, Any]:
     from designer.model.mechanics import state_names
 
     return dict(zip(state_names(len(values) // 2), values, strict=True))
-
-
-def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
-    """The frequency of a mechanism's force in Hz; nothing of a dimensionless model."""
-    return {} if si is None else {"frequency_hz": si.hertz(omega)}
 
 
 def _frequencies_hz(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:

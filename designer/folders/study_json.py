@@ -10,8 +10,8 @@ import numpy as np
 
 from designer.base.plain_json import FORMAT
 from designer.check.checked_design import CheckedResponse
-from designer.folders.json_answers import hertz_json
 from designer.model.model import SiScales
+from designer.model.si_units import hertz_json
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
 from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict

@@ -9,6 +9,7 @@ from typing import Any
 
 from designer.base.keyed_store import Vouch, nobody
 from designer.folders.study_cache import StudyCache
+from designer.model.model_file import ModelFile
 from designer.verdicts.verdict import StudyPlan
 from designer.yields.blame_analysis import Blame
 from designer.yields.layers import LAYERS, LayerName
@@ -120,7 +121,7 @@ class _FolderPieces(StoredParts):
             self._file.put_all(values, self._key)
 
 
-def map_files(study: Study, provenance: Mapping[str, Any]) -> dict[str, bytes]:
+def map_files(study: Study, file: ModelFile, provenance: Mapping[str, Any]) -> dict[str, bytes]:
     """``maps.json`` and a picture of each map, by name; none where there are no maps. Times are in
     ``tolerance.json``."""
     if not study.maps:
@@ -128,7 +129,8 @@ def map_files(study: Study, provenance: Mapping[str, Any]) -> dict[str, bytes]:
     from designer.plots.map_plots import map_files as files  # Matplotlib takes a while to import
 
     labels = [
-        f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
+        f"{file.drive_text(q.omega)} {q.spec.expect or q.start.response}"
+        for q in study.plan.questions
     ]
     timeless = [replace(each, seconds=0.0) for each in study.maps]
-    return files(timeless, labels, {"provenance": provenance})
+    return files(timeless, labels, {"provenance": provenance}, angular=file.angular)

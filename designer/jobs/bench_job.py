@@ -21,6 +21,8 @@ from designer.circuit.design import GeneratorSetting
 from designer.folders.design_source import read_design
 from designer.folders.origin import provenance
 from designer.folders.report_sections import BENCHED as NAME, design_hash, renew_report
+from designer.model.model import SiScales
+from designer.model.si_units import mechanism_json
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.workbench.advice import Advice
@@ -190,7 +192,7 @@ def bench(
     common = {
         "format": 1,
         "title": synthesis.modelfile.title,
-        "boards": [board.as_dict() for board in fitted.values()],
+        "boards": [board.as_dict(synthesis.modelfile.si) for board in fitted.values()],
         "spread": [k.as_dict() for k in estimated_spread([*fits.values()])]
         if boards and fits
         else [],
@@ -202,7 +204,9 @@ def bench(
     def result(records: Sequence[BenchedRecord]) -> BenchAnswer:
         answer = {
             **common,
-            "records": [_record_json(each, scales.seconds) for each in records],
+            "records": [
+                _record_json(each, scales.seconds, synthesis.modelfile.si) for each in records
+            ],
             "cost": {"seconds": time.perf_counter() - began},
         }
         return BenchAnswer(plain(answer), tuple(records), tuple(fitted.values()))
@@ -363,18 +367,20 @@ def _setting(frequency: float, prediction: BoardPrediction) -> GeneratorSetting 
     return setting if gap < NEAR else None
 
 
-def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
+def _record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> dict[str, Any]:
     """seconds : of the circuit for a unit of the model's time."""
     name, motion = benched.named, benched.named.motion
     record, overlay, setting = motion.record, benched.overlay, benched.setting
     wave = None if overlay is None else overlay.ngspice
+    omega = 2.0 * math.pi * motion.frequency * seconds
     return {
         "file": benched.path.name,
         "kind": record.kind,
         "samples": len(record.time),
         "periods": motion.periods,
         "channels": dict(motion.channels),
-        "omega": 2.0 * math.pi * motion.frequency * seconds,
+        "omega": omega,
+        **mechanism_json(omega, si),
         "frequency": motion.frequency,
         "frequency_hz": motion.frequency,
         "frequency_error_hz": motion.frequency_error,
@@ -416,7 +422,7 @@ def _record_json(benched: BenchedRecord, seconds: float) -> dict[str, Any]:
             "difference": dict(wave.errors),
         },
         "fitted": None if benched.board is None else [f.as_dict() for f in benched.board.figures],
-        "advice": None if benched.advice is None else benched.advice.as_dict(),
+        "advice": None if benched.advice is None else benched.advice.as_dict(si),
     }
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from designer.base.design_folder import Folder
 from designer.base.guarded_reading import reading
 from designer.base.progress import Progress
+from designer.base.si_unit import drive_text
 from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
@@ -159,4 +160,4 @@ def _warning(trade: Mapping[str, Any], decides: str) -> str:
 
 def _response(row: Mapping[str, Any]) -> str:
     b = f", b = {row['b']:g}" if "b" in row else ""  # earlier trades have no b
-    return f"ω = {row['omega']:g}{b}"
+    return f"{drive_text(row['omega'], row.get('frequency_hz'))}{b}"

@@ -202,7 +202,7 @@ class StudyStage:
         guard()
         cache.forget_unused()
         result = result_of(study)
-        for name, content in map_files(study, result.provenance).items():
+        for name, content in map_files(study, result.modelfile, result.provenance).items():
             folder.write(place.prefix + name, content)
         self._write(result)
         assert folder.manifest is not None

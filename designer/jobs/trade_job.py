@@ -282,13 +282,14 @@ def _document(
     measured = measure(
         synthesis, extent, pieces, seed=options.seed, jobs=options.workers, progress=progress
     )
+    file = synthesis.modelfile
     origin = provenance(
-        synthesis.modelfile,
+        file,
         synthesis.catalog.hash,
         seed=options.seed,
         settings={"trade": asdict(extent)},
     )
-    return trade_json(measured, origin, pieces.seconds, synthesis.modelfile.title)
+    return trade_json(measured, origin, pieces.seconds, file.title, file.si)
 
 
 def _write(folder: Folder, document: dict[str, Any]) -> None:

@@ -104,7 +104,9 @@ from .si_units import (
     NO_UNITS as NO_UNITS,
     Reader as Reader,
     angular_frequency as angular_frequency,
+    hertz_json as hertz_json,
     in_si as in_si,
+    mechanism_json as mechanism_json,
     units_of as units_of,
 )
 from .spread_table import (

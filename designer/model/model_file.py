@@ -30,6 +30,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
 from designer.base.json_schema import DIALECT, either, of_tables
 from designer.base.schema import FileTable, checked, line, such, whole_number
+from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
@@ -46,6 +47,7 @@ from designer.model.possible_counts import check_possible
 from designer.model.response_table import Response, ResponseTable
 from designer.model.rules_table import overrides
 from designer.model.search_table import SearchSpec
+from designer.model.si_units import in_si
 from designer.model.spread_table import BENCH_1, SpreadSpec
 from designer.model.tuning_bands import Bands
 
@@ -91,6 +93,15 @@ class ModelFile:
     def sha256(self) -> str:
         """Hash of the text: two files with the same hash ask for the same thing."""
         return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+
+    @property
+    def angular(self) -> bool:
+        """Whether ω is in rad/s, so that people are shown hertz."""
+        return in_si(self.si, self.model)
+
+    def drive_text(self, omega: float) -> str:
+        """A drive frequency for people: "36 Hz" where ω is in rad/s, else "ω = 0.85"."""
+        return drive_text(omega, None if self.si is None else self.si.hertz(omega))
 
     def choices(self, catalog: Catalog) -> Catalog:
         """The catalogue restricted to the cases and families that this file allows.

@@ -41,6 +41,17 @@ def in_si(si: SiScales | None, model: MechanicalModel) -> bool:
     return si == SiScales() and "b" not in model.units
 
 
+def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
+    """The frequency of a mechanism's force in Hz; nothing of a model without SI values."""
+    return {} if si is None else {"frequency_hz": si.hertz(omega)}
+
+
+def mechanism_json(omega: float, si: SiScales | None) -> dict[str, float]:
+    """What a generator's frequency stands for in the mechanism, Hz; nothing of a model without SI
+    values."""
+    return {} if si is None else {"mechanism_hz": si.hertz(omega)}
+
+
 def units_of(si: SiScales | None, model: MechanicalModel) -> dict[str, Unit]:
     """The SI units that a model's quantities are shown in beside its own numbers, by name: none of
     a model without SI values, and no unit that the numbers have already, but for frequencies,

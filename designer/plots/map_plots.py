@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -13,10 +14,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, new_figure, styled, to_png
+from designer.base.si_unit import drive_text
 from designer.yields.yield_maps import YieldMap
 
 FORMAT = 1
 _LINE, _BAND, _BEST = "#0072b2", "#c6dff0", "#d55e00"
+PER_TURN = 1.0 / (2.0 * math.pi)
+"""Hz per rad/s."""
+_HERTZ = "drive frequency [Hz]"
 _AXES = {
     "omega": "drive frequency ω",
     "b": "clearance b (the generator’s amplitude goes as 1/b)",
@@ -25,16 +30,20 @@ _AXES = {
 
 
 def map_files(
-    maps: Sequence[YieldMap], labels: Sequence[str], provenance: Mapping[str, Any]
+    maps: Sequence[YieldMap],
+    labels: Sequence[str],
+    provenance: Mapping[str, Any],
+    *,
+    angular: bool = False,
 ) -> dict[str, bytes]:
     """``maps.json`` and a picture for each map, by file name.
 
-    labels : of the plan's questions, such as "ω = 0.54   1-3-3".
+    labels : of the plan's questions, such as "ω = 0.54   1-3-3". angular : as of ``map_chart``.
     """
     rows, pictures = [], {}
     for one in maps:
         label, name = labels[one.question], f"map-{one.over}-{one.question + 1}.png"
-        pictures[name] = to_png(map_chart(" ".join(label.split()), one))
+        pictures[name] = to_png(map_chart(" ".join(label.split()), one, angular=angular))
         rows.append({"response": label, "picture": name, **one.as_dict()})
     document = {"format": FORMAT, **provenance, "maps": rows}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
@@ -42,14 +51,17 @@ def map_files(
 
 
 @styled
-def map_chart(label: str, one: YieldMap) -> Figure:
-    """A yield map of the response ``label``, readable alone."""
+def map_chart(label: str, one: YieldMap, *, angular: bool = False) -> Figure:
+    """A yield map of the response ``label``, readable alone.
+
+    angular : ω is in rad/s, and is shown in hertz.
+    """
     if len(one.axes) == 2:
-        return _heat(label, one)
+        return _heat(label, one, angular)
     figure = new_figure(6.2, 3.1)
     axes = figure.subplots()
     name = one.axes[0].name
-    scale = 100.0 if name == "grade" else 1.0
+    scale = 100.0 if name == "grade" else _scale(one, angular)
     x = scale * np.array(one.axes[0].values)
     axes.fill_between(x, 100.0 * one.low, 100.0 * one.high, color=_BAND, lw=0.0)
     axes.plot(x, 100.0 * one.rate, "-o", color=_LINE, ms=3.6, lw=1.2)
@@ -63,8 +75,8 @@ def map_chart(label: str, one: YieldMap) -> Figure:
     _marks(axes, one, scale)
     axes.set_ylim(0.0, 103.0)
     axes.set_ylabel("yield with its 95 % interval [%]")
-    axes.set_xlabel(_AXES[name])
-    _hertz(axes, one)
+    axes.set_xlabel(_HERTZ if scale == PER_TURN else _AXES[name])
+    _generator(axes, one, scale)
     axes.grid(color=GRID, lw=0.7)
     axes.set_title(f"{label}; {one.samples} boards a point", loc="left", color=INK, size=9)
     handles, names = axes.get_legend_handles_labels()
@@ -78,61 +90,72 @@ def _marks(axes: Axes, one: YieldMap, scale: float) -> None:
     best = None if one.recommended is None else scale * one.recommended[0]
     if best is None:
         axes.plot([], [], color=_BEST, lw=1.2, label=f"{word}: nowhere")
-    elif best == one.used and one.over != "grade":
+    elif best == scale * one.used and one.over != "grade":
         axes.axvline(best, color=_BEST, lw=1.2, label=f"recommended, in use: {best:.4g}")
     else:
         axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
     if one.over == "grade":
         return
-    if best != one.used:
-        axes.axvline(one.used, color=INK, lw=0.9, ls="--", label=f"in use: {one.used:.4g}")
+    if best != scale * one.used:
+        used = scale * one.used
+        axes.axvline(used, color=INK, lw=0.9, ls="--", label=f"in use: {used:.4g}")
     if one.window is not None:
         for edge, open_ in zip(one.window, one.open, strict=True):
             if not open_:
-                axes.axvline(edge, color=MUTED, lw=0.9, ls=":")
+                axes.axvline(scale * edge, color=MUTED, lw=0.9, ls=":")
         axes.plot([], [], color=MUTED, lw=0.9, ls=":", label="edge of the nominal window")
     if (~one.there).any():
         axes.plot([], [], "x", color=MUTED, label="not there nominally")
 
 
-def _hertz(axes: Axes, one: YieldMap) -> None:
-    """The generator's frequency above ω."""
+def _scale(one: YieldMap, angular: bool) -> float:
+    """From a value of the first axis to what is shown."""
+    return PER_TURN if angular and one.axes[0].name == "omega" else 1.0
+
+
+def _generator(axes: Axes, one: YieldMap, shown: float) -> None:
+    """The generator's frequency above the drive's. shown : as of ``_scale``."""
     if one.axes[0].name != "omega" or one.frequency is None:
         return
-    scale = one.frequency / one.used
+    scale = one.frequency / one.used / shown
     top = axes.secondary_xaxis(
         "top", functions=(partial(np.multiply, scale), partial(np.multiply, 1.0 / scale))
     )
-    top.set_xlabel("drive frequency [Hz]")
+    top.set_xlabel("generator frequency [Hz]")
 
 
-def _heat(label: str, one: YieldMap) -> Figure:
+def _heat(label: str, one: YieldMap, angular: bool) -> Figure:
     figure = new_figure(6.6, 3.3)
     axes = figure.subplots()
-    omega, grade = (np.array(a.values) for a in one.axes)
+    scale = _scale(one, angular)
+    omega, grade = scale * np.array(one.axes[0].values), np.array(one.axes[1].values)
     values = np.where(one.there, 100.0 * one.rate, np.nan)
     edges = _edges(omega)
     image = axes.pcolormesh(
         edges, np.arange(len(grade) + 1) - 0.5, values.T, cmap="cividis", vmin=0.0, vmax=100.0
     )
     axes.set_yticks(range(len(grade)), [f"{100 * g:g}" for g in grade])
-    axes.set_xlabel(_AXES["omega"])
-    _hertz(axes, one)
+    axes.set_xlabel(_HERTZ if scale == PER_TURN else _AXES["omega"])
+    _generator(axes, one, scale)
     axes.set_ylabel(_AXES["grade"])
-    axes.axvline(one.used, color=ON_DARK, lw=1.0, ls="--")
+    axes.axvline(scale * one.used, color=ON_DARK, lw=1.0, ls="--")
     best = one.recommended
-    marker = ([], []) if best is None else ([best[0]], [one.axes[1].values.index(best[1])])
-    text = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
+    marker = ([], []) if best is None else ([scale * best[0]], [one.axes[1].values.index(best[1])])
+    text = "nowhere" if best is None else f"{_drive(best[0], scale)} at {100 * best[1]:g} %"
     axes.plot(
         *marker, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {text}"
     )  # fmt: skip
-    axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {one.used:.4g}")
+    axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: {_drive(one.used, scale)}")
     axes.set_facecolor("#d9d9d9")
     bar = figure.colorbar(image, ax=axes, pad=0.015, format=FuncFormatter(lambda v, _: f"{v:g}"))
     bar.set_label("yield [%]")
     axes.set_title(f"{label}; {one.samples} boards a point", loc="left", color=INK, size=9)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
+
+
+def _drive(omega: float, scale: float) -> str:
+    return drive_text(omega, scale * omega if scale == PER_TURN else None)
 
 
 def _edges(centres: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[float]:

@@ -89,9 +89,12 @@ def pictures(data: ReportData) -> Pictures:
             "in the table.",
         )
         out[stop_name(number)] = Picture(svg=svg, plot=stop_name(number))
+    angular = data.result.modelfile.angular
     for one in data.study.maps:
         label = words.label(data.checked[data.study.response_indices[one.question]], " ")
-        svg = element(map_plots.map_chart(label, one), f"Yield over {one.over} of {label}.")
+        svg = element(
+            map_plots.map_chart(label, one, angular=angular), f"Yield over {one.over} of {label}."
+        )
         out[f"map {label} {one.over}"] = Picture(svg=svg)
     if data.design.errors.max_error > EXACT:
         unit = design_tables.spring_of(data.design.model)

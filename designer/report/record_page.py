@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from designer.base.figure_style import to_svg
 from designer.base.page import Block, Page, PageSection, Picture, SmallPrint, Table, table_of
+from designer.base.si_unit import drive_text
 from designer.base.units import format_quantity
 from designer.report.inline_svg import InlineSvg
 from designer.report.page_html import render_page
@@ -38,8 +39,8 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
         records,
         {
             "record": lambda r: r["file"],
-            "ω": lambda r: f"{r['omega']:.4g}",
-            "drive": lambda r: drive_words(r),
+            "drive": at,
+            "generator": lambda r: drive_words(r),
             "shows": lambda r: shown_words(r),
             "wanted there": lambda r: r["wanted"] or "",
             "exact circuit": lambda r: (r["exact_circuit"] or {}).get("response", ""),
@@ -54,6 +55,11 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
     if answer["spread"]:
         boards.append(PageSection("How far the boards differ", list(_spread(answer["spread"]))))
     return Page(f"On the bench: {answer['title']}", [intro, overview], [*boards, *sections])
+
+
+def at(row: Mapping[str, Any]) -> str:
+    """The drive frequency of a record, in the model's own units."""
+    return drive_text(row["omega"], row.get("mechanism_hz"))
 
 
 def _board_title(board: Mapping[str, Any]) -> str:
@@ -91,7 +97,7 @@ def _advice_table(advice: Sequence[Mapping[str, Any]]) -> Table | None:
         advice,
         {
             "wanted": lambda a: a["expected"],
-            "ω": lambda a: f"{a['omega']:.4g}",
+            "drive": at,
             "shows as set": lambda a: _shares(a["shown"]),
             "advice": lambda a: a["words"],
             "generator": lambda a: _generator(a),

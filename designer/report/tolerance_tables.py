@@ -9,6 +9,8 @@ from dataclasses import replace
 from functools import partial
 
 from designer.base.page import Table, table, table_of
+from designer.base.si_unit import value_text
+from designer.model.model import SiScales
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.measured_table import table as measured_boards
@@ -198,42 +200,49 @@ def corners(data: ReportData) -> Table | None:
 
 def maps(data: ReportData) -> Table | None:
     """Window, setting in use and recommended setting of each yield map."""
+    angular = data.result.modelfile.angular
+
+    def shown(value: float, axis: str) -> str:
+        if axis == "grade":
+            return f"{100 * value:g} % parts"
+        if axis == "omega" and angular:
+            return value_text(SiScales().hertz(value), "Hz")
+        return words.number(value)
+
+    names = {"omega": "frequency" if angular else "ω"}
     columns: dict[str, Callable[[YieldMap], str]] = {
         "response": lambda one: words.name(data.checked[data.study.response_indices[one.question]]),
-        "over": lambda one: " × ".join("ω" if a.name == "omega" else a.name for a in one.axes),
-        "nominal window": _window,
-        "in use": _in_use,
-        "recommended": _recommended,
+        "over": lambda one: " × ".join(names.get(a.name, a.name) for a in one.axes),
+        "nominal window": lambda one: _window(one, shown),
+        "in use": lambda one: _in_use(one, shown),
+        "recommended": lambda one: _recommended(one, shown),
     }
     return table_of(data.study.maps, columns)
 
 
-def _window(one: YieldMap) -> str:
+def _window(one: YieldMap, shown: Callable[[float, str], str]) -> str:
     if one.window is None:
         return words.NONE
     return " to ".join(
-        f"{words.number(edge)}{' (as far as was looked)' if open_ else ''}"
+        f"{shown(edge, one.axes[0].name)}{' (as far as was looked)' if open_ else ''}"
         for edge, open_ in zip(one.window, one.open, strict=True)
     )
 
 
-def _in_use(one: YieldMap) -> str:
+def _in_use(one: YieldMap, shown: Callable[[float, str], str]) -> str:
     if one.over == "grade" or one.used not in one.axes[0].values:
         return words.NONE
     place = [one.axes[0].values.index(one.used)]
     if len(one.axes) > 1:
         best = one.recommended
         place.append(0 if best is None else one.axes[1].values.index(best[1]))
-    return f"{words.number(one.used)}: {_share(one.at(*place))}"
+    return f"{shown(one.used, one.axes[0].name)}: {_share(one.at(*place))}"
 
 
-def _recommended(one: YieldMap) -> str:
+def _recommended(one: YieldMap, shown: Callable[[float, str], str]) -> str:
     best = one.recommended
     if best is None:
         return "nowhere"
     place = tuple(axis.values.index(v) for axis, v in zip(one.axes, best, strict=True))
-    setting = ", ".join(
-        f"{100 * v:g} % parts" if axis.name == "grade" else words.number(v)
-        for axis, v in zip(one.axes, best, strict=True)
-    )
+    setting = ", ".join(shown(v, axis.name) for axis, v in zip(one.axes, best, strict=True))
     return f"{setting}: {_share(one.at(*place))}"

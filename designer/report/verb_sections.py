@@ -152,7 +152,7 @@ def bench_section(answers: Mapping[str, Answer]) -> PageSection:
     columns: dict[str, Callable[[tuple[str, Answer]], str]] = {
         "board": lambda row: row[0],
         "record": lambda row: row[1]["file"],
-        "ω": lambda row: words.number(row[1]["omega"]),
+        "drive": lambda row: record_page.at(row[1]),
         "shows": lambda row: record_page.shown_words(row[1]),
         "wanted there": lambda row: row[1]["wanted"] or "",
         "advice": lambda row: (row[1]["advice"] or {}).get("words", ""),

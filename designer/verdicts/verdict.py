@@ -49,8 +49,13 @@ class Question:
     @property
     def stream(self) -> str:
         """Names what is drawn for this response alone: the same wherever it stands in a plan."""
+        return f"{self.omega:.9g}:{self.spec.expect}"
+
+    @property
+    def omega(self) -> float:
+        """The drive frequency, dimensionless or [rad/s]."""
         assert self.spec.omega is not None
-        return f"{self.spec.omega:.9g}:{self.spec.expect}"
+        return self.spec.omega
 
     @property
     def wanted(self) -> Response:

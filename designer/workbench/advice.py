@@ -22,6 +22,8 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.orbit import Orbit
+from designer.model.model import SiScales
+from designer.model.si_units import mechanism_json
 from designer.model.tuning_bands import Bands
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Question, Verdict
@@ -96,11 +98,12 @@ class Advice:
             return f"no setting helps; exact, this part would: {named}"
         return "no setting and no single part helps"
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
         """As a JSON answer has it."""
         to = self.excitation
         return {
-            "omega": self.question.spec.omega,
+            "omega": self.question.omega,
+            **mechanism_json(self.question.omega, si),
             "expected": str(self.question.wanted.expect),
             "shown": dict(self.shown),
             "as_set": self.as_set,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from designer.base.errors import DesignerError
+from designer.model.model import SiScales
 from designer.workbench.advice import Advice, advise
 from designer.workbench.board_fit import BoardFit, fit_board
 from designer.workbench.fitted_quantities import BoardFigure, told_figures
@@ -41,7 +42,7 @@ class FittedBoard:
         """Of the worst record; see ``BoardFit.misfits``."""
         return None if self.fit is None else max(self.fit.misfits)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
         """As a JSON answer has it. The residual is that of the worst record."""
         return {
             "board": self.name,
@@ -51,7 +52,7 @@ class FittedBoard:
             "doubtful": self.misfit is not None and self.misfit > DOUBTFUL,
             "residual": None if self.fit is None else max(self.fit.residuals),
             "rounds": None if self.fit is None else self.fit.rounds,
-            "advice": [one.as_dict() for one in self.advice],
+            "advice": [one.as_dict(si) for one in self.advice],
             "reason": self.reason,
         }
 

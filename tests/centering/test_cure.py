@@ -175,6 +175,7 @@ def test_the_cheapest_cure_is_the_enumerated_one(
     assert worst == sorted(worst)
     told = text(cure_json(found, {}, 0.0))
     assert "every response at 97 % or better" in told
+    assert "ω = " in told
     assert to_svg(front_chart(found)).startswith("<svg")
 
 

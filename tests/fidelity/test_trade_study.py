@@ -21,6 +21,7 @@ from designer.base.errors import InputError
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.base.si_unit import drive_text
 from designer.catalog.catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.board_values import nominal_board
@@ -55,6 +56,7 @@ from designer.jobs.options import Options
 from designer.jobs.rung_choice import choose, with_rung
 from designer.jobs.trade_job import NAMES
 from designer.kernels.kernel_boards import POINTS
+from designer.model.model import SiScales
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import BOUND, RELTOL
@@ -489,9 +491,24 @@ def test_yields_of_all_responses_name_those_that_were_not_asked() -> None:
     ]  # fmt: skip
 
 
+SETTINGS = {"trade": {"boards": 40}}
+
+
 def document(found: Trade) -> dict[str, Any]:
-    source = {"seed": 1, "settings": {"trade": {"boards": 40}}}
-    return trade_json(found, source, 1.0, "a title")
+    return trade_json(found, {"seed": 1, "settings": SETTINGS}, 1.0, "a title")
+
+
+def test_with_si_values_every_row_of_a_response_has_its_hertz() -> None:
+    found = judged(*LADDER, boards=of_boards(40, 1, 0))
+    answer = trade_json(found, {"seed": 1, "settings": SETTINGS}, 1.0, "a title", SiScales())
+    rows = [r for k in ("rungs", "truths", "boards") for r in answer[k]]
+    assert rows
+    for row in rows:
+        assert row["frequency_hz"] == pytest.approx(row["omega"] / (2.0 * math.pi))
+    hertz = drive_text(rows[0]["omega"], rows[0]["frequency_hz"])
+    assert hertz.endswith("Hz")
+    assert f"1: {hertz}, b = " in told(answer)
+    assert "ω = " not in told(answer)
 
 
 def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None:

@@ -45,6 +45,7 @@ LAZY = {
     STARTS: {
         ("folders.json_answers", "circuit.design"),
         ("folders.json_answers", "model.mechanics"),
+        ("folders.json_answers", "model.si_units"),
         ("folders.origin", "spice.batch_backend"),
         ("jobs.simulate_job", "centering.stage_choice"),
         ("jobs.study_stage", "jobs.dask_runner"),

@@ -205,8 +205,26 @@ def test_the_frequency_axis_is_in_hertz_too() -> None:
     (axes,) = figure.axes
     (top,) = axes.child_axes
     figure.draw_without_rendering()
-    assert top.get_xlabel() == "drive frequency [Hz]"
+    assert top.get_xlabel() == "generator frequency [Hz]"
     assert np.allclose(top.get_xlim(), np.array(axes.get_xlim()) * 500.0 / 0.85)
+
+
+@pytest.mark.parametrize("two", [False, True])
+def test_where_omega_is_in_rad_s_the_map_is_over_hertz(two: bool) -> None:
+    found = made([[3, 8], [9, 10]], "omega-grade") if two else made([3, 9], "omega")
+    found = replace(found, frequency=500.0)
+    figure = map_chart("36 Hz", found, angular=True)
+    axes = figure.axes[0]
+    figure.draw_without_rendering()
+    assert axes.get_xlabel() == "drive frequency [Hz]"
+    low, high = axes.get_xlim()
+    hertz = np.array(found.axes[0].values) / (2.0 * np.pi)
+    assert low <= hertz.min() < hertz.max() <= high < 1.5 * hertz.max()
+    (top,) = axes.child_axes
+    assert np.allclose(top.get_xlim(), np.array([low, high]) * 2.0 * np.pi * 500.0 / found.used)
+    shown = " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    assert "ω" not in shown
+    assert f"in use: {found.used / (2.0 * np.pi):.4g}" in shown
 
 
 def test_where_nothing_survives_nothing_is_recommended(tmp_path: Path) -> None:
