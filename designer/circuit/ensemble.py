@@ -60,6 +60,7 @@ class Ensemble:
         self.boards = boards
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
+        self._entered: dict[int, working.BoardModes] = {}
         fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
         fits = fits and not (boards.bandwidth and swinging_sections(boards.circuit))  # jumps
         self._modes = _reduced(boards, jobs) if fast and fits else None
@@ -185,7 +186,10 @@ class Ensemble:
         ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
         if self._modes is None or not self._modes.good[board] or not len(ends):
             return ends, np.zeros(len(ends), dtype=bool)
-        modes, missing = self._modes.take(np.array([board])), np.zeros(2, dtype=np.int64)
+        # A copy, for another thread may ask about this board too.
+        known, row = self._entered.get(board), np.array([0])
+        modes = self._modes.take(np.array([board])) if known is None else known.take(row)
+        missing, closely = np.zeros(2, dtype=np.int64), False
         drives = np.array([working_modes.drive_of(drive, MAX_EVENTS) for drive, _ in stages])
         periods = np.array([count for _, count in stages], dtype=np.int64)
         while True:
@@ -202,14 +206,18 @@ class Ensemble:
                 room.ints,
                 room.width,
                 room.far,
+                closely,
                 room.unit,
                 codes,
                 missing,
             )
             if missing[0] >= 0:
                 modes.enter([modes.targets.beyond(int(missing[0]), int(missing[1]))])
-            elif not ((codes == LEFT).any() and modes.enter_all()):
+            elif not (codes == LEFT).any() or closely:
+                self._entered[board] = modes
                 return ends, np.asarray(codes == DONE)
+            else:  # all modes first: a proof step by step takes longer
+                closely = not modes.enter_all()
 
     def _alone(self, board: int, drive: Drive, start: Array) -> SettledBoard:
         """One question, in Python."""
@@ -235,30 +243,40 @@ class Ensemble:
         out: list[SettledBoard | None] = [None] * len(which)
         if self._modes is None:
             return out
-        asked = np.flatnonzero(self._modes.good[which])
-        boards, rows = np.unique(which[asked], return_inverse=True)
+        good = np.flatnonzero(self._modes.good[which])
+        boards, number = np.unique(which[good], return_inverse=True)
         modes = self._modes.take(boards)
         given = np.array([working_modes.drive_of(d, MAX_EVENTS) for d in drives]).reshape(-1, 4)
-        while len(asked):
-            answers = self._answers(modes, rows, given[asked], starts[asked], stages)
-            code = answers.whole[:, kernel.CODE]
-            closed = np.flatnonzero(code == FOUND)
-            periods = [drives[k].period for k in asked[closed]]
-            responses = self._responses(answers, closed, periods, modes)
-            for k, response in zip(asked[closed], responses, strict=True):
-                out[k] = response
-            again = code == kernel.BUILD
-            missing = answers.whole[again, kernel.MISSING :][:, :2]
-            modes.enter({modes.targets.beyond(int(m), int(g)) for m, g in missing})
-            if (code == kernel.NOWHERE).any() and modes.enter_all():
-                again |= code == kernel.NOWHERE
-            asked, rows = asked[again], rows[again]
+        for closely in (False, True):
+            open_ = np.array([out[k] is None for k in good], dtype=bool)
+            asked, rows = good[open_], number[open_]
+            while len(asked):
+                answers = self._answers(modes, rows, given[asked], starts[asked], stages, closely)
+                code = answers.whole[:, kernel.CODE]
+                closed = np.flatnonzero(code == FOUND)
+                periods = [drives[k].period for k in asked[closed]]
+                responses = self._responses(answers, closed, periods, modes)
+                for k, response in zip(asked[closed], responses, strict=True):
+                    out[k] = response
+                again = code == kernel.BUILD
+                missing = answers.whole[again, kernel.MISSING :][:, :2]
+                modes.enter({modes.targets.beyond(int(m), int(g)) for m, g in missing})
+                if (code == kernel.NOWHERE).any() and modes.enter_all():
+                    again |= code == kernel.NOWHERE
+                asked, rows = asked[again], rows[again]
         return out
 
     def _answers(
-        self, modes: working.BoardModes, rows: Index, drives: Array, starts: Array, stages: int
+        self,
+        modes: working.BoardModes,
+        rows: Index,
+        drives: Array,
+        starts: Array,
+        stages: int,
+        closely: bool,
     ) -> kernel.Answers:
-        """What the compiled code says of boards ``rows`` of these modes."""
+        """What the compiled code says of boards ``rows`` of these modes. closely : as of
+        ``DrivenModes``."""
         count, (_, _, clearances, wide) = len(rows), modes.modes.past.shape
         n, watched = wide - 2, len(modes.modes.watched)
         answers = kernel.Answers(
@@ -285,6 +303,7 @@ class Ensemble:
             room.ints,
             room.width,
             room.far,
+            closely,
             room.unit,
             answers,
         )

@@ -267,7 +267,8 @@ class Circuit:
         without one. values : as of ``wires``."""
         wires, loads = self.wires(values), {}
         for section in self.sections:
-            siemens = [w.siemens for w in wires if {w.a, w.b} & self.output_nets(section)]
+            outputs = self.output_nets(section)
+            siemens = [w.siemens for w in wires if w.a in outputs or w.b in outputs]
             loads[section.name] = 1.0 / sum(siemens) if siemens else math.inf
         return loads
 

@@ -133,13 +133,16 @@ class NodalEquations:
         """Every way out of a mode, those of contacts scaled to displacement."""
         n = len(self.states)
         sides = self.sides(key)
+        touching = {contact.switch for s in self.circuit.stops for _, contact in s.contacts}
         ways: list[Exit] = []
         switches: tuple[Section | Diode, ...] = (*self._sections, *self._diodes)
         for i, switch in enumerate(switches):
             for row, to in self.leaving(key, switch, solved):
                 target = (*key[:i], to, *key[i + 1 :])
-                changed = [j for j, s in enumerate(self.sides(target)) if s != sides[j]]
-                j = changed[0] if changed else -1
+                j = -1
+                if switch.name in touching:
+                    there = self.sides(target)
+                    j = next((c for c, side in enumerate(there) if side != sides[c]), -1)
                 if j >= 0 or isinstance(switch, Diode):
                     largest = np.abs(row[..., :n]).max(axis=-1, initial=0.0)
                     if j >= 0:

@@ -70,7 +70,12 @@ class Reduction:
         """States are the capacitor voltages in volts, time in seconds, the drive in volts.
 
         A mode's key has one entry per op-amp section in the circuit's order, then one per diode.
+        The same each time: what is asked again finds its modes built.
         """
+        return self._system
+
+    @cached_property
+    def _system(self) -> PiecewiseLinearSystem:
         c = self.circuit
         displacement, velocity = self._motion()
         return PiecewiseLinearSystem(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Stop:
     """Between two masses: the net that carries the difference of their displacements, and the sign
     that it has there, 1 or -1."""
 
-    @property
+    @cached_property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:
         """The sides that exist, 1 upper and -1 lower, each with its contact."""
         pairs = ((1, self.upper), (-1, self.lower))

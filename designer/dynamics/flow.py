@@ -291,7 +291,11 @@ class Flow:
         before = phi.copy()
         code, done = self._in_chunks(advance, log, cursor, chunk, points)
         if code == kernel_orbit.LEFT:
-            return None
+            if not modes.look_closely():
+                return None
+            return self._run_tabulated(
+                modes, x, stretches, points, key, before, max_events, room, measure=measure
+            )
         if met[0] > room and measure:  # more impacts than room: again, with room for all
             return self._run_tabulated(
                 modes, x, stretches, points, key, before, max_events, int(met[0]), measure=True

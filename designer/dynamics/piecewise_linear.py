@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -67,6 +68,12 @@ class Mode:
     """For each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper."""
     clipped: bool = False
     """Whether an element that ought to be linear is at its limit."""
+
+    @cached_property
+    def guard_rows(self) -> tuple[Array, Array, Array]:
+        """C (guards, n), D (guards,) and e (guards,) of all guards."""
+        C = np.array([g.C for g in self.guards])
+        return C, np.array([g.D for g in self.guards]), np.array([g.e for g in self.guards])
 
 
 @dataclass(frozen=True)

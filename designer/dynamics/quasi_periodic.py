@@ -132,7 +132,7 @@ def _turning(count: int, line: float) -> Array:
     """(2, count) real and imaginary part of a line's conjugate, weighted. Two real rows, for numpy
     is a hundred times slower where a complex matrix meets a real one."""
     angle = 2.0 * np.pi * line * np.arange(count)
-    return _weights(count) * np.stack([np.cos(angle), -np.sin(angle)])
+    return np.asarray(_weights(count) * np.stack([np.cos(angle), -np.sin(angle)]))
 
 
 def _lines(x: Array) -> list[float]:

@@ -67,9 +67,11 @@ def drive_of(drive: Drive, max_events: int) -> Array:
     return np.array([drive.omega, drive.amplitude, drive.offset, float(max_events)])
 
 
-def driven(modes: kernel.Modes, drive: Array, *, leaps: bool = False) -> kernel.DrivenModes:
-    """The first board's modes under a drive (4,), without tables yet. leaps : whether the vector
-    field differs on the two sides of a boundary."""
+def driven(
+    modes: kernel.Modes, drive: Array, *, leaps: bool = False, closely: bool = False
+) -> kernel.DrivenModes:
+    """The first board's modes under a drive (4,), without tables yet. leaps, closely : as of
+    ``kernel.DrivenModes``."""
     columns, counts, far = kernel.widths(modes)
     number = len(modes.guards)
     return kernel.DrivenModes(
@@ -81,6 +83,7 @@ def driven(modes: kernel.Modes, drive: Array, *, leaps: bool = False) -> kernel.
         width=columns,
         far=far,
         leaps=leaps,
+        closely=closely,
         unit=(0.0,) * modes.A.shape[-1],
     )
 
@@ -140,12 +143,20 @@ class TabulatedModes:
             self._modes.displacement[0, c] = system.displacement[c]
             self._modes.velocity[0, c] = system.velocity[c]
         self.driven: kernel.DrivenModes | None = None
+        self._closely = False
+
+    def look_closely(self) -> bool:
+        """Prove boundaries far step by step from now on; whether it was not so before."""
+        before, self._closely = self._closely, True
+        if self.driven is not None:
+            self.driven = self.driven._replace(closely=True)
+        return not before
 
     def limited(self, max_events: int) -> kernel.DrivenModes:
         """The driven modes, to be left after so many mode changes in a stretch."""
         if self.driven is None:
             leaps = not self._system.continuous
-            self.driven = driven(self._modes, self._drive, leaps=leaps)
+            self.driven = driven(self._modes, self._drive, leaps=leaps, closely=self._closely)
         self.driven.drive[3] = max_events
         return self.driven
 

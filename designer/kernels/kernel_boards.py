@@ -256,13 +256,15 @@ def respond_all(
     ints: Int,
     width: int,
     far: int,
+    closely: bool,
     unit: Unit,
     answers: Answers,
 ) -> None:
     """Each of E questions: board which[e] under drives[e] from starts[e].
 
     which : (E,); drives : (E, 4) as ``DrivenModes.drive``; starts : (E, n). stages : of settling,
-    after which a question is left to the caller. data, ints, width, far, unit : room for tables.
+    after which a question is left to the caller. data, ints, width, far, closely, unit : as of
+    ``DrivenModes``.
     """
     n = len(unit)
     trail = RunTrail(
@@ -281,7 +283,9 @@ def respond_all(
             same = same and drives[e, k] == drives[e - 1, k]
         if not same:
             ints[:, FILLED] = 0
-        driven = DrivenModes(modes, which[e], drives[e], data, ints, width, far, False, unit)
+        driven = DrivenModes(
+            modes, which[e], drives[e], data, ints, width, far, False, closely, unit
+        )
         period = 2.0 * np.pi / drives[e, 0]
         board = DrivenBoard(driven, period, anchors, trail, missing)
         missing[0] = -1
@@ -302,6 +306,7 @@ def sweep_all(
     ints: Int,
     width: int,
     far: int,
+    closely: bool,
     unit: Unit,
     codes: Int,
     missing: Int,
@@ -327,7 +332,7 @@ def sweep_all(
     missing[0], codes[:] = -1, DONE
     for s in range(len(drives)):
         ints[:, FILLED] = 0
-        driven = DrivenModes(modes, board, drives[s], data, ints, width, far, False, unit)
+        driven = DrivenModes(modes, board, drives[s], data, ints, width, far, False, closely, unit)
         driven_board = DrivenBoard(driven, 2.0 * np.pi / drives[s, 0], anchors, trail, missing)
         strobes = np.zeros((periods[s] + 1, n))
         impacts = np.zeros((periods[s], columns), dtype=np.int64)

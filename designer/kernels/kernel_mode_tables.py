@@ -97,6 +97,9 @@ class DrivenModes(NamedTuple):
     """Boundaries that there is room for to prove far."""
     leaps: bool
     """Whether the vector field differs on the two sides of a boundary."""
+    closely: bool
+    """Whether each step is held against the far boundaries by itself: slower, and where the boxes
+    of the states prove too little."""
     unit: Unit
     """(n,) zeros."""
 

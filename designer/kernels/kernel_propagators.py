@@ -4,10 +4,12 @@ Within a mode the state moves in blocks of seven steps (``kernels.kernel_crossin
 propagators. For each boundary that is watched its distance and rate at the block's eight nodes are
 one product with the state; the two stops of a clearance are limits of one function where they watch
 one displacement. The boundaries that a good board never meets (outputs at their limits, diodes of
-the other half) are proved to be far: over the box that the states kept to, no such guard comes near
-zero. Where that proof fails the run is given up, and the general kernel
-(``kernels.kernel_general``), which this must equal, does it. Modes get their tables when they are
-first entered; one that has not been built yet ends the run with UNKNOWN_MODE.
+the other half) are proved to be far: over the box that the states kept to in a mode, no such guard
+comes near zero. States that move together fill little of their box: where that proof fails, the
+caller may ask for one step by step (``DrivenModes.closely``). Where that fails too the run is given
+up, and the general kernel (``kernels.kernel_general``), which this must equal, does it. Modes get
+their tables when they are first entered; one that has not been built yet ends the run with
+UNKNOWN_MODE.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from designer.kernels.kernel_crossing import (
     COEF,
     LAST,
     NODES,
+    PARTS,
     POINT,
     SCRATCH,
     STACK,
@@ -64,6 +67,8 @@ TANGENCY = 1e-13
 crossing is not looked for."""
 MODE, STRETCHES, MEASURE, GUARD = range(4)
 """Places in a run's cursor."""
+FINE = 1.0 / PARTS**2
+"""How much less a state may be from the chord of a part than from that of a step."""
 STANDS = 0
 """Place in the scratch array: the part of the block at which WITHIN stands, -1 for none."""
 MASK = 0xFFFFFFFF
@@ -234,6 +239,18 @@ def _scan(data: Float, place: int, unit: Unit, work: Float) -> float:
 
 
 @embedded
+def _reach(data: Float, base: int, unit: Unit, reach: Float) -> None:
+    """reach (n,) ← how far each state may be from the chord of a step, in this block."""
+    n, o = len(unit), base & MASK
+    _, _, second, _, _ = table_places(n)
+    for i in range(n):
+        total = 0.0
+        for j in range(n + 3):
+            total += data[o + second + n * j + i] * abs(data[NOW + j])
+        reach[i] = total
+
+
+@embedded
 def _keep(boxes: Float, m: int, n: int, x: Float, at: int, slack: float, reach: Float) -> None:
     """Widen the box (2 n,) of mode m by the state at ``at``, give or take a part of ``reach``."""
     for j in range(n):
@@ -244,19 +261,15 @@ def _keep(boxes: Float, m: int, n: int, x: Float, at: int, slack: float, reach: 
 
 @embedded
 def _watch(
-    data: Float, base: int, boxes: Float, m: int, end: float, unit: Unit, work: Float, reach: Float
-) -> None:
-    """Widen the box of mode m by the motion over [0, end], whose end is not in it yet."""
+    data: Float, base: int, boxes: Float, m: int, end: float, slack: float, unit: Unit, work: Float,
+    reach: Float,
+) -> None:  # fmt: skip
+    """Widen the box of mode m by the motion over [0, end], whose end is not in it yet. slack : for
+    the first step."""
     n, o = len(unit), base & MASK
-    _, way, second, _, _ = table_places(n)
-    for i in range(n):
-        total = 0.0
-        for j in range(n + 3):
-            total += data[o + second + n * j + i] * abs(data[NOW + j])
-        reach[i] = total
+    _, way, _, _, _ = table_places(n)
     h = data[o + H]
-    share = min(end / h, 1.0)
-    _keep(boxes, m, n, data, NOW, share * share, reach)
+    _keep(boxes, m, n, data, NOW, slack, reach)
     if end > h:
         count = (STEPS - 1) * n
         for k in range(count):
@@ -267,6 +280,48 @@ def _watch(
         for k in range(STEPS - 1):
             if (k + 1) * h < end:
                 _keep(boxes, m, n, work, STACK + n * k, 1.0, reach)
+
+
+@leaf
+def _clear(driven: DrivenModes, m: int, at: int, slack: float, reach: Float) -> bool:
+    """Whether no far boundary of mode m is near the state at ``at``, give or take a part of
+    ``reach``."""
+    n, far, data = len(driven.unit), driven.far, driven.data
+    o = (TABLES + driven.width * (m + 1) - (2 * n + 1) * far) & MASK
+    for g in range(far):
+        total = data[o + 2 * n * far + g]
+        for j in range(n):
+            up, down = data[o + far * j + g], data[o + far * (n + j) + g]
+            total += (up + down) * data[at + j] + (up - down) * slack * reach[j]
+        if not total < 0.0:
+            return False
+    return True
+
+
+@leaf
+def _clear_way(
+    driven: DrivenModes, base: int, m: int, end: float, slack: float, work: Float, reach: Float
+) -> bool:
+    """Whether no far boundary comes near in mode m over [0, end], the end left out: by the ends of
+    each step, and where these prove nothing by those of its parts. slack : for the first step."""
+    data, unit = driven.data, driven.unit
+    part, clear = data[(base & MASK) + PART], _clear(driven, m, NOW, slack, reach)
+    for k in range(STEPS):
+        first = PARTS * k
+        if not first * part < end:
+            return True
+        following = False
+        if (first + PARTS) * part <= end:
+            _go(data, base, first + PARTS, unit, work)
+            following = _clear(driven, m, WITHIN, 1.0, reach)
+        if not (clear and following):
+            for p in range(first, first + PARTS + 1):
+                if p * part < end:
+                    _go(data, base, p, unit, work)
+                    if not _clear(driven, m, WITHIN, min(FINE, slack), reach):
+                        return False
+        clear = following
+    return True
 
 
 @leaf
@@ -530,7 +585,7 @@ def advance(
     # A contact that was already running has an unknown deepest point so far.
     for c in range(clearances):
         depth[c] = np.inf if driven.modes.side[m, c] != 0 else 0.0
-    t, events, done, code = 0.0, 0, 0, DONE
+    t, events, done, code, slack = 0.0, 0, 0, DONE, 0.0
     if ints[m, FILLED] == 0:
         code = fill(driven, m)
     while done < strobes.shape[0] - 1 and code == DONE:
@@ -545,7 +600,12 @@ def advance(
         end = first if crossed else min(left, block)
         whole = not crossed and block < left
         if far > 0:
-            _watch(data, base, boxes, m, end, unit, work, reach)
+            _reach(data, base, unit, reach)
+            slack = min(end / h, 1.0) ** 2
+            if not driven.closely:
+                _watch(data, base, boxes, m, end, slack, unit, work, reach)
+            elif not _clear_way(driven, base, m, end, slack, work, reach):
+                return LEFT
         if measure:
             _measure(driven, m, end, work, trail, values, depth)
         if whole:
@@ -557,9 +617,10 @@ def advance(
         else:
             _move(data, base, end, omega, unit, phi, work)
         t += end
-        if far > 0:
-            share = min(end / h, 1.0)
-            _keep(boxes, m, n, data, NOW, share * share, reach)
+        if far > 0 and not driven.closely:
+            _keep(boxes, m, n, data, NOW, slack, reach)
+        elif far > 0 and not _clear(driven, m, NOW, min(FINE, slack), reach):
+            return LEFT
         if not (abs(data[NOW]) < 1e12):
             code = DIVERGED
         elif crossed:

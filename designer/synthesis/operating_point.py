@@ -3,7 +3,7 @@
 Over the orbits of the wanted responses on the exact circuit, their starts from rest, and every run
 with one op-amp stuck at a rail. All of it is linear in state and drive within a mode, so a value on
 a strobe is exact; strobes lie 0.1 rad of the fastest motion apart (``output_loads.RESOLUTION``), so
-a smooth peak between them is missed by at most 0.13 %.
+a smooth peak between them is missed by at most 0.13 %; with an op-amp stuck, 0.5 rad and 3 %.
 
 A slope counts where the section's loop is closed. While one diode of a rectifier has let go and the
 other has not taken over, nothing closes it: for some nanoseconds of the exact circuit the output
@@ -26,10 +26,13 @@ from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Solution
 from designer.circuit.reduction import Reduction
 from designer.dynamics.piecewise_linear import ModeKey
-from designer.synthesis.output_loads import REST, Run, Sampled
+from designer.synthesis.output_loads import RESOLUTION, REST, Run, Sampled
 
 CLOSED = BY_ID["feedback"].limit or 0.0
 """Share of its output that closes a section's loop, at least."""
+COARSE = 0.5
+"""Resolution of the runs with an op-amp stuck: there are two for each section, and nobody measures
+a fault to a per mille."""
 STUCK = 1e3
 """Offset [V] that drives a section to its rail whatever its inputs do."""
 
@@ -68,17 +71,22 @@ class Operating:
 
 def operating(reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str]) -> Operating:
     """What the circuit meets over these runs; one that does not come to its end is left out."""
-    return _operating(reduction, runs, left_out, speed=True)
+    return _operating(reduction, runs, left_out, RESOLUTION, speed=True)
 
 
 def _operating(
-    reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str], *, speed: bool
+    reduction: Reduction,
+    runs: Sequence[Run],
+    left_out: dict[str, str],
+    resolution: float,
+    *,
+    speed: bool,
 ) -> Operating:
     """speed : whether slopes are looked at, which takes as long as all else on a strobe."""
     out = Operating(left_out=dict(left_out))
     for run in runs:
         try:
-            sampled = Sampled(reduction, run)
+            sampled = Sampled(reduction, run, resolution)
             _add(out, reduction.circuit, sampled, run.name, speed=speed)
         except ArithmeticError as error:
             out.left_out[run.name] = str(error)
@@ -99,7 +107,7 @@ def stuck(circuit: Circuit, run: Run) -> Operating:
             board = _stuck(circuit, section.name, sign)
             name = f"{section.name} at the {rail} rail"
             there = replace(run, name=name, start=np.zeros(len(circuit.states)), periods=REST)
-            point = _operating(Reduction(circuit, board), [there], {}, speed=False)
+            point = _operating(Reduction(circuit, board), [there], {}, COARSE, speed=False)
             for kind in ("high", "low", "across", "power", "source"):
                 _raise_peaks(getattr(out, kind), getattr(point, kind).items())
             out.runs += point.runs

@@ -152,9 +152,12 @@ def over(
 
 
 class Sampled:
-    """One run on exact strobes, with the mode at each, and what lies between them."""
+    """One run on exact strobes, with the mode at each, and what lies between them.
 
-    def __init__(self, reduction: Reduction, run: Run) -> None:
+    resolution : of the strobes, see ``RESOLUTION``.
+    """
+
+    def __init__(self, reduction: Reduction, run: Run, resolution: float = RESOLUTION) -> None:
         if run.periods < 1:
             raise InputError(None, "periods", run.periods, "at least 1")
         self.reduction = reduction
@@ -170,7 +173,7 @@ class Sampled:
             modes = [self.system.mode(self.keys[int(i)]) for i in distinct_indices(self.at)]
             rates = [float(np.abs(np.linalg.eigvals(mode.A)).max()) for mode in modes]
             fastest = max(run.drive.omega, *rates)
-            needed = min(int(np.ceil(run.drive.period * fastest / RESOLUTION)), MOST_POINTS)
+            needed = min(int(np.ceil(run.drive.period * fastest / resolution)), MOST_POINTS)
 
     def extremes(self) -> dict[tuple[str, str], float]:
         """By section: -lowest and highest voltage, largest current out of and into the output."""
@@ -297,6 +300,5 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
 
 
 def _guards(mode: Mode, x: Array, u: Array) -> Array:
-    C = np.array([g.C for g in mode.guards])
-    D, e = (np.array([getattr(g, name) for g in mode.guards]) for name in ("D", "e"))
+    C, D, e = mode.guard_rows
     return np.asarray(x @ C.T + np.outer(u, D) + e)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from designer.check import checked_design
+from designer.check.synthesis_result import synthesise
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import Reduction
@@ -13,7 +17,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw_many
+from designer.yields.study import plan_study
 from tests.shared.exact_circuits import Scale, exact_circuit
 
 STIFFNESS = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
@@ -29,6 +35,51 @@ SYSTEM = SecondOrderSystem(
 )
 SCALE = Scale(1e-3, np.full(6, 6.0), 1.3)
 COUNT = 6
+TOGETHER = """
+format = 2
+[[mass]]
+name = "m1"
+mass = "2.14 kg"
+[[mass]]
+name = "m2"
+mass = "1.32 kg"
+[[spring]]
+between = ["m1", "ground"]
+stiffness = "2.84e+04 N/m"
+[[spring]]
+between = ["m2", "m1"]
+stiffness = "3.34e+04 N/m"
+[[spring]]
+between = ["m2", "ground"]
+stiffness = "4.09e+04 N/m"
+[[damper]]
+between = ["m1", "ground"]
+damping = "119 N s/m"
+[[damper]]
+between = ["m2", "m1"]
+damping = "89.5 N s/m"
+[[damper]]
+between = ["m2", "ground"]
+damping = "39.8 N s/m"
+[[clearance]]
+name = "A"
+between = ["m1", "m2"]
+lower = "-0.000488 m"
+stiffness = "1.14e+06 N/m"
+[[force]]
+on = "m1"
+amplitude = "78.7 N"
+[[force]]
+on = "m2"
+constant = "9.73 N"
+[[response]]
+frequency = "64 Hz"
+expect = "1-0-1"
+[circuit]
+dead_zone = "rectifier"
+"""
+"""Two masses that rest against each other by a stiff stop: the box of their states is mostly empty,
+and proves nothing of the diodes."""
 
 
 def test_every_clearance_is_counted_as_by_the_general_kernel() -> None:
@@ -56,3 +107,30 @@ def test_every_clearance_is_counted_as_by_the_general_kernel() -> None:
         speed = np.abs(b.impact_velocities).max()
         assert np.abs(a.impact_velocities - b.impact_velocities).max() < 1e-8 * speed
     assert len(fast._reductions) <= 1, "the compiled way serves all but what settles slowly"
+
+
+def test_boards_whose_states_move_together_are_served() -> None:
+    made = synthesise(parse_model_file(TOGETHER))
+    (first,) = checked_design.check(made.design, made.model_responses, None)
+    assert first.circuit.response == "1-0-1"
+    plan = plan_study(made.modelfile, made.design, [first], made.catalog, samples=COUNT, seed=1)
+    boards, drive = plan.boards(range(COUNT)), plan.questions[0].excitation.drive
+    starts = np.tile(first.circuit.start, (COUNT, 1))
+    fast, slow = Ensemble(boards), Ensemble(boards, fast=False)
+    asked = range(COUNT), [drive] * COUNT, starts
+    for a, b in zip(fast.settle(*asked), slow.settle(*asked), strict=True):
+        assert a.counts == b.counts
+        peak = np.abs(b.extremes).max(axis=1)
+        assert np.abs((a.start - b.start) / peak).max() < 1e-9
+    assert not fast._reductions
+    stages = [(drive, 5), (replace(drive, omega=1.01 * drive.omega), 5)]
+    for board in range(COUNT):
+        rest = np.zeros((1, starts.shape[1]))
+        ends, known = fast.swept(board, stages, rest)
+        assert known.all()
+        system, x = slow.reduction(board).system(), rest[0]
+        for each, periods in stages:
+            x = Flow(system, each, fast=False).run(x, periods).strobes[-1]
+        assert np.abs((ends[0] - x) / np.abs(x).max()).max() < 1e-8
+        again, _ = fast.swept(board, stages, rest)
+        np.testing.assert_array_equal(again, ends)

@@ -64,11 +64,16 @@ def cases(draw_: st.DrawFn) -> tuple[str, int, Drive, list[float]]:
 
 
 @settings(max_examples=60, deadline=None)
-@given(cases())
-def test_equals_the_general_kernel(case: tuple[str, int, Drive, list[float]]) -> None:
+@given(cases(), st.booleans())
+def test_equals_the_general_kernel(
+    case: tuple[str, int, Drive, list[float]], closely: bool
+) -> None:
     kind, seed, drive, start = case
     board = draw(CIRCUITS[kind], SPREAD, 1, seed)
     fast, slow = flows(CIRCUITS[kind], board, drive)
+    if closely:
+        assert fast._tabulated is not None
+        assert fast._tabulated.look_closely()
     x = np.array(start)
     begin = fast.system.mode_at(x, drive.offset)
     assume(begin in fast.system.working)
@@ -100,25 +105,46 @@ def test_the_fast_path_serves_good_boards(kind: str) -> None:
     """Otherwise the tests above would compare the general kernel with itself."""
     circuit = CIRCUITS[kind]
     drive = Drive(2.0 * np.pi * 300.0, 0.5 * VOLTS[kind])
-    served = 0
-    for index in range(20):
-        system = Reduction(circuit, draw(circuit, SPREAD, 2, index)).system()
-        modes = working_modes.TabulatedModes(system, drive)
-        for key in system.working:
-            modes.number(key)
-        code = kernel.advance(
-            modes.limited(1000),
-            np.zeros(4),
-            np.array([0, 0, 0, 0]),
-            drive.period,
-            working_modes.anchors(1),
-            np.zeros((0, 0)),
-            np.zeros((6, 4)),
-            np.zeros((5, 2), dtype=np.int64),
-            NO_TRAIL,
-        )
-        served += code == DONE
-    assert served == 20
+    boards = [draw(circuit, SPREAD, 2, index) for index in range(20)]
+    assert all(code(circuit, board, drive, closely=False) == DONE for board in boards)
+
+
+def code(circuit: Circuit, board: Board, drive: Drive, *, closely: bool) -> int:
+    """What the fast path says of five periods from rest."""
+    system = Reduction(circuit, board).system()
+    modes = working_modes.TabulatedModes(system, drive)
+    for key in system.working:
+        modes.number(key)
+    if closely:
+        modes.look_closely()
+    return kernel.advance(
+        modes.limited(1000),
+        np.zeros(4),
+        np.array([0, 0, 0, 0]),
+        drive.period,
+        working_modes.anchors(1),
+        np.zeros((0, 0)),
+        np.zeros((6, 4)),
+        np.zeros((5, 2), dtype=np.int64),
+        NO_TRAIL,
+    )
+
+
+def test_step_by_step_no_run_that_clips_is_served_and_more_of_the_others_are() -> None:
+    board, served = nominal_board(RECTIFIER), {False: 0, True: 0}
+    clips = 0
+    for amplitude in np.geomspace(3.0, 40.0, 60):
+        for hertz in (60.0, 150.0, 300.0):
+            drive = Drive(2.0 * np.pi * hertz, float(amplitude))
+            slow = Flow(Reduction(RECTIFIER, board).system(), drive, fast=False)
+            clipped = slow.run(np.zeros(4), 5, measure=True).clipped_time > 0.0
+            clips += clipped
+            for closely in served:
+                done = code(RECTIFIER, board, drive, closely=closely) == DONE
+                assert not (done and clipped)
+                served[closely] += done
+    assert 0 < served[False] < served[True] < 180 - clips // 2
+    assert clips > 20
 
 
 def test_a_run_that_clips_is_left_to_the_general_kernel() -> None:
