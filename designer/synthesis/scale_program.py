@@ -41,6 +41,9 @@ from designer.synthesis.limits import (
 from designer.synthesis.part_checks import nearest
 from designer.synthesis.stop_halves import INPUTS
 
+HIGHEST = 0.95
+"""Of the output limit: the highest threshold. A stop that no wanted response meets has to be within
+reach of the displacement too."""
 STILL = 1e-6
 """Peaks below this share of the largest count as so much: those of a state that hardly moves."""
 
@@ -410,6 +413,8 @@ class _Maker:
             if stop.gap:
                 threshold = own + float(np.log(abs(stop.gap)))
                 self.thresholds.append(threshold)
+                what, most = f"threshold of {names[0].threshold}", HIGHEST * self.order.output.limit
+                self._keep(threshold, StatedLimit("swing", what, most, "V"))
                 log = source - threshold + float(np.log(reference.voltage))
                 self._row([n.threshold for n in names], log, held=True)
             if len(idle) > 1:

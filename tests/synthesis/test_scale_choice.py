@@ -228,6 +228,22 @@ def test_unequal_stops_get_parts_and_the_thresholds_their_swing() -> None:
     assert design(ONE).circuit.values == made.circuit.values
 
 
+@pytest.mark.parametrize(
+    "stops",
+    [
+        clearance("A", "a", "ground", upper=-0.28, lower=2.05, stiffness=14.0),
+        clearance("A", "a", "ground", upper=0.4, stiffness=9.0)
+        + clearance("B", "a", "ground", lower=2.5, stiffness=9.0),
+    ],
+)
+def test_a_stop_that_is_never_met_is_within_reach(stops: str) -> None:
+    """At the scales that suit the motion no op-amp reached it, and nothing was found."""
+    one = {"a": 1.0}, {("a", "ground"): 1.0}, {("a", "ground"): 0.3}
+    made = design(system_text(*one, FORCE, stops, table("response", omega=1.0)))
+    assert made.errors.max_error <= 0.005
+    assert all(check.holds for check in made.checks)
+
+
 def test_an_idle_clamp_carries_what_the_other_half_does_at_the_deepest() -> None:
     # (t + t') / R' + d (1 / R' - s / F') of circuit.dead_zone_parts.idle_limits, over its first
     # term; s / (F' / R') is the ratio of the stiffnesses.
