@@ -158,7 +158,7 @@ def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
         for question in plan.questions:
             asked = question, question.excitation, question.start.start
             cases: list[Case] = [(i, *asked) for i in range(BOARDS)]
-            answers = settled(sample, cases, jobs)
+            answers = settled(sample, cases, jobs, brief=True)
             counts.append(sum(verdict is Verdict.OK for _, verdict, _ in answers))
         kept = min(counts)
     try:

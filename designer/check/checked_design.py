@@ -17,7 +17,7 @@ from designer.circuit.nominal import (
     Trace,
     circuit_flow,
     nominal_reduction,
-    reached,
+    on_circuit,
     response_flow,
     trace_of,
 )
@@ -121,7 +121,7 @@ def check(
     ]
     progress("exact circuit")
     flows = [circuit_flow(system, design, r) for r in responses]
-    orbits = [reached(flow, design, r) for flow, r in zip(flows, responses, strict=True)]
+    orbits = [on_circuit(system, design, r) for r in responses]
     results: Sequence[GateResult | None] = [None] * len(responses)
     if pool is not None and gates is not None:
         results = gates

@@ -86,7 +86,6 @@ from .nominal import (
     circuit_flow as circuit_flow,
     nominal_reduction as nominal_reduction,
     on_circuit as on_circuit,
-    reached as reached,
     record_of as record_of,
     response_flow as response_flow,
     trace_of as trace_of,

@@ -25,6 +25,7 @@ from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowResult
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
+from designer.dynamics.step_budget import Budget
 from designer.kernels import kernel_boards as kernel
 from designer.kernels.kernel_orbit import CHAOS, DONE, FOUND, LEFT
 
@@ -34,6 +35,8 @@ TOGETHER = 125
 """Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
 QUICK = 3
 """Stages of settling, 140 drive periods, after which a prediction gives up."""
+BRIEF = 200_000
+"""Steps that a brief settling may take."""
 FAINT = 5.0 * CHAOS
 """Growth of a tangent vector per drive period below which chaos is not plain."""
 
@@ -84,6 +87,7 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
+        brief: bool = False,
         progress: Callable[[], None] = lambda: None,
     ) -> list[Orbit]:
         """The attractor of board ``which[k]`` under ``drives[k]`` from ``starts[k]``, for each k.
@@ -92,9 +96,11 @@ class Ensemble:
         each other share its tables. starts : (len(which), states), or capacitor voltages, at drive
         phase 0. Equal to ``dynamics.attractors.settle`` of each, to rounding, but for the periods
         spent where Newton's method strayed into a mode in which an op-amp clips; a board without an
-        answer gives a failed orbit with the reason. progress : called once an answer.
+        answer gives a failed orbit with the reason. brief : as of ``respond``. progress : called
+        once an answer.
         """
-        return [r.orbit for r in self.respond(which, drives, starts, jobs=jobs, progress=progress)]
+        every = self.respond(which, drives, starts, jobs=jobs, brief=brief, progress=progress)
+        return [r.orbit for r in every]
 
     def respond(
         self,
@@ -103,9 +109,14 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
+        brief: bool = False,
         progress: Callable[[], None] = lambda: None,
     ) -> list[SettledBoard]:
-        """``settle``, with the displacement that each orbit draws."""
+        """``settle``, with the displacement that each orbit draws.
+
+        brief : for trials. What takes longer than `BRIEF` steps is not settled, and chaos is not
+        watched until it may end.
+        """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
 
@@ -116,7 +127,7 @@ class Ensemble:
             for k, response in enumerate(settled):
                 if response is None:
                     settled[k] = self._alone(
-                        int(index[first + k]), drives[first + k], states[first + k]
+                        int(index[first + k]), drives[first + k], states[first + k], brief=brief
                     )
                 progress()
             return [r for r in settled if r is not None]
@@ -219,14 +230,17 @@ class Ensemble:
             else:  # all modes first: a proof step by step takes longer
                 closely = not modes.enter_all()
 
-    def _alone(self, board: int, drive: Drive, start: Array) -> SettledBoard:
+    def _alone(self, board: int, drive: Drive, start: Array, *, brief: bool) -> SettledBoard:
         """One question, in Python."""
         try:
             reduction = self.reduction(board)
             system, start = reduction.system(), reduction.state(start)
             flow = Flow(system, drive, fast=self._fast)
-            orbit = attractors.settle(flow, start)
-            if self._fast and _faint(orbit, drive):
+            if brief:
+                orbit = attractors.settle(flow, start, budget=Budget(BRIEF), watch=0)
+            else:
+                orbit = attractors.settle(flow, start)
+            if self._fast and not brief and _faint(orbit, drive):
                 flow = Flow(system, drive, fast=False)
                 orbit = attractors.settle(flow, start)
             trace = np.zeros(0)

@@ -84,6 +84,12 @@ class Flow:
         return self.drive.period / mode_tables.step_length(A, self.drive.omega)
 
     @property
+    def met(self) -> list[ModeKey]:
+        """Modes that the runs so far have entered; none of the modal fast path."""
+        more = [] if self._tabulated is None else self._tabulated.targets.keys
+        return list(dict.fromkeys([*more, *self._keys]))
+
+    @property
     def kernel(self) -> str:
         """Which kernel carries it as long as all is usual: "modal", "tabulated" ("circuit" for one
         that keeps to its working modes) or "general"."""

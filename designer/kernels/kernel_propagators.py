@@ -283,29 +283,32 @@ def _watch(
 
 
 @leaf
-def _clear(driven: DrivenModes, m: int, at: int, slack: float, reach: Float) -> bool:
+def _clear(driven: DrivenModes, m: int, at: int, slack: float, reach: Float, guards: Float) -> bool:
     """Whether no far boundary of mode m is near the state at ``at``, give or take a part of
-    ``reach``."""
+    ``reach``. guards : (far,) scratch."""
     n, far, data = len(driven.unit), driven.far, driven.data
     o = (TABLES + driven.width * (m + 1) - (2 * n + 1) * far) & MASK
     for g in range(far):
-        total = data[o + 2 * n * far + g]
-        for j in range(n):
-            up, down = data[o + far * j + g], data[o + far * (n + j) + g]
-            total += (up + down) * data[at + j] + (up - down) * slack * reach[j]
-        if not total < 0.0:
-            return False
-    return True
+        guards[g] = data[o + 2 * n * far + g]
+    for j in range(n):
+        high, low = data[at + j] + slack * reach[j], data[at + j] - slack * reach[j]
+        for g in range(far):
+            guards[g] += data[o + far * j + g] * high + data[o + far * (n + j) + g] * low
+    near = 0
+    for g in range(far):
+        near += not guards[g] < 0.0
+    return near == 0
 
 
 @leaf
 def _clear_way(
-    driven: DrivenModes, base: int, m: int, end: float, slack: float, work: Float, reach: Float
-) -> bool:
+    driven: DrivenModes, base: int, m: int, end: float, slack: float, work: Float, reach: Float,
+    guards: Float,
+) -> bool:  # fmt: skip
     """Whether no far boundary comes near in mode m over [0, end], the end left out: by the ends of
     each step, and where these prove nothing by those of its parts. slack : for the first step."""
     data, unit = driven.data, driven.unit
-    part, clear = data[(base & MASK) + PART], _clear(driven, m, NOW, slack, reach)
+    part, clear = data[(base & MASK) + PART], _clear(driven, m, NOW, slack, reach, guards)
     for k in range(STEPS):
         first = PARTS * k
         if not first * part < end:
@@ -313,12 +316,12 @@ def _clear_way(
         following = False
         if (first + PARTS) * part <= end:
             _go(data, base, first + PARTS, unit, work)
-            following = _clear(driven, m, WITHIN, 1.0, reach)
+            following = _clear(driven, m, WITHIN, 1.0, reach, guards)
         if not (clear and following):
             for p in range(first, first + PARTS + 1):
                 if p * part < end:
                     _go(data, base, p, unit, work)
-                    if not _clear(driven, m, WITHIN, min(FINE, slack), reach):
+                    if not _clear(driven, m, WITHIN, min(FINE, slack), reach, guards):
                         return False
         clear = following
     return True
@@ -576,7 +579,7 @@ def advance(
     stretch, omega = period / anchor.shape[0], driven.drive[0]
     watch = rows + one * (n + len(driven.modes.watched) + clearances)
     work, reach, values = np.zeros(SCRATCH), np.zeros(n), np.zeros((2, 32))
-    boxes, depth = np.zeros((len(target), 2 * n)), np.zeros(clearances)
+    boxes, depth, guards = np.zeros((len(target), 2 * n)), np.zeros(clearances), np.zeros(far)
     for i in range(n):
         data[NOW + i] = strobes[0, i] = x[i]
     data[NOW + n], data[NOW + n + 1], data[NOW + n + 2] = 0.0, 1.0, 1.0
@@ -604,7 +607,7 @@ def advance(
             slack = min(end / h, 1.0) ** 2
             if not driven.closely:
                 _watch(data, base, boxes, m, end, slack, unit, work, reach)
-            elif not _clear_way(driven, base, m, end, slack, work, reach):
+            elif not _clear_way(driven, base, m, end, slack, work, reach, guards):
                 return LEFT
         if measure:
             _measure(driven, m, end, work, trail, values, depth)
@@ -619,7 +622,7 @@ def advance(
         t += end
         if far > 0 and not driven.closely:
             _keep(boxes, m, n, data, NOW, slack, reach)
-        elif far > 0 and not _clear(driven, m, NOW, min(FINE, slack), reach):
+        elif far > 0 and not _clear(driven, m, NOW, min(FINE, slack), reach, guards):
             return LEFT
         if not (abs(data[NOW]) < 1e12):
             code = DIVERGED

@@ -218,7 +218,7 @@ class Sampled:
         self.step = self.flow.drive.period / points
         self.x = run.strobes
         self.u = self._drive(self.step * np.arange(len(self.x), dtype=np.float64))
-        self.keys: list[ModeKey] = [self.system.start]
+        self.keys: list[ModeKey] = list(dict.fromkeys([self.system.start, *self.flow.met]))
         self.at = modes_at(self.system, self.x, self.u, self.keys)
         self.slope = np.empty_like(self.x)
         for i, key in enumerate(self.keys):
@@ -261,8 +261,8 @@ def _brackets(values: Array) -> tuple[Index, Array, Array]:
 def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeKey]) -> Index:
     """Index into ``keys``, which grows, of the mode at each state (k, n) and drive (k,).
 
-    The walk of ``PiecewiseLinearSystem.mode_at`` for all at once: across the most violated guard
-    until none is violated.
+    Where none of the keys that are known holds, the walk of ``PiecewiseLinearSystem.mode_at`` for
+    all at once: across the most violated guard until none is violated.
 
     Raises
     ------
@@ -270,6 +270,12 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
     """
     at = np.zeros(len(x), dtype=np.intp)
     unsettled = np.arange(len(x))
+    for i, key in enumerate(keys):
+        mode = system.mode(key)
+        if mode.guards and len(unsettled):
+            holds = (_guards(mode, x[unsettled], u[unsettled]) <= 0.0).all(axis=1)
+            at[unsettled[holds]] = i
+            unsettled = unsettled[~holds]
 
     def number(key: ModeKey) -> int:
         if key not in keys:

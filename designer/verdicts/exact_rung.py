@@ -26,13 +26,18 @@ def settled(
     cases: Sequence[Case],
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
+    *,
+    brief: bool = False,
 ) -> list[tuple[Orbit, Verdict, str]]:
-    """The orbit of each case, its verdict and the reason; ``progress`` is called once each."""
+    """The orbit of each case, its verdict and the reason; ``progress`` is called once each. brief :
+    as of ``Ensemble.respond``."""
     if not cases:
         return []
     boards, questions, excitations, starts = zip(*cases, strict=True)
     drives = [excitation.drive for excitation in excitations]
-    orbits = ensemble.settle(boards, drives, np.array(starts), jobs=jobs, progress=progress)
+    orbits = ensemble.settle(
+        boards, drives, np.array(starts), jobs=jobs, brief=brief, progress=progress
+    )
     return [(orbit, *q.judge(orbit)) for q, orbit in zip(questions, orbits, strict=True)]
 
 

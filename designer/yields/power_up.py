@@ -145,12 +145,14 @@ def switched_on(
     starts: Sequence[tuple[int, Question, Recipe, float]],
     jobs: int = 1,
     known: Sequence[Orbit | None] = (),
+    *,
+    brief: bool = False,
 ) -> list[PowerUpEnd]:
     """What each start leads to: a board of the ensemble, a response with its recipe, and the drive
     phase at power-up [rad].
 
     known : of each start the board's own orbit of the response, where it has one that attracts; a
-    start that has come to it is not settled again.
+    start that has come to it is not settled again. brief : as of ``Ensemble.respond``.
     """
     arrivals = _arrivals(ensemble, starts, jobs)
     orbits = _arrived(ensemble, starts, arrivals, known, jobs)
@@ -161,7 +163,7 @@ def switched_on(
         )
         if isinstance(arrival, Arrival) and orbit is None
     ]
-    ends = iter(settled(ensemble, cases, jobs))
+    ends = iter(settled(ensemble, cases, jobs, brief=brief))
     out = []
     for (_, question, _, _), arrival, orbit in zip(starts, arrivals, orbits, strict=True):
         if not isinstance(arrival, Arrival):

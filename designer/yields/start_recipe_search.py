@@ -173,14 +173,14 @@ class _Bench:
         starts: Sequence[tuple[int, Question, Recipe, float]],
         known: Sequence[Orbit | None],
     ) -> tuple[bool, ...]:
-        ends = switched_on(ensemble, starts, self.jobs, known)
+        ends = switched_on(ensemble, starts, self.jobs, known, brief=True)
         return tuple(end.verdict is Verdict.OK for end in ends)
 
 
 def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
     start = question.start.start
     cases: list[Case] = [(i, question, question.excitation, start) for i in range(BOARDS)]
-    as_built = enumerate(settled(sample, cases, jobs))
+    as_built = enumerate(settled(sample, cases, jobs, brief=True))
     able = {i: orbit for i, (orbit, verdict, _) in as_built if verdict is Verdict.OK}
     bench = _Bench(question, nominal, sample, able, jobs)
     every: list[_Trials] = []

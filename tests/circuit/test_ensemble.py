@@ -53,14 +53,13 @@ def nominal(kind: str, p: int) -> tuple[Drive, Orbit]:
 
 
 def respond(
-    kind: str, p: int, indices: range, *, fast: bool = True, jobs: int = 1
+    kind: str, p: int, indices: range, *, fast: bool = True, jobs: int = 1, brief: bool = False
 ) -> list[SettledBoard]:
     drive, orbit = nominal(kind, p)
     boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, indices), fast=fast)
     count = len(indices)
-    return boards.respond(
-        range(count), [drive] * count, np.tile(orbit.start, (count, 1)), jobs=jobs
-    )
+    starts = np.tile(orbit.start, (count, 1))
+    return boards.respond(range(count), [drive] * count, starts, jobs=jobs, brief=brief)
 
 
 def test_it_is_each_board_alone() -> None:
@@ -147,6 +146,24 @@ def test_where_chaos_is_not_plain_the_general_kernel_has_the_word(
         assert got.status is want.status
         assert got.start.tobytes() == want.start.tobytes()
         assert (got.lyapunov, got.periods) == (want.lyapunov, want.periods)
+
+
+def test_a_brief_answer_is_the_same_but_for_chaos_that_is_not_watched() -> None:
+    indices = range(12)
+    pairs = zip(
+        respond("saturation", 8, indices, brief=True),
+        respond("saturation", 8, indices),
+        strict=True,
+    )
+    chaotic = 0
+    for brief, whole in pairs:
+        if whole.orbit.status is OrbitStatus.PERIODIC and whole.orbit.periods < 800:
+            assert raw(brief) == raw(whole)
+        elif whole.orbit.status is OrbitStatus.APERIODIC:
+            chaotic += 1
+            assert brief.orbit.status is not OrbitStatus.PERIODIC
+            assert brief.orbit.periods < whole.orbit.periods
+    assert chaotic
 
 
 def raw(response: SettledBoard) -> tuple[bytes, ...]:

@@ -175,7 +175,10 @@ def test_only_a_recipe_that_worked_on_the_nominal_board_is_taken(
         starts: list[tuple[int, Question, Recipe, float]],
         _jobs: int,
         _known: object,
+        *,
+        brief: bool,
     ) -> list[Ended]:
+        assert brief
         alone = len(ensemble_.boards.values["R1"]) == 1
         return [
             Ended(
