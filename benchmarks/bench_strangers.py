@@ -51,6 +51,8 @@ GRACE = 5
 """CPU seconds that a process has to end by itself."""
 WALL = 10
 """Of the limit of CPU time: wall time after which a process that does nothing is stopped."""
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""As the command line has it: the matrices are small."""
 STAND = "parts stand"
 """How the line on standard error begins that says so."""
 ANSWERED, INEXACT, REFUSED, SILENT, FAILED = (
@@ -73,6 +75,7 @@ class Run:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            env=ONE_THREAD | os.environ,
             preexec_fn=lambda: _limited(seconds),
         )
         assert process.stderr is not None

@@ -53,7 +53,7 @@ BOX_ROUNDS = 8
 """How often scales are chosen before the search gives up."""
 BOUND_STEPS = 4_000_000
 """Steps of the tree of choices that looks for a lower bound."""
-LOOK = 2_000_000
+LOOK = 400_000
 """Steps of the engine in which a circuit has to settle on a wanted response."""
 BESIDE, BESIDE_TREE = 10, 2
 """Linear blocks that are tried beside the first: where joins find them, and where a tree of choices
