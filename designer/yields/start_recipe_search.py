@@ -42,6 +42,8 @@ SETTLE = 40
 REMAINDER = 1e-3
 LONGEST_WAIT = 4000
 """Drive periods of the last wait at most."""
+LONGEST_SWEEP = 20_000
+"""Drive periods of a slower sweep up to which it is tried: one from far away takes minutes."""
 ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
@@ -229,7 +231,8 @@ def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
 
     smooth = as_well(recipe.refined())
     slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)
-    return replace(recipe, smooth=smooth, slower=as_well(slow))
+    short = slow.steps * slow.hold <= LONGEST_SWEEP
+    return replace(recipe, smooth=smooth, slower=short and as_well(slow))
 
 
 def phase(number: int) -> float:
