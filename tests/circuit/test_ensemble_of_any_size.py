@@ -21,6 +21,7 @@ from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw_many
 from designer.yields.study import plan_study
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.system_text import clearance, system_text, table
 
 STIFFNESS = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 SYSTEM = SecondOrderSystem(
@@ -35,49 +36,24 @@ SYSTEM = SecondOrderSystem(
 )
 SCALE = Scale(1e-3, np.full(6, 6.0), 1.3)
 COUNT = 6
-TOGETHER = """
-format = 2
-[[mass]]
-name = "m1"
-mass = "2.14 kg"
-[[mass]]
-name = "m2"
-mass = "1.32 kg"
-[[spring]]
-between = ["m1", "ground"]
-stiffness = "2.84e+04 N/m"
-[[spring]]
-between = ["m2", "m1"]
-stiffness = "3.34e+04 N/m"
-[[spring]]
-between = ["m2", "ground"]
-stiffness = "4.09e+04 N/m"
-[[damper]]
-between = ["m1", "ground"]
-damping = "119 N s/m"
-[[damper]]
-between = ["m2", "m1"]
-damping = "89.5 N s/m"
-[[damper]]
-between = ["m2", "ground"]
-damping = "39.8 N s/m"
-[[clearance]]
-name = "A"
-between = ["m1", "m2"]
-lower = "-0.000488 m"
-stiffness = "1.14e+06 N/m"
-[[force]]
-on = "m1"
-amplitude = "78.7 N"
-[[force]]
-on = "m2"
-constant = "9.73 N"
-[[response]]
-frequency = "64 Hz"
-expect = "1-0-1"
-[circuit]
-dead_zone = "rectifier"
-"""
+TOGETHER = system_text(
+    {"m1": "2.14 kg", "m2": "1.32 kg"},
+    {
+        ("m1", "ground"): "2.84e+04 N/m",
+        ("m2", "m1"): "3.34e+04 N/m",
+        ("m2", "ground"): "4.09e+04 N/m",
+    },
+    {
+        ("m1", "ground"): "119 N s/m",
+        ("m2", "m1"): "89.5 N s/m",
+        ("m2", "ground"): "39.8 N s/m",
+    },
+    clearance("A", "m1", "m2", lower="-0.000488 m", stiffness="1.14e+06 N/m"),
+    table("force", on="m1", amplitude="78.7 N"),
+    table("force", on="m2", constant="9.73 N"),
+    table("response", frequency="64 Hz", expect="1-0-1"),
+    '[circuit]\ndead_zone = "rectifier"\n',
+)
 """Two masses that rest against each other by a stiff stop: the box of their states is mostly empty,
 and proves nothing of the diodes."""
 
