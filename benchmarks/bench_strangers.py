@@ -142,12 +142,12 @@ def measure(stranger: Stranger, folder: Path, seconds: float, boards: int) -> Ro
         "wall": round(run.wall, 2),
         "first_parts": None if run.noted is None else round(run.noted, 2),
     }
-    answer = _json(run.output)
+    answer = printed_json(run.output)
     if run.status in (0, 1) and answer is not None:
         row |= _answer(answer)
         after = [sys.executable, "-P", "-m", "benchmarks.stranger_boards", str(design), str(boards)]
         asked = Run(after, LATE)
-        row |= _json(asked.output) or {"not_asked": (asked.errors or ["no time left"])[-1]}
+        row |= printed_json(asked.output) or {"not_asked": (asked.errors or ["no time left"])[-1]}
         return row
     last = next((line for line in reversed(run.errors) if line.strip()), "")
     if run.status in (1, 2) and answer is None:
@@ -167,10 +167,11 @@ def _to_seek(row: Row) -> bool:
 def sought(file: Path, seconds: float) -> dict[str, Any] | None:
     """What the other search finds; None where it does not come to an end."""
     words = ["benchmarks.stranger_parts", str(file), "--seconds", str(seconds)]
-    return _json(Run([sys.executable, "-P", "-m", *words], 2 * seconds + 20).output)
+    return printed_json(Run([sys.executable, "-P", "-m", *words], 2 * seconds + 20).output)
 
 
-def _json(text: str) -> dict[str, Any] | None:
+def printed_json(text: str) -> dict[str, Any] | None:
+    """The object on standard output; None where there is none."""
     try:
         found = json.loads(text)
     except ValueError:
@@ -369,7 +370,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     lines = [
         "# Strangers' systems: who gets a circuit, how good, how soon, and who does not",
         "",
-        _filled(
+        filled(
             f"Made by `python -m benchmarks strangers --seed {seed} --count {len(rows)} "
             f"--seconds {seconds:g}`; systems that stand in `{LINES}` are taken as they are, so "
             "take the folder away to measure anew. Every system can be had again from the seed "
@@ -379,7 +380,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         f"- Commit: {commit()}",
         f"- Machine: {machine()}",
         "",
-        _filled(
+        filled(
             f"Of {f['systems']} systems {f['below_1_percent']} get a circuit whose largest "
             f"coefficient error is below 1 %, {f['within_20_s']} of them within {SOON:g} s and "
             f"{f['within_60_s']} within {LATE:g} s; {f['above_1_percent']} get one above 1 %, "
@@ -391,7 +392,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
             f"({BOARDS} boards, exact engine)."
         ),
         "",
-        _filled(
+        filled(
             "Seconds are CPU seconds of the whole verb `synthesise`, start-up and start recipes "
             "included, with all compiled code there: the machine was shared, and wall time says "
             "more of its load. *First parts* is wall time until the line on standard error that "
@@ -418,7 +419,8 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _filled(text: str) -> str:
+def filled(text: str) -> str:
+    """A paragraph of a report."""
     return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)
 
 

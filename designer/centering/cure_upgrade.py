@@ -171,7 +171,7 @@ def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
         opamp,
         supply=design.circuit.supply,
         saturation=spec.saturation,
-        stage=dead_zone_stage(model, spec, catalog),
+        stage=dead_zone_stage(model, spec, catalog, design.circuit.values),
         composites=design.composites,
     )
 

@@ -30,6 +30,7 @@ from .dead_zone_parts import (
     dead_zone_stage as dead_zone_stage,
     half_parts as half_parts,
     idle_limits as idle_limits,
+    reference_sign as reference_sign,
     stage_kind as stage_kind,
 )
 from .dead_zone_place import (

@@ -6,7 +6,7 @@ stop's force, belongs to the integrator. docs/synthesis.md has the formulas.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,7 +14,7 @@ from designer.base.errors import InputError
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
-from designer.circuit.dead_zone_place import DeadZonePlace, part_of
+from designer.circuit.dead_zone_place import SUM, DeadZonePlace, part_of
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode, Part, Section
 from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
 from designer.circuit.resistors import Resistors
@@ -36,11 +36,8 @@ class DeadZoneStage:
     """The rectifier's diode; None for the other kind."""
     reference: ReferenceEntry | None = None
     """The reference of thresholds and constant forces; None where nothing needs one."""
-
-    @property
-    def inverts(self) -> bool:
-        """Whether it works on the displacement's negative."""
-        return self.kind == "rectifier"
+    apart: frozenset[int] = frozenset()
+    """Clearances, by their place in the order, whose two halves have an output each."""
 
     @property
     def feeds(self) -> Mapping[int, str]:
@@ -51,7 +48,13 @@ class DeadZoneStage:
         """Where the stage of each clearance stands."""
         alone = len(clearances) == 1
         return tuple(
-            DeadZonePlace(clearance, index, alone, self.inverts)
+            DeadZonePlace(
+                clearance,
+                index,
+                alone,
+                inverts=self.kind == "rectifier" and index not in self.apart,
+                apart=index in self.apart,
+            )
             for index, clearance in enumerate(clearances)
         )
 
@@ -110,8 +113,12 @@ def stage_kind(spec: CircuitSpec, clearances: Sequence[Clearance]) -> Kind:
     return "saturation" if able else "rectifier"
 
 
-def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
+def dead_zone_stage(
+    model: MechanicalModel, spec: CircuitSpec, catalog: Catalog, parts: Collection[str] = ()
+) -> DeadZoneStage:
     """The stage that a model file asks for.
+
+    parts : names of the parts of a circuit that is there, which say whose halves are apart.
 
     Raises
     ------
@@ -121,7 +128,9 @@ def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog)
     kind = stage_kind(spec, system.clearances)
     if kind == "rectifier":
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-        return DeadZoneStage(kind, diode, reference)
+        indices = range(len(system.clearances))
+        apart = frozenset(i for i in indices if all(part_of(i, name) in parts for name in SUM))
+        return DeadZoneStage(kind, diode, reference, apart)
     if system.constant.any():
         return DeadZoneStage(kind, None, catalog.reference(spec.reference))
     return DeadZoneStage(kind)
@@ -224,7 +233,8 @@ def half_parts(index: int, side: int) -> HalfNames:
 def _rectifier(
     place: DeadZonePlace, resistor: Resistors, rails: ReferenceRails, model: DiodeModel
 ) -> tuple[list[Part], Stop]:
-    """A half-wave rectifier for each stop, both on one output node.
+    """A half-wave rectifier for each stop, both on one output node, or on one each which an
+    inverting amplifier sums (``DeadZonePlace.apart``).
 
     Inside the clearance the clamp diode holds the half's output away and the feedback resistor
     holds fv at 0 V; beyond the threshold the clamp lets go and the series diode takes over. A
@@ -234,16 +244,18 @@ def _rectifier(
     stand above fv (below it, in the upper half). A resistor in series with the clamp sees to that:
     between equal halves the clamp then carries 2 Vref/R201, whatever the depth of the contact, so
     the output stands at 2 Vref R208/R201 and a drop. It has R201's value unless it is given one of
-    its own. Without the other half there is nothing to keep off. ``idle_limits`` has unequal ones.
+    its own. Without the other half on its node there is nothing to keep off. ``idle_limits`` has
+    unequal ones.
     """
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    both = place.clearance.which == "both"
+    beside = place.clearance.which == "both" and not place.apart
     for side, stop in place.clearance.sides:
         half = half_names(place, side)
-        parts += _half(place, half, side, stop, resistor, rails, model, both=both)
+        parts += _half(place, half, side, stop, resistor, rails, model, beside=beside)
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
-    return parts, _stop(place, contacts, parts)
+    stop_of_place = _stop(place, contacts, parts)
+    return [*parts, *place.summed(resistor)], stop_of_place
 
 
 def _half(
@@ -255,12 +267,13 @@ def _half(
     rails: ReferenceRails,
     model: DiodeModel,
     *,
-    both: bool,
+    beside: bool,
 ) -> list[Part]:
-    """The half of one stop; ``both``: the other one is there too."""
+    """The half of one stop; ``beside``: the other one is on its node."""
     word = "upper" if side > 0 else "lower"
     role, clamped = f"{word} half of the dead zone", half.output
-    sign, preloaded = _reference_sign(side, stop), stop.gap < 0.0
+    sign, preloaded = reference_sign(place, side, stop), stop.gap < 0.0
+    acting, driven = place.acting(side), place.half_output(side)
     parts: list[Part] = [
         _section(half.section, half.node, half.output, role),
         *resistor(half.source, place.displacement, half.node, role),
@@ -268,24 +281,25 @@ def _half(
     if stop.gap:
         parts += resistor(half.threshold, RAILS[sign], half.node, f"threshold of the {role}")
     parts += [
-        *resistor(half.feedback, half.node, place.output, role),
-        _diode(half.series, half.output, place.output, side, model, preloaded, role),
+        *resistor(half.feedback, half.node, driven, role),
+        _diode(half.series, half.output, driven, acting, model, preloaded, role),
     ]
-    if both:
+    if beside:
         clamped = half.between
         like = half.threshold if stop.gap else half.source
         parts += resistor(half.lift, clamped, half.output, f"clamp of the {role}", like=like)
     clamps = f"clamp of the {role}"
-    parts.append(_diode(half.clamp, half.node, clamped, side, model, not preloaded, clamps))
+    parts.append(_diode(half.clamp, half.node, clamped, acting, model, not preloaded, clamps))
     if stop.gap:
         end = "upper" if sign > 0 else "lower"
         parts += rails(sign, f"reference of the {role}", f"feed of the reference, {end} half")
     return parts
 
 
-def _reference_sign(side: int, stop: Side) -> int:
-    """Which reference sets the threshold of a side: its own, of a preloaded stop the other."""
-    return side if stop.gap >= 0.0 else -side
+def reference_sign(place: DeadZonePlace, side: int, stop: Side) -> int:
+    """Sign of the reference that sets a threshold of a rectifier: of the side on which the stage
+    meets the stop, of a preloaded stop the other."""
+    return place.acting(side) if stop.gap >= 0.0 else -place.acting(side)
 
 
 def _stop(place: DeadZonePlace, contacts: Mapping[int, Contact], parts: Sequence[Part]) -> Stop:
@@ -309,13 +323,15 @@ def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tupl
     thresholds of the driving and the idle half, s the driving half's gain, R' and F' the idle
     half's input and feedback resistor. The clamp's resistor and two drops are what keeps the diode
     off; a half steeper than the idle one takes from that current. values : [ohm] by name, a
-    composite's as one. Empty where no clearance has both halves.
+    composite's as one. Empty where no clearance has both halves on one output.
     """
     out = {}
     for index, stop in enumerate(circuit.stops):
         if circuit.diodes and len(stop.contacts) == 2:
             for side in (1, -1):
                 driving, idle = (half_parts(index, end) for end in (side, -side))
+                if idle.lift not in values:
+                    continue
                 diodes = {d.name: d for d in circuit.diodes}
                 feeding = diodes[driving.series].nets
                 section = next(s.name for s in circuit.sections if s.output in feeding)

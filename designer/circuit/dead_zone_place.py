@@ -15,6 +15,8 @@ from designer.model.mechanics import Clearance
 
 OUTPUT = "fv"
 """Net of a stage's output where there is one clearance."""
+SUM = ("R210", "R211", "R212")
+"""Of the amplifier that sums both halves of a rectifier: of the upper, of the lower, feedback."""
 PLAIN = 5
 """Clearances whose numbers follow the paper's; further ones would meet those of inverters."""
 BEYOND = 2000
@@ -40,6 +42,9 @@ class DeadZonePlace:
     """Whether there is no other."""
     inverts: bool
     """Whether the stage works on the displacement's negative."""
+    apart: bool = False
+    """Whether each half of a rectifier has an output of its own, which an inverting amplifier
+    sums: a half then drives nothing of the other one, however unequal they are."""
 
     def part(self, first: str) -> str:
         """The name of a part that is called so in the first clearance's stage."""
@@ -57,6 +62,33 @@ class DeadZonePlace:
     def output(self) -> str:
         """Net of the stage's output."""
         return self.net(OUTPUT)
+
+    def half_output(self, side: int) -> str:
+        """Net that a half of a rectifier drives, 1 upper or -1 lower."""
+        return self.net("fu" if side > 0 else "fl") if self.apart else self.output
+
+    def acting(self, side: int) -> int:
+        """The side on which the stage meets this stop: the other one where what follows inverts."""
+        return -side if self.apart else side
+
+    @property
+    def sum_resistors(self) -> tuple[str, ...]:
+        """Resistors of the amplifier that sums both halves, equal; none where they share their
+        output."""
+        return tuple(self.part(name) for name in SUM) if self.apart else ()
+
+    def summed(self, resistors: Resistors) -> list[Part]:
+        """The amplifier that sums both halves; nothing where they share their output."""
+        if not self.apart:
+            return []
+        role, node = "sum of the dead zone", self.net("d3")
+        upper, lower, back = self.sum_resistors
+        return [
+            Section(self.section("U3D"), node, GROUND, self.output, role),
+            *resistors(upper, self.half_output(1), node, role),
+            *resistors(lower, self.half_output(-1), node, role),
+            *resistors(back, node, self.output, role),
+        ]
 
     @property
     def reaction(self) -> str:

@@ -129,7 +129,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             opamp,
             supply=float(document["circuit"]["supply"]),
             saturation=spec.saturation,
-            stage=dead_zone_stage(model, spec, catalog),
+            stage=dead_zone_stage(model, spec, catalog, values),
             composites=document.get("composites", {}),
         )
         gain, bias, limit = (float(document["circuit"][k]) for k in ("gain", "bias", "saturation"))

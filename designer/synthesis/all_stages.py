@@ -18,7 +18,7 @@ from designer.base.progress import doing
 from designer.catalog.output_stage import OutputStage
 from designer.circuit.build import constant_resistor
 from designer.circuit.coefficients import EXACT
-from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts
+from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts, reference_sign
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
@@ -310,7 +310,7 @@ class _Sizing:
         """Conductance on each reference that is there [1/ohm], by its sign."""
         loads: dict[int, float] = {}
         ends = [
-            (side if stop.gap >= 0.0 else -side, half_parts(place.index, side).threshold)
+            (reference_sign(place, side, stop), half_parts(place.index, side).threshold)
             for place in self.places
             for side, stop in place.clearance.sides
             if self.question.stage.kind == "rectifier"

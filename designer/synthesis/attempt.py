@@ -34,7 +34,7 @@ from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLi
 from designer.synthesis.part_checks import (
     buyable,
     drive_resistors,
-    inverter_resistors,
+    equal_resistors,
     nearest,
     unit_circuit,
 )
@@ -69,8 +69,8 @@ class Order:
     """Price class of each capacitance."""
     resistor_prices: Mapping[float, float]
     """Price class by resistance."""
-    inverters: frozenset[str]
-    """Names of the inverters' resistors."""
+    levels: tuple[frozenset[str], ...]
+    """Groups of equal resistors that only set a level: those of each inverter and sum."""
     drive: tuple[str, ...]
     """Names of the resistors from the generator, one for each driven mass."""
     largest: float
@@ -88,15 +88,20 @@ class Order:
         *,
         largest: float = 1.0,
         aims: Aims = NO_AIMS,
+        apart: frozenset[int] = frozenset(),
     ) -> Order:
         """What the model file asks for, with what the catalogue has for it.
+
+        apart : ``DeadZoneStage.apart``.
 
         Raises
         ------
         InputError : an unknown part of the catalogue.
         Unreachable : no value of the series can be bought.
         """
-        opamp, unit = catalog.opamp(spec.opamp), unit_circuit(model, spec, catalog)
+        opamp = catalog.opamp(spec.opamp)
+        stage = replace(dead_zone_stage(model, spec, catalog), apart=apart)
+        unit = unit_circuit(model, spec, catalog, stage)
         resistors = buyable("resistor", spec, catalog)
         capacitors = buyable("capacitor", spec, catalog)
 
@@ -108,7 +113,7 @@ class Order:
             spec=spec,
             opamp=opamp,
             output=output_at(opamp, spec.supply, spec.saturation),
-            stage=dead_zone_stage(model, spec, catalog),
+            stage=stage,
             peaks=peaks,
             resistors=resistors,
             capacitors=capacitors,
@@ -118,7 +123,7 @@ class Order:
             resistor_prices={
                 v: price("resistor", v, spec.resistor_grade) for v in resistors.tolist()
             },
-            inverters=inverter_resistors(unit),
+            levels=equal_resistors(unit),
             drive=drive_resistors(unit),
             largest=largest,
             aims=aims,
@@ -313,7 +318,8 @@ def _question(order: Order, limits: ConditionLimits) -> StageQuestion:
 def _inverters(
     order: Order, limits: ConditionLimits, values: Mapping[str, float], thrifty: bool
 ) -> dict[str, float] | Shortfall:
-    """The inverters' resistors: one value for all, but where a matched group says otherwise."""
+    """The inverters' resistors, and those of sums: one value for all, but where a matched group
+    says otherwise."""
     light = order.resistors[order.resistors >= limits.load]
     if len(light) == 0:
         return Shortfall("load", True)
@@ -322,18 +328,16 @@ def _inverters(
         least = max(limits.load, float(order.resistors[0]))
         known = [v for n, v in values.items() if n.startswith("R") and v >= least]
         base = nearest(np.array(known or [base]), base)
-    out = dict.fromkeys(sorted(order.inverters), base)
+    out = dict.fromkeys(sorted(frozenset().union(*order.levels)), base)
     for group in order.spec.matched:
         given = {values[name] for name in group if name in values}
-        members = order.inverters & set(group)
-        if len(given) > 1 and members:
-            return Shortfall("matched parts", True)
-        for name in members:
-            # An inverter's two resistors are equal, so one that is matched matches the other.
-            number = int(name[1:])
-            pair = (f"R{number - number % 2}", f"R{number - number % 2 + 1}")
+        for equal in order.levels:
+            if not equal & set(group):
+                continue
+            if len(given) > 1:
+                return Shortfall("matched parts", True)
             for value in given:
-                out |= dict.fromkeys(pair, value)
+                out |= dict.fromkeys(sorted(equal), value)
     return out
 
 

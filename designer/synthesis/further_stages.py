@@ -252,7 +252,7 @@ def lifts(
     the stop is in contact at rest. shares : of ``idle_shares``. limit : of an output [V].
     resistors : that an output may drive, ascending [ohm].
     """
-    if len(sources) < 2:
+    if len(sources) < 2 or place.apart:
         return {}
     total = sum(thresholds.values())
     out = {}

@@ -153,8 +153,16 @@ def nearest(values: Array, wanted: float) -> float:
     return float(values[int(np.argmin(np.abs(np.log(values / wanted))))])
 
 
-def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> Circuit:
-    """The circuit of this model with every value 1: the names of its parts are what counts."""
+def unit_circuit(
+    model: MechanicalModel,
+    spec: CircuitSpec,
+    catalog: Catalog,
+    stage: DeadZoneStage | None = None,
+) -> Circuit:
+    """The circuit of this model with every value 1: the names of its parts are what counts.
+
+    stage : of its dead zones; the one that the file asks for, if None.
+    """
     opamp = catalog.opamp(spec.opamp)
     return build.circuit_of(
         model,
@@ -162,20 +170,21 @@ def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) ->
         opamp,
         supply=spec.supply,
         saturation=spec.saturation,
-        stage=dead_zone_stage(model, spec, catalog),
+        stage=dead_zone_stage(model, spec, catalog) if stage is None else stage,
     )
 
 
-def inverter_resistors(circuit: Circuit) -> frozenset[str]:
-    """Resistors of the inverters, which only set a level: the two of an amplifier that neither
-    integrates nor belongs to a dead zone."""
+def equal_resistors(circuit: Circuit) -> tuple[frozenset[str], ...]:
+    """Groups of resistors that are equal and only set a level: the two of an amplifier that neither
+    integrates nor belongs to a dead zone, and the three that sum the halves of one."""
     stored = {net for capacitor in circuit.capacitors for net in capacitor.nets}
-    out: set[str] = set()
+    sums = {stop.output for stop in circuit.stops}
+    out = []
     for s in circuit.sections:
-        at = [r.name for r in circuit.resistors if s.inverting in r.nets]
-        if not s.limits and s.inverting not in stored and len(at) == 2:
-            out.update(at)
-    return frozenset(out)
+        at = frozenset(r.name for r in circuit.resistors if s.inverting in r.nets)
+        if not s.limits and s.inverting not in stored and (len(at) == 2 or s.output in sums):
+            out.append(at)
+    return tuple(out)
 
 
 def drive_resistors(circuit: Circuit) -> tuple[str, ...]:
@@ -190,7 +199,7 @@ def matching_resistors(circuit: Circuit) -> tuple[str, ...]:
     a supply to a reference. Only these can gain from a second part."""
     held = {net for ref in circuit.references for net in ref.nets}
     rails = {supply.net for supply in circuit.supplies}
-    others = inverter_resistors(circuit) | set(drive_resistors(circuit))
+    others = set(drive_resistors(circuit)).union(*equal_resistors(circuit))
     return tuple(
         r.name
         for r in circuit.resistors

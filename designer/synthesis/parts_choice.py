@@ -60,14 +60,11 @@ BESIDE, BESIDE_TREE = 10, 2
 does, which is slower by far."""
 EMPTY = 1e-9
 """Relative: so far below a bound there is no choice, where at the bound there may be one."""
+LEAST_IDLE = 0.2
+"""Least share of an idle half's current (``idle_shares``) with which both halves share an output;
+the driving one has so much of the swing."""
 ASIDE = 1e-6
 """Relative: the ends of an interval of R4 leave out the value between."""
-SPLIT = (
-    "its two stops in two clearances: one [[clearance]] with only upper, another at the same place "
-    "with only lower; each has its own count then, so that 1-1-1 is 1-1-0;0-1"
-)
-"""What frees a clearance whose stops are too unequal for one stage: beside a much steeper half, its
-idle half does not stay off."""
 FREES = {
     "frequency": "widen circuit.frequency or circuit.capacitor_range",
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
@@ -111,14 +108,20 @@ class _Verified:
 
 @dataclass(frozen=True)
 class _Missed:
-    """Why there is no design, the side conditions that finished circuits broke on the way there,
-    and what would free it where that is known."""
+    """Why there is no design, and the side conditions that finished circuits broke on the way
+    there."""
 
     short: Shortfall
     broken: tuple[str, ...] = ()
-    free: str = ""
     conflicts: tuple[Conflict, ...] = ()
     """Limits that cannot be kept together, by a proof; none where that is not why."""
+    apart: int | None = None
+    """The clearance, by its place in the order, whose idle half would not stay off beside the other
+    one; the circuit is to be had with both apart."""
+
+
+def _apart(index: int) -> _Missed:
+    return _Missed(Shortfall("swing", True), ("swing",), apart=index)
 
 
 def synthesise(
@@ -148,6 +151,11 @@ def synthesise(
     order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims)
     search = _Search(order, responses)
     best = search.best(spec.active_conditions)
+    while isinstance(best, _Missed) and best.apart is not None:
+        apart = order.stage.apart | {best.apart}
+        order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims, apart=apart)
+        search = _Search(order, responses)
+        best = search.best(spec.active_conditions)
     if isinstance(best, _Missed):
         search.refuse(best)
     design = best.design
@@ -176,8 +184,9 @@ class _Search:
         if self.by_scales:
             return self._in_box(conditions)
         answer = self._rounds(conditions, slower=False)
-        short = isinstance(answer, _Missed) and answer.broken and not answer.free
-        if short and "bandwidth" in conditions:
+        if isinstance(answer, _Missed) and answer.apart is not None:
+            return answer
+        if isinstance(answer, _Missed) and answer.broken and "bandwidth" in conditions:
             answer = self._rounds(conditions, slower=True)
         if isinstance(answer, _Missed) and not self.whole_by_joins and not self._asked:
             return self._in_box(conditions)
@@ -268,7 +277,7 @@ class _Search:
         guilty, names = self._guilty(missed)
         if names and names != what:
             what += f"; side condition: {names}"
-        free = missed.free or FREES.get(missed.short.what, "a wider choice of parts")
+        free = FREES.get(missed.short.what, "a wider choice of parts")
         if guilty:
             free += "; or circuit.side_conditions without " + " or ".join(guilty)
         whole = self.by_joins or missed.short.whole
@@ -320,7 +329,7 @@ class _Search:
             names += tuple(check.name for check in broken)
             apart = self._too_unequal(broken)
             if apart is not None:
-                return self._unequal(apart)
+                return _apart(apart)
             tighter = within.tightened(broken, design, slower=slower)
             if tighter == within:
                 break
@@ -329,10 +338,11 @@ class _Search:
 
     def _in_box(self, conditions: frozenset[str]) -> _Verified | _Missed:
         """Scales first, then parts; verify, tighten what is not kept, and again."""
-        for index, clearance in enumerate(self.order.model.second_order().clearances):
-            shares = idle_shares(clearance, self.order.peaks.reach(index))
-            if self.order.stage.kind == "rectifier" and min(shares.values(), default=1.0) <= 0.0:
-                return self._unequal(clearance.name)
+        for place in self.order.stage.places(self.order.model.second_order().clearances):
+            shares = idle_shares(place.clearance, self.order.peaks.reach(place.index))
+            least = min(shares.values(), default=1.0)
+            if self.order.stage.kind == "rectifier" and not place.apart and least < LEAST_IDLE:
+                return _apart(place.index)
         within = stated = self._limits(conditions)
         names: tuple[str, ...] = ()
         before, broken = None, list[ConditionCheck]()
@@ -391,20 +401,15 @@ class _Search:
         bound, proof = linear_search.lower_bound(question, made.errors.max_error, BOUND_STEPS)
         return replace(made.linear, bound=bound, proved=True, proof=proof)
 
-    @staticmethod
-    def _unequal(clearance: str) -> _Missed:
-        what = f"the stops of clearance {clearance}, too unequal for one stage"
-        return _Missed(Shortfall(what, True), ("swing",), SPLIT)
-
-    def _too_unequal(self, broken: Sequence[ConditionCheck]) -> str | None:
-        """The clearance whose steeper half drives fv further than its other half can idle, which
-        no amplitude mends; None without one."""
+    def _too_unequal(self, broken: Sequence[ConditionCheck]) -> int | None:
+        """The clearance, by its place in the order, whose steeper half drives fv further than its
+        other half can idle, which no amplitude mends; None without one."""
         where = {check.where for check in broken if check.quantity == "rectifier_fv_v"}
         for index, clearance in enumerate(self.order.model.second_order().clearances):
             stops = [stop for _, stop in clearance.sides]
             diodes = {half_parts(index, side).series for side, _ in clearance.sides}
             if where & diodes and len({stop.stiffness for stop in stops}) > 1:
-                return clearance.name
+                return index
         return None
 
     def _within_most_values(

@@ -390,7 +390,7 @@ class _Maker:
         assert diode is not None
         assert reference is not None
         drop = diode_model(diode).drop
-        idle = idle_shares(clearance, reach)
+        idle = {} if place.apart else idle_shares(clearance, reach)
         room = sum(stop.gap for stop in stops.values())
         own = self.volts(2 * mass) + gain
         for sides in halves(clearance):
@@ -499,7 +499,7 @@ class _Maker:
         light = o.resistors[o.resistors >= self.within.load]
         base = nearest(light if len(light) else o.resistors, BASE)
         nothing = Affine(np.zeros(len(self.lists)), float(np.log(base)))
-        known |= dict.fromkeys(o.inverters, nothing)
+        known |= dict.fromkeys(frozenset().union(*o.levels), nothing)
         frequency = -self.time + float(np.log(max(o.peaks.fastest, 1e-300) / (2.0 * np.pi)))
         for section in circuit.sections:
             yield from self._stage_sums(circuit, section, known, frequency)

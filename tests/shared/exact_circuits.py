@@ -73,6 +73,7 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
             values |= {f"R{first}": 10e3, f"R{first + 2}": 10e3 * slope}
             if stop.gap:
                 values[f"R{first + 1}"] = 10e3 * VREF / (abs(stop.gap) * own)
+        values |= {f"R{base + k}": 10e3 for k in (10, 11, 12)}
         if len(clearance.sides) == 2:
             span = own * sum(stop.gap for _, stop in clearance.sides)
             values |= dict.fromkeys((f"R{base + 8}", f"R{base + 9}"), 10e3 * IDLE / span)
