@@ -16,13 +16,12 @@ import json
 import shutil
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks.bench_flow import commit, machine, table
-from benchmarks.bench_strangers import REPORT, SEED, Run, filled, printed_json
+from benchmarks.bench_strangers import REPORT, SEED, Run, ended, filled, last_line, printed_json
 from benchmarks.stranger_systems import Stranger, draw
 
 FILE, RUNS_FILE, SEARCHES_FILE = "runs.md", "runs.jsonl", "searches.jsonl"
@@ -47,10 +46,10 @@ def designer(words: Sequence[str], seconds: float = LONG) -> Run:
 def run_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:
     """What ``run`` says of the system, and ``rules`` of its board."""
     ran = designer(["run", str(file), "--out", str(design), "--json"])
-    row: dict[str, Any] = _cost(stranger, ran)
+    row = ended(stranger, ran)
     answer = printed_json(ran.output)
     if answer is None:
-        return row | {"said": _last(ran)}
+        return row | {"said": last_line(ran)}
     row |= _study(answer)
     boards = sorted((design / "kicad").glob("*.kicad_pcb"))
     if not boards:
@@ -58,7 +57,7 @@ def run_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:
     judged = designer(["rules", str(design), "--board", str(boards[0]), "--json"])
     answer = printed_json(judged.output)
     if answer is None:
-        return row | {"said": _last(judged)}
+        return row | {"said": last_line(judged)}
     rules = answer["rules"]
     unconnected = next(rule for rule in rules if rule["id"] == "unconnected")
     return row | {
@@ -72,33 +71,16 @@ def run_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:
 def search_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:
     """What ``search`` says of the system."""
     ran = designer(["search", str(file), "--out", str(design), "--json"], 2 * LONG)
-    row: dict[str, Any] = _cost(stranger, ran)
+    row = ended(stranger, ran)
     answer = printed_json(ran.output)
     if answer is None:
-        return row | {"said": _last(ran)}
+        return row | {"said": last_line(ran)}
     return row | {
         "max_error": answer["max_error"],
         "warnings": answer["warnings"],
         "responses": [_yield(response) for response in answer["responses"]],
         "search": answer.get("search"),
     }
-
-
-def _cost(stranger: Stranger, run: Run) -> dict[str, Any]:
-    return {
-        "number": stranger.number,
-        "masses": stranger.masses,
-        "clearances": stranger.clearances,
-        "kinds": list(stranger.kinds),
-        "size": stranger.size,
-        "exit": run.status,
-        "cpu": round(run.cpu, 1),
-        "wall": round(run.wall, 1),
-    }
-
-
-def _last(run: Run) -> str:
-    return next((line for line in reversed(run.errors) if line.strip()), "nothing")
 
 
 def _study(answer: Row) -> dict[str, Any]:
@@ -152,8 +134,12 @@ def population(
 # The report
 
 
-def causes(row: Row) -> Iterator[str]:
-    """What is not as it should be with a system after ``run``, one kind each."""
+def causes(row: Row) -> list[str]:
+    """What is not as it should be with a system after ``run``, each once."""
+    return list(dict.fromkeys(_causes(row)))
+
+
+def _causes(row: Row) -> Iterator[str]:
     if "responses" not in row:
         ran_out = row["exit"] < 0
         yield f"no end within {LONG:g} s of CPU" if ran_out else f"ended with status {row['exit']}"
@@ -199,14 +185,12 @@ def figures(rows: Sequence[Row], searches: Sequence[Row]) -> dict[str, int]:
 
 
 def _reached(row: Row) -> bool:
-    return (
-        all((r["rate"] or 0) >= WANTED for r in row["responses"]) if "responses" in row else False
-    )
+    return "responses" in row and all((r["rate"] or 0) >= WANTED for r in row["responses"])
 
 
 def _words(row: Row) -> str:
     rate = [r["rate"] for r in row.get("responses", ())]
-    said = "; ".join(Counter(causes(row))) if "equations" in row else row.get("said", "")
+    said = "; ".join(causes(row)) if "equations" in row else row.get("said", "")
     return f"wall {row['wall']:.0f} s, yields {rate}: {said}"
 
 
@@ -229,7 +213,7 @@ def report(rows: Sequence[Row], searches: Sequence[Row], seed: int) -> str:
     f = figures(rows, searches)
     found: dict[str, list[str]] = {}
     for row in rows:
-        for cause in dict.fromkeys(causes(row)):
+        for cause in causes(row):
             found.setdefault(cause, []).append(str(row["number"]))
     columns = ["number", "masses, clearances", "what", "error", "model → circuit, ngspice", "yield"]
     columns += ["CPU s", "wall s"]
@@ -265,7 +249,7 @@ def report(rows: Sequence[Row], searches: Sequence[Row], seed: int) -> str:
         "## System by system",
         "",
         *table([*columns, "what is not as it should be"],
-               [[*_cells(row), "; ".join(dict.fromkeys(causes(row)))] for row in rows]),
+               [[*_cells(row), "; ".join(causes(row))] for row in rows]),
     ]  # fmt: skip
     if searches:
         lines += [

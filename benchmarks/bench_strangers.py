@@ -131,17 +131,8 @@ def measure(stranger: Stranger, folder: Path, seconds: float, boards: int) -> Ro
     shutil.rmtree(design, ignore_errors=True)
     words = ["synthesise", str(file), "--out", str(design), "--json"]
     run = Run([sys.executable, "-P", "-m", "designer", *words], seconds, STAND)
-    row: dict[str, Any] = {
-        "number": stranger.number,
-        "masses": stranger.masses,
-        "clearances": stranger.clearances,
-        "kinds": list(stranger.kinds),
-        "size": stranger.size,
-        "exit": run.status,
-        "cpu": round(run.cpu, 2),
-        "wall": round(run.wall, 2),
-        "first_parts": None if run.noted is None else round(run.noted, 2),
-    }
+    row = ended(stranger, run)
+    row["first_parts"] = None if run.noted is None else round(run.noted, 2)
     answer = printed_json(run.output)
     if run.status in (0, 1) and answer is not None:
         row |= _answer(answer)
@@ -149,7 +140,7 @@ def measure(stranger: Stranger, folder: Path, seconds: float, boards: int) -> Ro
         asked = Run(after, LATE)
         row |= printed_json(asked.output) or {"not_asked": (asked.errors or ["no time left"])[-1]}
         return row
-    last = next((line for line in reversed(run.errors) if line.strip()), "")
+    last = last_line(run)
     if run.status in (1, 2) and answer is None:
         said = _said(run.errors)
         row |= {"outcome": REFUSED, "said": said}
@@ -158,6 +149,25 @@ def measure(stranger: Stranger, folder: Path, seconds: float, boards: int) -> Ro
     else:
         row |= {"outcome": FAILED, "said": last}
     return row
+
+
+def ended(stranger: Stranger, run: Run) -> dict[str, Any]:
+    """What a row says of its system, and of how a verb on it ended."""
+    return {
+        "number": stranger.number,
+        "masses": stranger.masses,
+        "clearances": stranger.clearances,
+        "kinds": list(stranger.kinds),
+        "size": stranger.size,
+        "exit": run.status,
+        "cpu": round(run.cpu, 2),
+        "wall": round(run.wall, 2),
+    }
+
+
+def last_line(run: Run) -> str:
+    """The last line on standard error that says something; empty where none does."""
+    return next((line for line in reversed(run.errors) if line.strip()), "")
 
 
 def _to_seek(row: Row) -> bool:

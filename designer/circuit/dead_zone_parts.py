@@ -254,8 +254,8 @@ def _rectifier(
         half = half_names(place, side)
         parts += _half(place, half, side, stop, resistor, rails, model, beside=beside)
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
-    stop_of_place = _stop(place, contacts, parts)
-    return [*parts, *place.summed(resistor)], stop_of_place
+    # The amplifier that sums is linear, so it is none of the stop's switches.
+    return [*parts, *place.summed(resistor)], _stop(place, contacts, parts)
 
 
 def _half(
