@@ -1,9 +1,12 @@
 """Does the netlist compute the model's equation? Asked of ngspice, by ``.ac`` and ``.dc``.
 
 The deck is the one that is simulated in time, but for the generator's line, the analysis, and
-op-amps without finite gain and bias, as the matching conditions and the coefficient errors assume.
+op-amps of gain `GAIN` and without bias, as the matching conditions and the coefficient errors assume.
 A constant force decides where the masses rest, so each clearance is open or closed without a change
-of the circuit (``static_rests``):
+of the circuit (``static_rests``). At rest a capacitor carries no current, which leaves ngspice all
+integrators in one loop without a gain that it could follow, and often no operating point. So
+beside each capacitor lies a source of the voltage that it has at rest, behind an inductor
+(`HOLDING`): the operating point falls apart into single stages, and no frequency sees it.
 
 - ``.ac`` from generator to v1 over a decade around resonance, all clearances open and in each
   contact, against the model's transfer function at the design's scales;
@@ -17,7 +20,7 @@ order in each, and by `FLOOR` beside it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -35,7 +38,6 @@ from designer.circuit.stop import Stop
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import SecondOrderSystem
 from designer.spice import deck
-from designer.spice.convergence_aids import did_not_converge
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
@@ -47,9 +49,13 @@ FLOOR = 1e-3
 """What may differ beside the coefficient errors."""
 POINTS = 50
 """Points of an ``.ac`` analysis; a decade. Of each stretch of a ``.dc`` analysis likewise."""
-EASY_GAIN = 1e6
-"""Open-loop gain of the op-amps where ngspice finds no operating point with more; it errs by the
-noise gain over it, a tenth of `FLOOR` at a noise gain of 100."""
+DEEPEST = 5
+"""The deepest points of a contact's line, which always count."""
+GAIN = 1e8
+"""Open-loop gain of the op-amps, with which ngspice finds more operating points than with an
+endless one; it errs by the noise gain over it, a tenth of `FLOOR` at a noise gain of 10 000."""
+HOLDING = 1e15
+"""Inductance [H] beside each integrator's capacitor: a wire at rest, nothing at any frequency."""
 
 
 @dataclass(frozen=True)
@@ -150,20 +156,12 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
     curve = rests if design.circuit.stops else ()
 
-    def jobs(*, easy: bool) -> list[SpiceJob[Waveforms]]:
-        ac = [_ac(design, rest, low, high, easy=easy) for rest in rests]
-        return ac + [_dc(design, rest, easy=easy) for rest in curve]
-
+    jobs = [_ac(design, rest, low, high) for rest in rests]
+    jobs += [_dc(design, rest) for rest in curve]
     answers = {}
-    first = jobs(easy=False)
-    for number, answer in pool.map(first):
+    for number, answer in pool.map(jobs):
         answers[number] = answer
-        doing(f"{len(answers)} of {len(first)} runs")
-    # From the nodeset where a rectifier rests, its diodes' drop a constant, ngspice may end in vain
-    # where it finds the operating point by itself; op-amps of endless gain leave it nanovolts.
-    again = [i for i, answer in answers.items() if _unconverged(answer)]
-    easier = jobs(easy=True)
-    answers |= {again[k]: answer for k, answer in pool.map(easier[i] for i in again)}
+        doing(f"{len(answers)} of {len(jobs)} runs")
     findings = [_transfer(design, model, rest, answers[i]) for i, rest in enumerate(rests)]
     sweeps = [(rest, answers[len(rests) + i]) for i, rest in enumerate(curve)]
     return EquationCheck((*findings, *_curve(design, model, sweeps)), low, high)
@@ -242,24 +240,23 @@ def _deck(
     generator: float,
     sides: tuple[int, ...],
     *,
-    easy: bool,
     turned: bool = False,
 ) -> str:
-    """The deck that is simulated in time, with another generator line and analysis.
+    """The deck that is simulated in time, with another generator line and analysis, held at rest.
 
-    generator [V], sides : at the first operating point. ngspice looks for it from where the
-    reduction says it is; easy : from zero, with op-amps of `EASY_GAIN`. Neither finds every point.
-    turned : the generator's poles are exchanged, so that its voltage counts negative.
+    generator [V], sides : at the first operating point; ngspice looks for it from where the
+    reduction says it is. turned : the generator's poles are exchanged, so that its voltage counts
+    negative.
     """
     circuit = design.circuit
-    board = nominal_board(circuit, ideal=True)
-    if easy:
-        board = replace(board, inverse_gain=1.0 / EASY_GAIN)
+    board = replace(nominal_board(circuit, ideal=True), inverse_gain=1.0 / GAIN)
+    reduction = Reduction(circuit, board)
     try:
-        volts = [] if easy else rest(Reduction(circuit, board), generator, sides)
+        volts = rest(reduction, generator, sides)
+        resting = [*_holding(reduction, sides)]
+        resting.append(".nodeset " + " ".join(f"v({net})={v!r}" for net, v in volts))
     except ArithmeticError:  # a floating net: ngspice shall say it
-        volts = []
-    resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in volts)] if volts else []
+        resting = []
     text = deck.write(
         circuit,
         board,
@@ -287,12 +284,30 @@ def rest(reduction: Reduction, generator: float, sides: tuple[int, ...]) -> list
     """Every net with its voltage [V] where the circuit rests, in these contacts, at a constant
     generator voltage; exact, since a mode is linear."""
     circuit = reduction.circuit
-    key = circuit.in_contact(sides)
-    mode = reduction.system().mode(key)
-    x = np.linalg.solve(mode.A, -(mode.B * generator + mode.d))
-    voltage = reduction.solution(key).voltage
+    x = _resting_states(reduction, generator, sides)
+    voltage = reduction.solution(circuit.in_contact(sides)).voltage
     inputs = np.concatenate([x, [generator, 1.0]])
     return [(net, float(voltage[net] @ inputs)) for net in circuit.nets]
+
+
+def _resting_states(reduction: Reduction, generator: float, sides: tuple[int, ...]) -> Array:
+    """(n,) states where the circuit rests in these contacts."""
+    mode = reduction.system().mode(reduction.circuit.in_contact(sides))
+    return np.asarray(np.linalg.solve(mode.A, -(mode.B * generator + mode.d)))
+
+
+def _holding(reduction: Reduction, sides: tuple[int, ...]) -> Iterator[str]:
+    """Beside each capacitor its voltage at rest, which follows the generator, behind an inductor.
+    The first states are the capacitors' voltages."""
+    circuit = reduction.circuit
+    without = _resting_states(reduction, 0.0, sides)
+    by_generator = _resting_states(reduction, 1.0, sides) - without
+    capacitors = {c.name: c for c in circuit.capacitors}
+    for name, volts, gain in zip(circuit.states, without, by_generator, strict=False):
+        c = capacitors[name]
+        yield f"Lhold{name} {c.plus} hold{name} {HOLDING!r}"
+        yield f"Vhold{name} hold{name} follow{name} {float(volts)!r}"
+        yield f"Ehold{name} follow{name} {c.minus} {circuit.generator.net} 0 {float(gain)!r}"
 
 
 def _volts(design: Design, force: float) -> float:
@@ -300,16 +315,14 @@ def _volts(design: Design, force: float) -> float:
     return -force * design.amplitude()
 
 
-def _ac(
-    design: Design, resting: StaticRest, low: float, high: float, *, easy: bool
-) -> SpiceJob[Waveforms]:
+def _ac(design: Design, resting: StaticRest, low: float, high: float) -> SpiceJob[Waveforms]:
     generator = _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {generator!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, generator, resting.sides, easy=easy)
+    text = _deck(design, source, card, generator, resting.sides)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
 
 
-def _dc(design: Design, resting: StaticRest, *, easy: bool) -> SpiceJob[Waveforms]:
+def _dc(design: Design, resting: StaticRest) -> SpiceJob[Waveforms]:
     """From the near end, where the stage carries least; upwards, as every sweep goes."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
@@ -319,12 +332,8 @@ def _dc(design: Design, resting: StaticRest, *, easy: bool) -> SpiceJob[Waveform
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
     pairs = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
     nets = tuple(dict.fromkeys(net for pair in pairs for net in pair))
-    text = _deck(design, "DC 0", card, near, resting.sides, easy=easy, turned=turned)
+    text = _deck(design, "DC 0", card, near, resting.sides, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
-
-
-def _unconverged(answer: Waveforms | SimulationFailed) -> bool:
-    return isinstance(answer, SimulationFailed) and did_not_converge(answer)
 
 
 def _whole(sweep: Waveforms) -> Waveforms:
@@ -390,7 +399,7 @@ def _contact(
     index, side = resting.clearance, resting.side
     assert index is not None
     leftover, level = inside
-    slope, offset = _line(design, design.circuit.stops[index], sweep)
+    slope, offset = _line(design, design.circuit.stops[index], sweep, inside)
     wanted = _wanted_slope(design, model, index, side)
     place = resting.place(model)
     error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
@@ -410,11 +419,23 @@ def _contact(
     return findings
 
 
-def _line(design: Design, stop: Stop, sweep: Waveforms) -> tuple[float, float]:
-    """Slope and level of a stage's output over the displacement in its clearance."""
+def _line(
+    design: Design, stop: Stop, sweep: Waveforms, inside: tuple[float, float] | None = None
+) -> tuple[float, float]:
+    """Slope and level of a stage's output over the displacement in its clearance.
+
+    inside : the line through the dead zone. Only where the output departs from it by more than half
+    of the most is looked at, since a contact may close later than foretold, and not at once.
+    """
     sign = 1 if stop.difference is None else stop.difference[1]
     moved = sign * sweep.signals[_moving(design, stop)].real
-    slope, level = np.polyfit(moved, sweep.signals[stop.output].real, 1)
+    output = sweep.signals[stop.output].real
+    if inside is not None:
+        departure = np.abs(output - np.polyval(inside, moved))
+        closed = departure >= 0.5 * departure.max()
+        closed[-DEEPEST:] = True
+        moved, output = moved[closed], output[closed]
+    slope, level = np.polyfit(moved, output, 1)
     return float(slope), float(level)
 
 

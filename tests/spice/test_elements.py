@@ -18,7 +18,7 @@ from designer.spice.numerics_gate import WAVE_BOUND
 from designer.spice.pool import SpicePool
 from tests.shared.chains import chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit
-from tests.shared.system_text import clearance, table
+from tests.shared.system_text import clearance, system_text, table
 
 PEAK = 4.0
 """Volts of every state's peak."""
@@ -134,3 +134,23 @@ def test_ngspice_shows_the_model_s_response(case: str, pool: SpicePool) -> None:
         assert np.abs(spice - traces["model"].states[:, i]).max() < 2e-2 * peak
     check = equation_check.check(design, found, pool)
     assert check.passed, check.problem
+
+
+def test_a_contact_in_which_ngspice_once_found_no_rest_is_answered(pool: SpicePool) -> None:
+    """A beam's tip between two steep stops, in SI units: the integrators' loop as a whole left
+    ngspice without an operating point in the upper contact."""
+    between = {GROUND: "2.56e6 N/m"}, {GROUND: "929 N s/m"}
+    stops = {"upper_stiffness": "7.2e7 N/m", "lower_stiffness": "3.99e7 N/m"}
+    gaps = {"upper": "0.38 mm", "lower": "0.117 mm"}
+    design, found = design_of(
+        system_text(
+            {"m1": "2.97 kg"},
+            *between,
+            clearance("A", *GROUND, **gaps, **stops),
+            table("force", on="m1", amplitude="1920 N"),
+            table("response", frequency="174.2 Hz"),
+        )
+    )
+    check = equation_check.check(design, found, pool)
+    assert check.passed, check.problem
+    assert len(check.findings) == 8
