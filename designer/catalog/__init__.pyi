@@ -15,6 +15,7 @@ from .design_rule import (
     FAIL as FAIL,
     NOT_RUN as NOT_RUN,
     PASS as PASS,
+    ROUNDING as ROUNDING,
     DesignRule as DesignRule,
     Finding as Finding,
     NotRun as NotRun,

@@ -146,7 +146,7 @@ class NodalEquations:
                 if j >= 0 or isinstance(switch, Diode):
                     largest = np.abs(row[..., :n]).max(axis=-1, initial=0.0)
                     if j >= 0:
-                        across, per = np.abs(row[..., self._moving[j]]), self._per_state(j, solved)
+                        across, per = np.abs(row[..., self._moving[j]]), self.per_state(j, solved)
                         # A difference amplifier at its limit shows no displacement.
                         moves = (across > 1e-9 * largest * per) & (per > 0.0)
                         scale = np.divide(across, per, out=np.ones_like(across), where=moves)
@@ -164,7 +164,7 @@ class NodalEquations:
             self._sided[key] = known
         return known
 
-    def _per_state(self, j: int, solved: Solution) -> Any:
+    def per_state(self, j: int, solved: Solution) -> Any:
         """Volts of the displacement in a clearance per volt of the first mass's state."""
         difference = self.circuit.stops[j].difference
         if difference is None:

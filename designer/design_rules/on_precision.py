@@ -10,7 +10,13 @@ from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
 from designer.design_rules.subject import RuleSubject
-from designer.synthesis.force_at_clearance import Forces, leftovers, thermal
+from designer.synthesis.static_shifts import (
+    Shifts,
+    largest_offset,
+    leftovers,
+    offset_forces,
+    thermal,
+)
 
 INSULATION = 1e9
 """Ohm between a node and a rail across the board."""
@@ -29,14 +35,10 @@ STEP = 1e-5
 
 def offset(s: RuleSubject) -> Iterator[Finding]:
     """All sections' largest offsets, independent of each other."""
-    figure = s.opamp.offset
-    limit = figure.max if figure.max is not None else s.opamp.offset_limit
+    limit = largest_offset(s.opamp)
     for at in s.forces:
-        share = {
-            section.name: abs(at.offset[section.name]) * limit / s.drive
-            for section in s.circuit.sections
-        }
-        total = float(np.sqrt(sum(each**2 for each in share.values())))
+        share = offset_forces(at, limit)
+        total = float(np.hypot.reduce(list(share.values())))
         more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
         yield Finding(total, _most(share), more=_with_clearance(s, at, more))
 
@@ -50,7 +52,7 @@ def bias(s: RuleSubject) -> Iterator[Finding]:
             section.name: abs(at.current.get(section.inverting, 0.0))
             for section in s.circuit.sections
         }
-        total = sum(share.values()) * limit / s.drive
+        total = sum(share.values()) * limit
         yield Finding(
             total,
             _most(share),
@@ -67,7 +69,7 @@ def noise(s: RuleSubject) -> Iterator[Finding]:
     for at in s.forces:
         amplifiers = sum((at.offset[a.name] * density) ** 2 for a in s.circuit.sections)
         warm = sum((at.between(r.a, r.b) * thermal(r.value)) ** 2 for r in resistors)
-        total = float(np.sqrt(amplifiers * (white + flicker) + warm * white)) / s.drive
+        total = float(np.sqrt(amplifiers * (white + flicker) + warm * white))
         yield Finding(
             total, more=_with_clearance(s, at, f"{SLOWEST:g} Hz to {value_text(s.fastest, 'Hz')}")
         )
@@ -96,9 +98,7 @@ def leakage(s: RuleSubject) -> Iterator[Finding]:
             if any(node in pair for pair in opposed):
                 more += "; the protection's diodes see no voltage"
             place = f"{section.name}, node {node}"
-            yield Finding(
-                (over_board + through) / s.drive, place, more=_with_clearance(s, at, more)
-            )
+            yield Finding((over_board + through), place, more=_with_clearance(s, at, more))
 
 
 def absorption(s: RuleSubject) -> Iterator[Finding]:
@@ -111,7 +111,7 @@ def absorption(s: RuleSubject) -> Iterator[Finding]:
         current = share * capacitor.value * circuit.saturation / RETURNS
         more = f"{100 * share:g} % of {circuit.saturation:g} V, {words or 'dielectric not known'}"
         for at in s.forces:
-            force = abs(at.between(capacitor.plus, capacitor.minus)) * current / s.drive
+            force = abs(at.between(capacitor.plus, capacitor.minus)) * current
             yield Finding(force, capacitor.name, more=_with_clearance(s, at, more))
 
 
@@ -154,7 +154,7 @@ def _relative_stiffness(s: RuleSubject) -> Array:
     )
 
 
-def _with_clearance(s: RuleSubject, at: Forces, more: str) -> str:
+def _with_clearance(s: RuleSubject, at: Shifts, more: str) -> str:
     """The text, with the name of the clearance in front where there are several."""
     return f"clearance {at.clearance}: {more}" if len(s.forces) > 1 else more
 

@@ -22,9 +22,9 @@ from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
-from designer.synthesis.force_at_clearance import Forces, Statics
 from designer.synthesis.operating_point import Operating, operating, stuck
 from designer.synthesis.output_loads import Run
+from designer.synthesis.static_shifts import Shifts, forces, least_drive
 
 
 @dataclass(frozen=True)
@@ -105,15 +105,11 @@ class RuleSubject:
         return _complete(stuck(self.circuit, largest), "with")
 
     @cached_property
-    def forces(self) -> tuple[Forces, ...]:
-        """Disturbances as forces at each clearance."""
-        return Statics(self.circuit).forces
-
-    @cached_property
-    def drive(self) -> float:
-        """Smallest amplitude of the wanted responses [V]."""
-        wanted = [self.design.amplitude(r.b, r.omega) for r in self.model_responses]
-        return min(wanted, default=self.design.amplitude())
+    def forces(self) -> tuple[Shifts, ...]:
+        """Disturbances as constant forces at each clearance, as shares of the drive's amplitude."""
+        drive = least_drive(self.design.model, self.model_responses)
+        system, volts = self.design.model.second_order(), self.design.volts()
+        return forces(self.circuit, system, volts, drive)
 
     @cached_property
     def fastest(self) -> float:

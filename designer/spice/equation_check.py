@@ -1,7 +1,7 @@
 """Does the netlist compute the model's equation? Asked of ngspice, by ``.ac`` and ``.dc``.
 
 The deck is the one that is simulated in time, but for the generator's line, the analysis, and
-op-amps of gain `GAIN` and without bias, as the matching conditions and the coefficient errors assume.
+op-amps of gain `GAIN` and without bias, as matching conditions and coefficient errors assume.
 A constant force decides where the masses rest, so each clearance is open or closed without a change
 of the circuit (``static_rests``). At rest a capacitor carries no current, which leaves ngspice all
 integrators in one loop without a gain that it could follow, and often no operating point. So

@@ -3,12 +3,6 @@ from . import (
     parts_choice as parts_choice,
     side_conditions as side_conditions,
 )
-from .force_at_clearance import (
-    Forces as Forces,
-    Statics as Statics,
-    leftovers as leftovers,
-    thermal as thermal,
-)
 from .limits import (
     NO_AIMS as NO_AIMS,
     Aims as Aims,
@@ -43,4 +37,14 @@ from .parts_choice import (
 from .side_conditions import (
     guaranteed_swing as guaranteed_swing,
     saturating as saturating,
+)
+from .static_shifts import (
+    Shifts as Shifts,
+    Statics as Statics,
+    forces as forces,
+    largest_offset as largest_offset,
+    least_drive as least_drive,
+    leftovers as leftovers,
+    offset_forces as offset_forces,
+    thermal as thermal,
 )

@@ -75,6 +75,8 @@ class Order:
     """Names of the resistors from the generator, one for each driven mass."""
     largest: float
     """Largest of the generator's amplitudes, over that at the model's clearance."""
+    drive_force: float = 1.0
+    """``least_drive`` of the wanted responses."""
     aims: Aims = NO_AIMS
     """What is aimed at inside the side conditions."""
 
@@ -87,6 +89,7 @@ class Order:
         peaks: Peaks,
         *,
         largest: float = 1.0,
+        drive_force: float = 1.0,
         aims: Aims = NO_AIMS,
         apart: frozenset[int] = frozenset(),
     ) -> Order:
@@ -126,6 +129,7 @@ class Order:
             levels=equal_resistors(unit),
             drive=drive_resistors(unit),
             largest=largest,
+            drive_force=drive_force,
             aims=aims,
         )
 

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NoReturn
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from designer.base.errors import Unreachable
 from designer.base.progress import best_so_far, doing, part
 from designer.catalog.catalog import Catalog
+from designer.catalog.design_rule import ROUNDING
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design
@@ -46,6 +47,7 @@ from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
 from designer.synthesis.part_checks import check_choices
 from designer.synthesis.scale_box import Conflict
 from designer.synthesis.scale_choice import ScaleAttempt, ScaleChoice
+from designer.synthesis.static_shifts import least_drive
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
@@ -60,6 +62,8 @@ BESIDE, BESIDE_TREE = 10, 2
 does, which is slower by far."""
 EMPTY = 1e-9
 """Relative: so far below a bound there is no choice, where at the bound there may be one."""
+RULED = frozenset({"swing", "load", "bandwidth"})
+"""Side conditions whose figures design rules judge too."""
 LEAST_IDLE = 0.2
 """Least share of an idle half's current (``idle_shares``) with which both halves share an output;
 the driving one has so much of the swing."""
@@ -147,13 +151,15 @@ def synthesise(
     """
     began = time.perf_counter()
     check_choices(model, spec, catalog)
-    largest = max([1.0, *(relative_amplitude(model, r) for r in responses)])
-    order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims)
+    largest = max((relative_amplitude(model, r) for r in responses), default=1.0)
+    drive = least_drive(model, responses)
+    make = partial(Order.of, model, spec, catalog, peaks, largest=largest, drive_force=drive)
+    order = make(aims=aims)
     search = _Search(order, responses)
     best = search.best(spec.active_conditions)
     while isinstance(best, _Missed) and best.apart is not None:
         apart = order.stage.apart | {best.apart}
-        order = Order.of(model, spec, catalog, peaks, largest=largest, aims=aims, apart=apart)
+        order = make(aims=aims, apart=apart)
         search = _Search(order, responses)
         best = search.best(spec.active_conditions)
     if isinstance(best, _Missed):
@@ -346,24 +352,33 @@ class _Search:
         within = stated = self._limits(conditions)
         names: tuple[str, ...] = ()
         before, broken = None, list[ConditionCheck]()
+        found: tuple[ScaleAttempt, Design, ConditionLimits] | None = None
         for number in range(BOX_ROUNDS):
             choice = ScaleChoice(self.order, within)
             made = self._showing(choice.circuits(before))
             if isinstance(made, Shortfall):
+                if found is not None:
+                    break
                 conflicts = tuple(choice.conflicts())
                 return _Missed(replace(made, whole=bool(conflicts)), names, conflicts=conflicts)
             design = verified(self.order, made.made, self.responses, conditions)
             broken = [check for check in design.checks if not check.holds]
+            if broken and found is not None:
+                break
             if not broken:
-                certificate = _certificate(made.made, self._least(made.made, stated), made.words)
-                return _Verified(made.made, replace(design, certificate=certificate), within)
+                found = made, design, within
+            over = broken or [c for c in design.checks if c.name in RULED and _above(c)]
             names += tuple(check.name for check in broken)
             before = made.z
-            tighter = within.tightened(broken, design, slower=number > 0)
+            tighter = within.tightened(over, design, slower=number > 0)
             if tighter == within:
                 break
             within = tighter
-        return _Missed(Shortfall(broken[0].name, False), names)
+        if found is None:
+            return _Missed(Shortfall(broken[0].name, False), names)
+        made, design, within = found
+        certificate = _certificate(made.made, self._least(made.made, stated), made.words)
+        return _Verified(made.made, replace(design, certificate=certificate), within)
 
     def _showing(self, circuits: Iterable[ScaleAttempt | Shortfall]) -> ScaleAttempt | Shortfall:
         """The first circuit that shows every response which the model does; the first of all where
@@ -454,6 +469,11 @@ class _Search:
         if best.limits != first:  # some limit had to be tightened
             return True
         return name == "swing" or first != replace(without, conditions=conditions)
+
+
+def _above(check: ConditionCheck) -> bool:
+    """Whether a figure is beyond its limit, which a design rule knows no tolerance of."""
+    return check.excess > 1.0 + ROUNDING
 
 
 def verified(

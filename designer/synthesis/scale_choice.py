@@ -10,6 +10,7 @@ limited and the draws follow from it, so the same order has the same answer.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,14 +19,17 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.progress import best_so_far, doing
+from designer.catalog.design_rules import BY_ID
+from designer.circuit.netlist import Circuit
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
-from designer.synthesis.attempt import Attempt, Order, attempt, completed
+from designer.synthesis.attempt import BASE, Attempt, Order, attempt, completed
 from designer.synthesis.dead_zone_target import DeadZone
 from designer.synthesis.kernel_rounding import Rounding, descend
-from designer.synthesis.limits import ConditionLimits
+from designer.synthesis.limits import GENERATOR_PEAK, ConditionLimits
 from designer.synthesis.scale_box import Conflict, ScaleBox
-from designer.synthesis.scale_program import ScaleProgram
+from designer.synthesis.scale_program import Affine, LinearBound, ScaleProgram, StatedLimit
+from designer.synthesis.static_shifts import forces, largest_offset, offset_forces
 
 NEAR, FAR = (0.05, 0.2), (0.7, 6.0)
 """Of the logarithm of the thresholds: how far below their best the points lie, in turn; further
@@ -43,6 +47,13 @@ KEPT = 1e-6
 """Of a logarithm: a limit that is missed by no more is kept."""
 ALIKE = 0.02
 """Of the logarithm of the thresholds: choices no further apart are as good."""
+ROOM = 0.9
+"""Of the limit of the rule ``offset-force``: what scales are chosen for. Parts are rounded,
+and some are sized afterwards."""
+TANGENTS, CUTS = 12, 3
+"""Tangents of it at the best point, at most; and at corners of each range of thresholds."""
+STEP = 1e-4
+"""Of a logarithm: for the slope of a tangent."""
 TRIED = 6
 """Choices of which a circuit is made, until one can be."""
 GOAL, ENOUGH = 0.1, 0.5
@@ -67,6 +78,8 @@ class RoundedChoice:
     """``ScaleBox.worth`` of it."""
     kinds: int
     """Distinct values."""
+    quiet: bool
+    """Whether its offsets keep the rule ``offset-force``, or no scales do."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +104,8 @@ class ScaleChoice:
     """The side conditions."""
     candidates: list[RoundedChoice] = field(default_factory=list)
     """Choices that keep all limits which are known before the circuit is made."""
+    _noisy: bool = False
+    """Whether no scales were found that keep the rule ``offset-force``."""
 
     @cached_property
     def program(self) -> ScaleProgram:
@@ -119,13 +134,14 @@ class ScaleChoice:
         before : scales whose choice nearly kept the limits."""
         if self.box.best() is None:
             return iter([Shortfall("side conditions", True)])
+        self._keep_offsets()
         if before is not None:
             self._descend([before] * 4, 0)
         for number, loss in enumerate((*NEAR, *FAR)):
             enough = self._at_most(GOAL if loss in NEAR else ENOUGH)
             if self._least <= enough:
                 break
-            corners = np.array(self.box.points(CORNERS, loss, seed=number))
+            corners = np.array(self._corners(loss, number))
             for batch in range(BATCHES):
                 known = f", so far an error of {self._least:.2%}" if self.candidates else ""
                 doing(f"scales and parts, range {number + 1}, part {batch + 1} of {BATCHES}{known}")
@@ -138,11 +154,80 @@ class ScaleChoice:
                     break
         return self._circuits()
 
+    def _keep_offsets(self) -> None:
+        """Cut off the points of the box whose circuits fail the rule ``offset-force``, as far as
+        that leaves any: near the best point, by tangents."""
+        before = list(self.box.cuts)
+        for _ in range(TANGENTS):
+            z = self.box.best()
+            if z is None:  # no scales keep the rule, which judges the finished circuit
+                self.box.cuts, self._noisy = before, True
+            if z is None or self._over(z) <= 0.0:
+                return
+            doing("scales at which offsets matter less")
+            self.box.cuts.append(self._offset_cut(z))
+
+    def _corners(self, loss: float, seed: int) -> list[Array]:
+        """Corners of the box; cut once more where offsets of the worst are too large."""
+        corners = self.box.points(CORNERS, loss, seed=seed)
+        over = sorted(((self._over(z), k) for k, z in enumerate(corners)), reverse=True)
+        worst = [corners[k] for log, k in over[:CUTS] if log > 0.0]
+        if worst:
+            before = list(self.box.cuts)
+            self.box.cuts += [self._offset_cut(z) for z in worst]
+            fewer = self.box.points(CORNERS, loss, seed=seed)
+            if fewer:
+                return fewer
+            self.box.cuts = before
+        return corners
+
+    def _offset_cut(self, z: Array) -> LinearBound:
+        """The tangent of the offsets at these scales."""
+        log, rule = self._over(z), BY_ID["offset-force"]
+        assert rule.limit is not None
+        slope = np.array([(self._over(z + s) - log) / STEP for s in STEP * np.eye(len(z))])
+        limit = StatedLimit(rule.id, "offsets over the drive", rule.limit)
+        return LinearBound(Affine(slope, log - float(slope @ z)), limit)
+
+    def _over(self, z: Array) -> float:
+        """``_over_limit`` at these scales, with what they are to leave beside the limit; parts that
+        are sized afterwards have some value. -inf where no scales keep it."""
+        order, program = self.order, self.program
+        if self._noisy or not program.outputs:
+            return -np.inf
+        values: dict[str, float] = defaultdict(lambda: BASE)
+        values |= program.values(z, program.follows(z)) | self._drive(z)
+        return self._over_limit(order.build(values), program.volts(z)) - float(np.log(ROOM))
+
+    def _drive(self, z: Array) -> dict[str, float]:
+        """The drive's resistors at half of the generator's largest amplitude [ohm]."""
+        order, program = self.order, self.program
+        system, volts = order.model.second_order(), program.volts(z)
+        force = system.drive_force(system.own_frequency)
+        out = {}
+        for name, mass in zip(order.drive, np.flatnonzero(force).tolist(), strict=True):
+            state = 2 * mass + 1
+            rate = volts[state] * abs(force[mass]) / system.mass[mass] / np.exp(z[0])
+            amperes = rate * np.exp(z[program.shared[f"C{state + 1}"]])
+            ohms = 0.5 * GENERATOR_PEAK / (order.largest * amperes)
+            out[name] = float(np.clip(ohms, order.resistors[0], order.resistors[-1]))
+        return out
+
+    def _over_limit(self, circuit: Circuit, volts: Array) -> float:
+        """Logarithm of the largest offsets as a force at a clearance over the limit of the rule:
+        above 0 they are too large."""
+        order, rule = self.order, BY_ID["offset-force"]
+        assert rule.limit is not None
+        limit = largest_offset(order.opamp)
+        at = forces(circuit, order.model.second_order(), volts, order.drive_force)
+        each = [np.hypot.reduce(list(offset_forces(shifts, limit).values())) for shifts in at]
+        return float(np.log(max(each) / rule.limit))
+
     def _circuits(self) -> Iterator[ScaleAttempt | Shortfall]:
         """A circuit of each of the best candidates, as they are ranked; one whose error is not that
-        of its candidate comes last."""
+        of its candidate, or whose offsets are too large, comes last."""
         why = Shortfall("coefficients", False)
-        worse: list[ScaleAttempt] = []
+        worse: list[tuple[bool, float, ScaleAttempt]] = []
         there = False
         for candidate in list(self._ranked())[:TRIED]:
             made = self.circuit_of(candidate)
@@ -150,12 +235,15 @@ class ScaleChoice:
                 why = made
                 continue
             own = ScaleAttempt(made, candidate.z, self._words(candidate))
-            if made.errors.max_error <= max(self.goal, CLOSE * candidate.error):
+            noisy = self._over_limit(made.circuit, made.errors.scales.volts) > 0.0
+            error = made.errors.max_error
+            as_meant = error <= max(self.goal, CLOSE * candidate.error)
+            if as_meant and not noisy:
                 there = True
                 yield own
             else:
-                worse.append(own)
-        yield from sorted(worse, key=lambda each: each.made.errors.max_error)
+                worse.append((noisy, 0.0 if as_meant else error, own))
+        yield from (own for *_, own in sorted(worse, key=lambda each: each[:2]))
         if not (there or worse):
             yield why
 
@@ -191,7 +279,7 @@ class ScaleChoice:
 
     @property
     def _least(self) -> float:
-        return min((c.error for c in self.candidates), default=np.inf)
+        return min((c.error for c in self.candidates if c.quiet), default=np.inf)
 
     def _rounded(self, logs: Array) -> Array:
         """(rows,) the values nearest to these logarithms."""
@@ -201,19 +289,21 @@ class ScaleChoice:
     def _candidate(self, z: Array, rounded: Array, error: float) -> RoundedChoice:
         own = z[[k for k, values in enumerate(self.program.lists) if len(values)]]
         kinds = len(np.unique(np.round(np.concatenate([rounded, own]), 9)))
-        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds)
+        quiet = self._over(z) <= -float(np.log(ROOM))
+        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds, quiet)
 
     def _ranked(self) -> Iterator[RoundedChoice]:
         """The candidates, the best one first."""
-        good = [c for c in self.candidates if c.error <= self.goal]
+        good = [c for c in self.candidates if c.error <= self.goal and c.quiet]
         if good:
             top = max(c.worth for c in good)
             first = [c for c in good if c.worth >= top - ALIKE]
             yield from sorted(first, key=lambda c: (c.kinds, c.error))
             good = [c for c in good if c.worth < top - ALIKE]
             yield from sorted(good, key=lambda c: -c.worth)
-        rest = [c for c in self.candidates if c.error > self.goal]
-        yield from sorted(rest, key=lambda c: c.error)
+        rest = [c for c in self.candidates if c.error > self.goal or not c.quiet]
+        enough = self._at_most(ENOUGH)
+        yield from sorted(rest, key=lambda c: (c.error > enough, not c.quiet, c.error))
 
     def _rounding(self) -> Rounding:
         program, bounds = self.program, [*self.program.bounds, *self.box.cuts]

@@ -176,6 +176,14 @@ class ScaleProgram:
         places = [k for k, row in enumerate(self.rows) if row.held and not row.constant]
         return places[0] if places else -1
 
+    def volts(self, z: Array) -> Array:
+        """(states,) volts per model unit."""
+        return np.exp(z[1 : 1 + len(self.levels)])
+
+    def follows(self, z: Array) -> Array:
+        """(rows,) logarithms of the resistors that follow, before they are rounded."""
+        return np.array([row.log.at(z) for row in self.rows])
+
     def values(self, z: Array, rounded: Array) -> dict[str, float]:
         """The values [ohm, F] by part. rounded : (rows,) logarithms of the rows' values."""
         out = {name: float(np.exp(z[k])) for name, k in self.shared.items()}

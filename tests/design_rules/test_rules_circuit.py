@@ -22,14 +22,14 @@ from designer.design_rules.subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
 from designer.synthesis import output_loads
-from designer.synthesis.force_at_clearance import Statics, leftovers, thermal
 from designer.synthesis.operating_point import operating, stuck
 from designer.synthesis.output_loads import Run
 from designer.synthesis.side_conditions import guaranteed_swing
+from designer.synthesis.static_shifts import Statics, forces, leftovers, thermal
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
-from tests.shared.exact_circuits import Scale, exact_values
+from tests.shared.exact_circuits import Scale, exact_circuit, exact_values
 from tests.shared.oracles import linear_matrix
 from tests.shared.rule_cases import PAIRS, TEXT, base, subject_of, with_circuit, with_part
 from tests.shared.stages import bought, model, one_sided, rectifier, stage
@@ -260,7 +260,7 @@ def test_without_responses_nothing_is_said_of_operation() -> None:
 
 
 # ---------------------------------------------------------------------------------------------
-# Errors as forces
+# Errors as shifts, and as forces
 
 
 def shift(subject: RuleSubject, clearance: int = 0, **board: dict[str, float]) -> float:
@@ -292,41 +292,34 @@ def chain_subject() -> RuleSubject:
     return subject_of(circuit, mechanism, chain_text(3, *TWO_GAPS, wanted))
 
 
-def per_volt(subject: RuleSubject) -> float:
-    """How far one volt of the generator moves it."""
-    circuit = subject.circuit
-    mode = Reduction(circuit, nominal_board(circuit)).system().mode(circuit.rest)
-    return float(np.linalg.solve(mode.A, -mode.B)[0])
-
-
 @pytest.mark.parametrize("kind", ["rectifier", "saturation"])
 def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> None:
     circuit = base().circuit if kind == "rectifier" else stage("saturation", "both", EXACT)
     subject = RuleSubject(base().synthesis, circuit, base().components)
-    forces = Statics(circuit).forces[0]
-    rest, unit = shift(subject), per_volt(subject)
+    shifts = Statics(circuit).shifts[0]
+    rest = shift(subject)
     for section in circuit.sections:
         moved = shift(subject, offset={section.name: 1e-6}) - rest
-        assert forces.offset[section.name] * 1e-6 == pytest.approx(moved / unit, abs=1e-12)
+        assert shifts.offset[section.name] * 1e-6 == pytest.approx(moved, abs=1e-11)
         # A bias current leaves the node.
         biased = shift(subject, bias={section.name: 1e-12}) - rest
-        assert -forces.current[section.inverting] * 1e-12 == pytest.approx(biased / unit, abs=1e-15)
+        assert -shifts.current[section.inverting] * 1e-12 == pytest.approx(biased, abs=1e-14)
 
 
-def test_each_clearance_has_forces_of_its_own() -> None:
+def test_each_clearance_has_shifts_of_its_own() -> None:
     """Three masses with a clearance to ground and one between two masses: an offset moves either
     as far as the reduction says, and the rules name the clearance."""
     subject = chain_subject()
-    forces = Statics(subject.circuit).forces
-    assert [at.clearance for at in forces] == ["A", "B"]
+    shifts = Statics(subject.circuit).shifts
+    assert [at.clearance for at in shifts] == ["A", "B"]
     rest = [shift(subject, k) for k in range(2)]
-    mode = Reduction(subject.circuit, nominal_board(subject.circuit)).system()
-    still = mode.mode(subject.circuit.open)
-    unit = [row[:6] @ np.linalg.solve(still.A, -still.B) for row in mode.displacement]
+    rows = Reduction(subject.circuit, nominal_board(subject.circuit)).system().displacement
+    places = [subject.circuit.states.index(stop.state) for stop in subject.circuit.stops]
+    gains = [row[place] for row, place in zip(rows, places, strict=True)]
     for section in subject.circuit.sections[::3]:
-        for k, at in enumerate(forces):
-            moved = shift(subject, k, offset={section.name: 1e-6}) - rest[k]
-            assert at.offset[section.name] * 1e-6 == pytest.approx(moved / unit[k], abs=1e-12)
+        for k, at in enumerate(shifts):
+            moved = (shift(subject, k, offset={section.name: 1e-6}) - rest[k]) / gains[k]
+            assert at.offset[section.name] * 1e-6 == pytest.approx(moved, abs=1e-11)
     found = {o.rule.id: o for o in (run_rules.look(id_, subject) for id_ in STATIC)}
     assert {o.status for o in found.values()} <= {PASS, FAIL}
     assert any(f"clearance {name}: " in found["offset-force"].found for name in "AB")
@@ -346,10 +339,29 @@ def test_each_dead_zone_leaves_stiffness_by_its_own_resistors() -> None:
     assert np.abs(changed) == pytest.approx([0.0, 0.01], rel=2e-2, abs=1e-9)
 
 
-def test_a_current_into_the_driven_node_is_the_generator_s() -> None:
-    """One ampere into s2 is R6 volts of the generator."""
-    forces = Statics(base().circuit).forces[0]
-    assert forces.current["s2"] == pytest.approx(base().circuit.values["R6"], rel=1e-6)
+def test_a_current_into_the_driven_node_is_the_drive() -> None:
+    """The generator's amplitude through R6 into s2 is a force as large as the drive."""
+    design = base().design
+    volts, circuit = design.volts(), base().circuit
+    (at,) = forces(circuit, design.model.second_order(), volts, 1.0)
+    amperes = design.amplitude() / circuit.values["R6"]
+    assert abs(at.current["s2"]) * amperes == pytest.approx(1.0, rel=1e-2)
+
+
+def test_a_unit_force_at_a_clearance_is_one() -> None:
+    """A force on a mass is a current into its velocity's integrator, C V/(m T) by hand; one between
+    two masses is two of them."""
+    system, volts, seconds = chain(3, *TWO_GAPS).second_order(), np.full(6, 4.0), 1e-3
+    circuit = exact_circuit(system, Scale(seconds, volts, 2.0))
+    capacitors = {c.name: c for c in circuit.capacitors}
+    every = forces(circuit, system, volts, 1.0)
+    for at, clearance in zip(every, system.clearances, strict=True):
+        total = 0.0
+        for mass, push in enumerate(system.displacement(clearance)):
+            c = capacitors[circuit.states[2 * mass + 1]]
+            amperes = c.value * volts[2 * mass + 1] / (system.mass[mass] * seconds)
+            total += push * amperes * at.current[c.minus]
+        assert abs(total) == pytest.approx(1.0, rel=1e-4)
 
 
 def test_johnson_noise_of_a_kilohm() -> None:
@@ -366,8 +378,8 @@ def at(circuit: Circuit, **figures: object) -> RuleSubject:
 
 def test_noise_is_that_of_each_source_by_itself() -> None:
     circuit = base().circuit
-    forces = Statics(circuit).forces[0]
-    (found,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.1))
+    forces = Statics(circuit).shifts[0]
+    (found,) = on_precision.noise(at(circuit, forces=(forces,), fastest=1000.1))
     power = sum((forces.offset[s.name] * 18e-9) ** 2 for s in circuit.sections)
     for r in circuit.resistors:
         force = forces.current.get(r.a, 0.0) - forces.current.get(r.b, 0.0)
@@ -377,10 +389,10 @@ def test_noise_is_that_of_each_source_by_itself() -> None:
 
 def test_flicker_noise_counts_from_a_tenth_of_a_hertz() -> None:
     circuit, opamp = base().circuit, base().opamp
-    forces = Statics(circuit).forces[0]
-    (plain,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.0))
+    forces = Statics(circuit).shifts[0]
+    (plain,) = on_precision.noise(at(circuit, forces=(forces,), fastest=1000.0))
     corner = replace(opamp, noise_corner=Figure(None, 500.0, None, "a test"))
-    noisy = at(replace(circuit, figures=corner), drive=1.0, fastest=1000.0)
+    noisy = at(replace(circuit, figures=corner), forces=(forces,), fastest=1000.0)
     (found,) = on_precision.noise(noisy)
     amplifiers = sum((forces.offset[s.name] * 18e-9) ** 2 for s in circuit.sections)
     added = amplifiers * 500.0 * np.log(1e4)
@@ -389,13 +401,13 @@ def test_flicker_noise_counts_from_a_tenth_of_a_hertz() -> None:
 
 def test_offsets_add_as_squares_and_bias_currents_as_they_are() -> None:
     circuit = base().circuit
-    forces = Statics(circuit).forces[0]
-    (offset,) = on_precision.offset(at(circuit, drive=2.0))
-    expected = np.sqrt(sum((10e-3 * forces.offset[s.name]) ** 2 for s in circuit.sections)) / 2.0
+    forces = Statics(circuit).shifts[0]
+    (offset,) = on_precision.offset(at(circuit, forces=(forces,)))
+    expected = np.sqrt(sum((10e-3 * forces.offset[s.name]) ** 2 for s in circuit.sections))
     assert offset.value == pytest.approx(expected)
-    (bias,) = on_precision.bias(at(circuit, drive=2.0))
+    (bias,) = on_precision.bias(at(circuit, forces=(forces,)))
     total = sum(abs(forces.current[s.inverting]) for s in circuit.sections)
-    assert bias.value == pytest.approx(200e-12 * total / 2.0)
+    assert bias.value == pytest.approx(200e-12 * total)
 
 
 @pytest.mark.parametrize(
@@ -405,11 +417,11 @@ def test_offsets_add_as_squares_and_bias_currents_as_they_are() -> None:
 def test_absorption_by_dielectric(words: str, share: float) -> None:
     circuit = base().circuit
     made = {c.name: words for c in circuit.capacitors}
-    subject = at(circuit, dielectrics=made, drive=1.0)
+    subject = at(circuit, dielectrics=made)
     found = {f.where: f.value for f in on_precision.absorption(subject)}
-    c2 = circuit.values["C2"]
-    expected = share * c2 * 13.0 * circuit.values["R6"]
-    assert found["C2"] == pytest.approx(expected, rel=1e-3)
+    drive = subject.design.amplitude() / circuit.values["R6"]
+    expected = share * circuit.values["C2"] * 13.0 / drive
+    assert found["C2"] == pytest.approx(expected, rel=1e-2)
 
 
 def test_leftover_stiffness_is_the_difference_of_two_gains() -> None:

@@ -22,10 +22,11 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model_file import parse_model_file
 from designer.synthesis import parts_choice
-from designer.synthesis.attempt import Order
+from designer.synthesis.attempt import Order, relative_amplitude
 from designer.synthesis.further_stages import idle_shares
 from designer.synthesis.limits import ConditionLimits, limits
 from designer.synthesis.scale_box import ScaleBox
+from designer.synthesis.scale_choice import ScaleAttempt, ScaleChoice
 from designer.synthesis.scale_program import (
     Affine,
     ExponentialSum,
@@ -33,6 +34,7 @@ from designer.synthesis.scale_program import (
     ScaleProgram,
     StatedLimit,
 )
+from designer.synthesis.static_shifts import forces, least_drive
 from tests.shared.system_text import clearance, system_text, table
 from tests.shared.term_enumeration import everything
 
@@ -287,3 +289,40 @@ def test_a_lower_bound_is_never_above_the_optimum(seed: int) -> None:
             bound, proof = lower_bound(question, found, patience)
             assert bound <= optimum + 1e-6
             assert "12 resistor and 4 capacitor values" in proof
+
+
+SLOW_BASE = system_text(
+    {"a": 0.41, "b": 1.0},
+    {("a", "ground"): 0.81, ("a", "b"): 1.0},
+    {("a", "ground"): 0.11},
+    "[base]\namplitude = 1.33\n",
+    table("force", on="b", constant=-0.81),
+    clearance("A", "b", "a", upper=1.0, lower=4.0, upper_stiffness=8.0, lower_stiffness=14.7),
+    table("response", omega=0.55),
+)
+"""Two masses on a base that moves slowly, a clearance between them: where thresholds are highest,
+offsets are 0.12 of the drive."""
+
+
+def test_scales_keep_offsets_small_beside_the_drive() -> None:
+    file = parse_model_file(SLOW_BASE)
+    found = find(file.model, file.responses)
+    spec = replace(file.circuit, dead_zone="rectifier")
+    drive, held = least_drive(file.model, found), peaks(file.model, found)
+    largest = relative_amplitude(file.model, found[0])
+    order = Order.of(file.model, spec, CATALOG, held, largest=largest, drive_force=drive)
+    unit = file.model.second_order().own_frequency
+    conditions = spec.active_conditions
+    within = limits(spec, conditions, order.opamp, order.output.limit, held.fastest, unit=unit)
+
+    def offsets(choice: ScaleChoice) -> float:
+        first = next(choice.circuits())
+        assert isinstance(first, ScaleAttempt)
+        made = first.made
+        system, volts = file.model.second_order(), made.errors.scales.volts
+        (at,) = forces(made.circuit, system, volts, drive)
+        return float(np.linalg.norm([10e-3 * share for share in at.offset.values()]))
+
+    assert offsets(ScaleChoice(order, within)) <= 0.05
+    free = replace(order, drive_force=1e6)  # so strong a drive hides the rule from the choice
+    assert offsets(ScaleChoice(free, within)) > 0.05

@@ -1,9 +1,8 @@
-"""What disturbs a circuit at rest, referred to the clearance as a constant force.
+"""How far what disturbs a circuit at rest shifts the displacement in each clearance.
 
-A disturbance (an offset, a current into a net) moves the mass and the clearance against each other.
-The equivalent force is the one that moves the mass as far inside the clearance, as a share of the
-drive's amplitude. Both come from the nodal equations of the open mode with one more source; no
-formula of the topology enters.
+A disturbance (an offset, a current into a net) moves the masses and the clearance against each
+other. How far follows from the nodal equations of the open mode with one more source; no formula of
+the topology enters.
 """
 
 from __future__ import annotations
@@ -15,30 +14,41 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.catalog.entries import OpAmp
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.dynamics.piecewise_linear import ModeKey
+from designer.model.find_responses import ModelResponse
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 
 BOLTZMANN, KELVIN = 1.380649e-23, 298.15
 """J/K, exact since 2019; room temperature [K]."""
 
 
 @dataclass(frozen=True)
-class Forces:
-    """Equivalent force at one clearance, in volts of the generator, of one unit of each
-    disturbance."""
+class Shifts:
+    """How far one unit of each disturbance shifts the displacement from the middle of one
+    clearance, in volts of its first mass's displacement."""
 
     clearance: str
     """Name of the clearance; "" where a circuit without one has the first mass's displacement."""
     offset: Mapping[str, float]
-    """Force by section, per volt at its input."""
+    """Shift by section, per volt at its input."""
     current: Mapping[str, float]
-    """Force by net, per ampere into it."""
+    """Shift by net, per ampere into it."""
 
     def between(self, a: str, b: str) -> float:
         """Of one ampere that leaves net a and enters net b."""
         return self.current.get(b, 0.0) - self.current.get(a, 0.0)
+
+    def over(self, volts: float) -> Shifts:
+        """The shifts as shares of one of so many volts."""
+        return replace(
+            self,
+            offset={name: shift / volts for name, shift in self.offset.items()},
+            current={net: shift / volts for net, shift in self.current.items()},
+        )
 
 
 class Statics:
@@ -50,33 +60,28 @@ class Statics:
         self._nets = [net for net in circuit.nets if net != circuit.generator.net]
 
     @cached_property
-    def forces(self) -> tuple[Forces, ...]:
+    def shifts(self) -> tuple[Shifts, ...]:
         """Of every section's offset, and of a current into every net: at each clearance in order.
 
         Raises
         ------
-        ArithmeticError : the circuit has no rest, or the generator does not move a clearance.
+        ArithmeticError : the circuit has no rest.
         """
         names = [stop.clearance for stop in self.circuit.stops] or [""]
-        return tuple(map(self._force, names, self._moved()))
+        return tuple(map(self._shift, names, self._moved()))
 
-    def _force(self, clearance: str, moved: Array) -> Forces:
-        """moved : of the displacement, by the generator, by each section and each net."""
+    def _shift(self, clearance: str, moved: Array) -> Shifts:
+        """moved : of the displacement, by each section and each net."""
         sections = [s.name for s in self.circuit.sections]
-        drive, rest = moved[0], moved[1:]
-        if drive == 0.0:
-            mass_name = f"the mass at clearance {clearance}" if clearance else "the mass"
-            raise ArithmeticError(f"the generator does not move {mass_name}")
-        volts = [float(m / drive) for m in rest]
-        return Forces(
+        volts = moved.tolist()
+        return Shifts(
             clearance,
             dict(zip(sections, volts, strict=False)),
             dict(zip(self._nets, volts[len(sections) :], strict=True)),
         )
 
     def _moved(self) -> list[Array]:
-        """How far the mass moves from the middle of each clearance, for the generator and each
-        source."""
+        """How far the mass moves from the middle of each clearance, for each source."""
         c = self.circuit
         n = len(c.states)
         key = c.open
@@ -88,7 +93,7 @@ class Statics:
             sources[row, i] = -1.0
         for i, net in enumerate(self._nets, sections):
             sources[c.nets.index(net), i] = 1.0
-        inputs = np.hstack([right[:, : n + 1], sources, right[:, n + 1 :]])
+        inputs = np.hstack([right[:, :n], sources, right[:, n + 1 :]])
         y = np.asarray(np.linalg.solve(G, inputs), dtype=np.float64)
         solved = self._equations.solution(y)
         solved.voltage[GROUND] = np.zeros(y.shape[1])
@@ -100,6 +105,7 @@ class Statics:
             return [np.asarray(states[0])]
         return [
             self._from_middle([e for e in exits if e.clearance == k], k, states)
+            / self._equations.per_state(k, solved)
             for k in range(len(c.stops))
         ]
 
@@ -115,6 +121,47 @@ class Statics:
         """The row of each section's own equation, behind nets and capacitors."""
         first = len(self.circuit.nets) + len(self.circuit.capacitors)
         return [first + i for i in range(len(self.circuit.sections))]
+
+
+def least_drive(model: MechanicalModel, responses: Sequence[ModelResponse]) -> float:
+    """Amplitudes of all forces of the drive together, in model units at the model's clearance, of
+    the wanted response that is driven least."""
+    system = model.second_order()
+    drives = [(r.omega, model.b / r.b) for r in responses] or [(system.own_frequency, 1.0)]
+    return min(float(np.abs(system.drive_force(omega)).sum()) * share for omega, share in drives)
+
+
+def forces(
+    circuit: Circuit, system: SecondOrderSystem, volts: Array, drive: float
+) -> tuple[Shifts, ...]:
+    """Disturbances as constant forces at each clearance, between its mass and the other or the
+    ground, that shift it as far; as shares of ``drive``, a force in model units.
+
+    volts : (states,) per model unit.
+
+    Raises
+    ------
+    ArithmeticError : the circuit has no rest.
+    """
+    rows = [(c.mass, system.displacement(c)) for c in system.clearances]
+    rows = rows or [(0, np.eye(system.size)[0])]
+    shifts = Statics(circuit).shifts
+    out = []
+    for (mass, row), shift in zip(rows, shifts, strict=True):
+        compliance = abs(float(row @ np.linalg.solve(system.stiffness, row)))
+        out.append(shift.over(compliance * drive * float(volts[2 * mass])))
+    return tuple(out)
+
+
+def largest_offset(opamp: OpAmp) -> float:
+    """An op-amp's largest offset [V]: its data sheet's, or what the offsets are cut off at."""
+    figure = opamp.offset
+    return figure.max if figure.max is not None else opamp.offset_limit
+
+
+def offset_forces(shifts: Shifts, limit: float) -> dict[str, float]:
+    """By section, what an offset of ``limit`` [V] does; independent of each other."""
+    return {name: abs(shift) * limit for name, shift in shifts.offset.items()}
 
 
 def thermal(ohms: float) -> float:
