@@ -56,7 +56,9 @@ def search(modelfile: ModelFile, seconds: float, seed: int = 1) -> dict[str, obj
             for z, rounded in _draws(program, point, random):
                 if time.process_time() > end:
                     break
-                attempt = choice.circuit_of(RoundedChoice(z, rounded, error=0.0, worth=0.0, kinds=0, quiet=True))
+                attempt = choice.circuit_of(
+                    RoundedChoice(z, rounded, error=0.0, worth=0.0, kinds=0, quiet=True)
+                )
                 made += 1
                 if isinstance(attempt, Shortfall) or attempt.errors.max_error >= min(
                     best, LARGE_ERROR
