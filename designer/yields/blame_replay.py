@@ -5,7 +5,8 @@ for an op-amp section), everything else as drawn; so are groups of parts. The sa
 boards that were ok, which tells the losses that an exact part would *cause*.
 
 The unit of a blame's work is a step: an attractor that is sought, or an orbit that is followed. How
-many there are is known before the first, so that progress can say how long it takes. What a budget
+many there are is known before the first, so that progress can say how long it takes. A board that
+took many drive periods in the study counts for several, since it takes as many again. What a budget
 leaves out are boards: fewer lost ones are replayed and followed, of every response in turn, never
 fewer parts.
 """
@@ -17,6 +18,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, islice
+
+import numpy as np
 
 from designer.base.proportion import wilson
 from designer.base.threads import parallel
@@ -38,6 +41,9 @@ TOGETHER = 8
 """Boards that are replayed before what they showed is stored; no answer depends on it."""
 BUDGET = 20_000
 """Steps of a blame, about, where nobody says another number."""
+
+PERIODS = 125
+"""Drive periods of a step of that budget; nearly all boards with a periodic answer take fewer."""
 
 _DEAD_ZONE = re.compile(r"R[2-9]\d\d[AB]?")
 _VERDICTS = {str(verdict)[0]: verdict for verdict in Verdict}
@@ -100,6 +106,8 @@ class _Replay:
     before: Verdict
     place: int
     turn: float
+    cost: float
+    """Steps that one question counts for."""
 
     @property
     def part(self) -> str:
@@ -165,10 +173,13 @@ def extent_of(
     least = len(rows) * (around + 2**CORNER)
     costs = (len(changes), ROUNDS + around)
     total = least + len(again) * costs[0] + len(followed) * costs[1]
-    if budget is not None and budget < total:
-        share = max(budget - least, 0) / max(total - least, 1)  # nothing lost: no more to do
+    replaying = np.cumsum([replay.cost * costs[0] for replay in again])
+    work = least + float(replaying[-1] if len(again) else 0.0) + len(followed) * costs[1]
+    if budget is not None and budget < work:
+        share = max(budget - least, 0) / max(work - least, 1.0)  # nothing lost: no more to do
+        within = int(np.searchsorted(replaying, share * replaying[-1:].sum(), side="right"))
         # The first boards in turn are one of each response.
-        again = again[: max(int(share * len(again)), len({r.question for r in again}))]
+        again = again[: max(within, len({r.question for r in again}))]
         followed = followed[: max(int(share * len(followed)), len({q for q, _ in followed}))]
     steps = least + len(again) * costs[0] + len(followed) * costs[1]
     return Extent(boards, rows, tuple(changes), tuple(again), tuple(followed), steps, total)
@@ -189,7 +200,7 @@ def _replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[_R
     that lost no board has none.
     """
     replays = [
-        _Replay(i, a.sample, verdict, place, place / limit)
+        _Replay(i, a.sample, verdict, place, place / limit, max(1.0, a.periods / PERIODS))
         for i, row in enumerate(rows)
         if any(a.verdict is Verdict.LOST for a in row)
         for verdict, limit in zip((Verdict.LOST, Verdict.OK), most, strict=True)

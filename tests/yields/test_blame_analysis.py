@@ -382,7 +382,8 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
 
 
 def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
-    study, rows = plan(2, "offsets"), answers(2, "offsets")
+    study = plan(2, "offsets")
+    rows = tuple(replace(a, periods=50) for a in answers(2, "offsets"))
     whole = extent_of(study, rows)
     budget = round(0.5 * whole.steps)
     half = extent_of(study, rows, budget)
@@ -398,6 +399,19 @@ def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
     assert found.share == least.share
     assert {s.replayed for s in found.responses[0].subjects} <= {0, 1}
     assert found.responses[0].subjects
+
+
+def test_boards_that_take_long_are_fewer_within_a_budget() -> None:
+    """Lost boards of 1250 drive periods are ten steps each, so a budget holds fewer of them."""
+    study = plan(2, "offsets")
+    rows = tuple(replace(a, periods=50) for a in answers(2, "offsets"))
+    slow = tuple(replace(a, periods=1250) if a.verdict is Verdict.LOST else a for a in rows)
+    budget = round(0.5 * extent_of(study, rows).steps)
+    lost = [
+        sum(replay.before is Verdict.LOST for replay in extent_of(study, asked, budget).replays)
+        for asked in (rows, slow)
+    ]
+    assert 1 <= lost[1] < 0.5 * lost[0]
 
 
 def test_a_larger_budget_does_the_rest() -> None:
