@@ -18,7 +18,7 @@ from designer.catalog.catalog import load_catalog
 from designer.check import checked_design
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders import design_files
-from designer.folders.design_source import source
+from designer.folders.model_source import source
 from designer.model.find_responses import matches
 from designer.verdicts.exact_rung import block
 from designer.yields.study import plan_study

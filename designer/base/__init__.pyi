@@ -20,10 +20,14 @@ from .csv_tables import (
 from .defaults import (
     CURVE_DEPTH as CURVE_DEPTH,
     DRAWN_STARTS as DRAWN_STARTS,
+    OVERS as OVERS,
     SAMPLES as SAMPLES,
     SEARCH_SAMPLES as SEARCH_SAMPLES,
     SEED as SEED,
+    STUDY_ENGINES as STUDY_ENGINES,
     TRADE_BOARDS as TRADE_BOARDS,
+    Over as Over,
+    StudyEngine as StudyEngine,
     at_least as at_least,
     cores as cores,
 )

@@ -1,11 +1,19 @@
-"""What an option is where nothing is said, for functions and command line alike."""
+"""What an option may be, and is where nothing is said, for functions and command line alike."""
 
 from __future__ import annotations
 
 import os
+from typing import Literal
 
 from designer.base.errors import InputError
 
+StudyEngine = Literal["exact", "bandwidth", "auto", "ngspice"]
+"""Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample;
+"bandwidth": the same with op-amps that lag, in both."""
+STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "bandwidth", "auto", "ngspice")
+Over = Literal["omega", "b", "grade", "omega-grade"]
+OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")
+"""What a yield map is made over."""
 SEED = 1
 """Of the random numbers."""
 SAMPLES = 200

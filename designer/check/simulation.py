@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from designer.base.progress import Progress
 from designer.check import coexistence, trust
 from designer.check.checked_design import CheckedResponse, spice_trace
 from designer.check.coexistence import Coexistence
-from designer.check.synthesis_result import Synthesis, synthesise
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.netlist import Excitation
@@ -55,6 +54,9 @@ from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool, require_ngspice
+
+if TYPE_CHECKING:
+    from designer.check.synthesis_result import Synthesis
 
 Engine = Literal["model", "circuit", "ngspice"]
 NEAR_TWIN = 0.02
@@ -138,15 +140,15 @@ def simulate(
     rung: Rung = "ideal",
     starts: int = DRAWN_STARTS,
     seed: int = SEED,
-    choose: Callable[[ModelFile], Synthesis] = synthesise,
+    choose: Callable[[ModelFile], Synthesis] | None = None,
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
-    synthesis : of this model file; made by ``choose`` where the engine needs one and None is given.
-    traces :
-    keep the orbits and their mirror twins as traces too. rung : the op-amps' model in ngspice.
-    starts, seed : of the initial states that are drawn to see which attractors coexist
+    synthesis : of this model file; where the engine needs one and None is given it is made by
+    ``choose``, or as ``check.synthesis_result`` makes it. traces : keep the orbits and their mirror
+    twins as traces too. rung : the op-amps' model in ngspice. starts, seed : of the initial states
+    that are drawn to see which attractors coexist
     (``check.coexistence``); ngspice has none.
 
     Raises
@@ -173,15 +175,23 @@ def simulate(
     if engine != "ngspice":
         one = partial(_on_model, modelfile, traces, sampling)
         if engine == "circuit":
-            synthesis = synthesis or choose(modelfile)
+            synthesis = synthesis or _design(modelfile, choose)
             one = partial(_on_circuit, synthesis, bool(omegas), traces, sampling)
         engine_name = "model" if engine == "model" else "exact circuit"
         step = progress.stage(f"responses of the {engine_name}", len(specs))
         return tuple(_timed(step, one, spec) for spec in specs)
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
-        synthesis = synthesis or choose(modelfile)
+        synthesis = synthesis or _design(modelfile, choose)
         return _in_ngspice(synthesis, specs, bool(omegas), pool, progress, traces, rung)
+
+
+def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | None) -> Synthesis:
+    if choose is None:
+        from designer.check import synthesis_result
+
+        choose = synthesis_result.synthesise
+    return choose(modelfile)
 
 
 def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:

@@ -62,6 +62,8 @@ def option(names: str, metavar: str | None = None, text: str = "") -> Any:
     return typer.Option(*names.split(), metavar=metavar, help=text)
 
 
+SOURCE = "model"
+"""Name of the argument that is a ``Source``."""
 Source = Annotated[
     Path, typer.Argument(metavar="MODEL|DIR", help="A model file (TOML) or a design folder.")
 ]
@@ -152,7 +154,7 @@ def verb(
                 with (
                     _logged(log),
                     progress_for(quiet) as progress,
-                    _announced(progress) if computes else nullcontext(),
+                    _announced(progress, words.get(SOURCE)) if computes else nullcontext(),
                 ):
                     output = function(Session(progress, not (json or quiet)), **words)
             except ResponseNotFound as error:
@@ -224,8 +226,13 @@ def _logged(log: Path | None) -> Iterator[None]:
 
 
 @contextmanager
-def _announced(progress: Progress) -> Iterator[None]:
-    """Says it when the engine has to be compiled."""
+def _announced(progress: Progress, source: object) -> Iterator[None]:
+    """Says it when the engine has to be compiled. source : a model file is read before the engine
+    is imported, so that what is wrong in it is told at once."""
+    if isinstance(source, Path) and source.is_file():
+        from designer.folders.model_source import model_file
+
+        model_file(source)
     from designer.base.jit_notice import announced
 
     with announced(progress.note):

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from designer.base.defaults import DRAWN_STARTS, SEARCH_SAMPLES, SEED, TRADE_BOARDS, cores
+from designer.base.defaults import (
+    DRAWN_STARTS,
+    SEARCH_SAMPLES,
+    SEED,
+    TRADE_BOARDS,
+    StudyEngine,
+    cores,
+)
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.version import __version__
 from designer.cli import next_steps
@@ -46,7 +53,6 @@ STUDY_KEYS = (
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
-StudyRung = Literal["exact", "bandwidth", "auto", "ngspice"]
 
 
 class MapOver(StrEnum):
@@ -171,7 +177,7 @@ def tolerance(
         float | None, option("--until", "WIDTH", "Add boards until intervals are narrower.")
     ] = None,
     rung: Annotated[
-        StudyRung | None,
+        StudyEngine | None,
         option(
             "--rung",
             None,
@@ -337,7 +343,7 @@ def search(
         ),
     ] = None,
     rung: Annotated[
-        StudyRung | None,
+        StudyEngine | None,
         option(
             "--rung", None, "Of the final study; auto: by a trade that is in the folder. [auto]"
         ),

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
@@ -450,6 +449,8 @@ def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
 
 def starts(scale: Array, count: int, seed: int = 0) -> Array:
     """(count, n) initial states: rest, then a scrambled Sobol set in the box ± scale."""
+    from scipy.stats import qmc
+
     box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
     return np.vstack([np.zeros((1, len(scale))), scale * (2.0 * box - 1.0)])[:count]
 

@@ -30,7 +30,7 @@ from designer.explorer.questions import boards, planes, read_question, save_mode
 from designer.explorer.saved_page import save_page
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
-from designer.folders.design_source import source
+from designer.folders.model_source import source
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, read_model_file
 

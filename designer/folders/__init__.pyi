@@ -17,18 +17,20 @@ from .design_source import (
     bills_are_of_old as bills_are_of_old,
     design_answer as design_answer,
     design_inputs as design_inputs,
-    design_inputs_of as design_inputs_of,
     design_stage as design_stage,
     grade_inputs as grade_inputs,
-    model_file as model_file,
     read_design as read_design,
-    source as source,
     standing_design as standing_design,
 )
 from .json_answers import (
     cost_of as cost_of,
     run_json as run_json,
     simulate_json as simulate_json,
+)
+from .model_source import (
+    design_inputs_of as design_inputs_of,
+    model_file as model_file,
+    source as source,
 )
 from .origin import (
     provenance as provenance,

@@ -24,7 +24,7 @@ from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
-from designer.folders.design_source import read_design, source
+from designer.folders.model_source import source
 from designer.folders.sweep_store import GridStore
 from designer.jobs.bifurcation_request import Request, Swept, plan_of
 from designer.jobs.bifurcation_work import BifurcationWork, Files, Made, image_files, with_si
@@ -200,6 +200,8 @@ def _subject(
 ) -> tuple[ModelFile, Swept]:
     if not isinstance(model, ModelFile) and Path(model).is_dir():
         if request.circuit:
+            from designer.folders.design_source import read_design
+
             synthesis = read_design(model, progress=progress)
             return synthesis.modelfile, BoardSubject(synthesis.design)
         modelfile, _ = source(model, model)

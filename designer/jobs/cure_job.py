@@ -29,13 +29,8 @@ from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
-from designer.folders.design_source import (
-    design_inputs,
-    design_inputs_of,
-    design_stage,
-    grade_inputs,
-    read_design,
-)
+from designer.folders.design_source import design_inputs, design_stage, grade_inputs, read_design
+from designer.folders.model_source import design_inputs_of
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
 from designer.jobs import folder_numbers, rung_choice

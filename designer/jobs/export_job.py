@@ -37,7 +37,7 @@ from designer.fabrication.order_refusal import (
 )
 from designer.folders import board_files, kicad_files
 from designer.folders.design_files import design_provenance
-from designer.folders.design_source import design_inputs_of, source
+from designer.folders.model_source import design_inputs_of, source
 from designer.jobs.board_routing import route_in_folder, write_design
 from designer.jobs.options import Options
 from designer.jobs.rules_job import checked

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SAMPLES, SEED, at_least, cores
+from designer.base.defaults import SAMPLES, SEED, Over, StudyEngine, at_least, cores
 from designer.base.errors import InputError
-from designer.yields.tolerance_study import StudyEngine
-from designer.yields.yield_maps import Over
 
 MOST_SAMPLES = 1_000_000
 

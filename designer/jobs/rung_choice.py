@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from designer.base.defaults import STUDY_ENGINES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.guarded_reading import reading
 from designer.base.progress import Progress
@@ -23,7 +24,6 @@ from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
-from designer.yields.tolerance_study import STUDY_ENGINES, StudyEngine
 
 TRADE = "trade.json"
 """What ``jobs.trade_job`` writes."""

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SEARCH_SAMPLES
+from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import Stages
@@ -22,7 +22,8 @@ from designer.centering.ngspice_check import LEVELS, RUNG
 from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
-from designer.folders.design_source import design_inputs_of, grade_inputs, source
+from designer.folders.design_source import grade_inputs
+from designer.folders.model_source import design_inputs_of, source
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
 from designer.jobs import folder_numbers, rung_choice
@@ -40,7 +41,7 @@ from designer.verdicts.cross_check import Ask, StartKind, Why
 from designer.verdicts.rung_gate import gated
 from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import LocalRunner
-from designer.yields.tolerance_study import StudyEngine, check
+from designer.yields.tolerance_study import check
 
 CONFIRMATION = "confirmation.json"
 DIFFERING = 0.05

@@ -23,7 +23,8 @@ from designer.centering.design_search import look, search as design_search
 from designer.centering.ngspice_check import Listener
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import search_json
-from designer.folders.design_source import design_inputs, design_stage, model_file
+from designer.folders.design_source import design_inputs, design_stage
+from designer.folders.model_source import model_file
 from designer.folders.origin import provenance
 from designer.jobs import rung_choice
 from designer.jobs.options import Options

@@ -18,9 +18,8 @@ from designer.base.si_unit import DIGITS
 from designer.catalog.catalog import load_catalog
 from designer.check import simulation
 from designer.check.simulation import Engine, Simulated
-from designer.check.synthesis_result import Synthesis
-from designer.folders.design_source import model_file, read_design, source
 from designer.folders.json_answers import simulate_json
+from designer.folders.model_source import model_file, source
 from designer.folders.origin import provenance
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile
@@ -29,6 +28,8 @@ from designer.spice.opamp_model import Rung
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from designer.check.synthesis_result import Synthesis
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,10 @@ def simulate(
         modelfile = model
     elif Path(model).is_dir():
         modelfile, folder = source(model, model)
-        synthesis = None if engine == "model" else read_design(folder, catalog, progress)
+        if engine != "model":
+            from designer.folders.design_source import read_design
+
+            synthesis = read_design(folder, catalog, progress)
     else:
         modelfile = model_file(Path(model))
     read = Reader(modelfile.model, modelfile.si)

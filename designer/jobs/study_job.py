@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from designer.base.defaults import Over, StudyEngine
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
@@ -18,8 +19,9 @@ from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files
-from designer.folders.design_source import bills_are_of_old, design_inputs, source
+from designer.folders.design_source import bills_are_of_old, design_inputs
 from designer.folders.json_answers import run_json
+from designer.folders.model_source import source
 from designer.jobs import folder_numbers, rung_choice, search_stage
 from designer.jobs.board_routing import route_own_board
 from designer.jobs.job_outcome import JobOutcome
@@ -42,8 +44,6 @@ from designer.jobs.study_stage import (
 from designer.model.measured_values import MEASURED, read_measured
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spread.part_rules import spread_of
-from designer.yields.tolerance_study import StudyEngine
-from designer.yields.yield_maps import Over
 
 THE_BOARD = "board"
 """Name of the only board of a list that names none."""

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from designer.base.defaults import OVERS
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.manifest import StageName
 from designer.folders.study_cache import CACHE
 from designer.folders.study_stores import BLOCK_FOLDERS, BOARDS, MAPS, PIECES
 from designer.jobs.options import Options
-from designer.yields.yield_maps import OVERS
 
 MAP = "map:"
 ALL_IN_NGSPICE = "ngspice of every board"

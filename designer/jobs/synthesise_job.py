@@ -19,8 +19,9 @@ from designer.catalog.catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
-from designer.folders.design_source import design_answer, source
+from designer.folders.design_source import design_answer
 from designer.folders.json_answers import cost_of
+from designer.folders.model_source import source
 from designer.jobs import search_stage
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options

@@ -24,7 +24,8 @@ from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, VENDOR, Truths
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
-from designer.folders.design_source import grade_inputs, source
+from designer.folders.design_source import grade_inputs
+from designer.folders.model_source import source
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
 from designer.jobs import folder_numbers

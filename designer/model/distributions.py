@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from designer.base.arrays import Array
 
@@ -55,6 +54,9 @@ class Normal(Distribution):
         if self.sigma == 0.0:
             return np.zeros_like(u)
         cut = self.limit / self.sigma
+        # Imported here: to read a model file takes none of it.
+        from scipy.special import ndtr, ndtri
+
         below = float(ndtr(-cut))
         # From the nearer end: the probabilities of the upper tail have no digits to spare.
         lower = np.minimum(u, 1.0 - u)

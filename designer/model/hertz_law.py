@@ -6,10 +6,9 @@ same on all of them: no other choice of as many pieces from zero force has a sma
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-
-from scipy.optimize import brentq
 
 POWER = 1.5
 """Of the depth, for two round bodies (H. Hertz, 1881)."""
@@ -51,7 +50,14 @@ def _least_error(pieces: int) -> float:
     def short(error: float) -> float:
         return 1.0 - _knots(error, pieces)[-1][0]
 
-    return float(brentq(short, 1e-9, 1.0, xtol=1e-15, rtol=1e-14))
+    return _root(short, 1e-9, 1.0)
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    # Imported here: a model file without such a contact does not wait for it.
+    from scipy.optimize import brentq
+
+    return float(brentq(function, low, high, xtol=1e-15, rtol=1e-14))
 
 
 def _knots(error: float, pieces: int) -> list[tuple[float, float]]:
@@ -77,4 +83,4 @@ def _end(x: float, f: float, error: float) -> float:
     while excess(high) < 0.0:
         high += high
     low = max(x, error ** (1.0 / POWER)) * (1.0 + 1e-12) + 1e-12
-    return float(brentq(excess, low, high, xtol=1e-15, rtol=1e-14))
+    return _root(excess, low, high)

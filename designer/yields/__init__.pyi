@@ -72,9 +72,7 @@ from .study_identity import (
     study_hash as study_hash,
 )
 from .tolerance_study import (
-    STUDY_ENGINES as STUDY_ENGINES,
     Stores as Stores,
-    StudyEngine as StudyEngine,
     check as check,
     tolerance as tolerance,
 )
@@ -111,9 +109,7 @@ from .yield_count import (
     worst as worst,
 )
 from .yield_maps import (
-    OVERS as OVERS,
     Axis as Axis,
-    Over as Over,
     YieldMap as YieldMap,
     settle_open as settle_open,
     yield_map as yield_map,

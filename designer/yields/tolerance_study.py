@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
-from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED, at_least, cores
+from designer.base.defaults import (
+    SAMPLES as SAMPLES,
+    SEED as SEED,
+    Over,
+    StudyEngine,
+    at_least,
+    cores,
+)
 from designer.base.progress import Laps, Progress
 from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse
@@ -34,7 +41,7 @@ from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study, plan_study
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
 from designer.yields.tuned_yield import tuned_block
-from designer.yields.yield_maps import Over, yield_map
+from designer.yields.yield_maps import yield_map
 
 MOST_UNTIL = 100_000
 """Samples at which a study that grows until its intervals are narrow gives up."""
@@ -42,11 +49,6 @@ MOST_NOMINAL = 1000
 """Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
 MORE_NOMINAL = 50
 """By how many their number grows."""
-
-StudyEngine = Literal["exact", "bandwidth", "auto", "ngspice"]
-"""Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample;
-"bandwidth": the same with op-amps that lag, in both."""
-STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "bandwidth", "auto", "ngspice")
 
 
 class Stores:

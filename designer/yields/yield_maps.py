@@ -12,12 +12,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
+from designer.base.defaults import OVERS, Over
 from designer.base.errors import InputError
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
@@ -29,8 +30,6 @@ from designer.spread.spread import draw_many
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.yield_count import Yield
 
-Over = Literal["omega", "b", "grade", "omega-grade"]
-OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")
 Counts = NDArray[np.int64]
 
 POINTS = 17

@@ -18,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from designer.base.defaults import StudyEngine
 from designer.base.errors import InputError
 from designer.base.figure_style import to_svg
 from designer.base.progress import Progress
@@ -47,7 +48,6 @@ from designer.spread.spread import Spread, draw_many
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.margins import Limit, Margin
-from designer.yields.tolerance_study import StudyEngine
 from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.yield_count import Yield
 from designer.yields.yield_maps import Axis, YieldMap

@@ -477,6 +477,20 @@ def test_import_is_light() -> None:
     assert done.stdout.split() == ["False", __version__]
 
 
+def test_a_wrong_model_file_is_told_before_the_engine_is_imported(tmp_path: Path) -> None:
+    (tmp_path / "wrong.toml").write_text("format = 2\nfoo = 1\n")
+    code = (
+        "import sys; from designer.cli import entry; status = entry.status(sys.argv[1:]);"
+        "print(status, sorted({'numba', 'scipy', 'pandas', 'cvxpy'} & set(sys.modules)))"
+    )
+    for verb in ("run", "simulate", "bifurcation"):
+        command = [sys.executable, "-c", code, verb, str(tmp_path / "wrong.toml")]
+        command += ["--out", str(tmp_path / "out")] if verb == "run" else []
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        assert done.stdout.split("\n")[0] == "2 []", done.stderr
+        assert "unknown key 'foo'" in done.stderr
+
+
 def test_every_verb_is_registered() -> None:
     code = "from designer.cli import command_line;print(*command_line.application().commands)"
     done = subprocess.run(

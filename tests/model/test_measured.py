@@ -13,7 +13,7 @@ from designer.base.design_folder import is_design_folder
 from designer.base.errors import InputError
 from designer.catalog.catalog import load_catalog
 from designer.cli import entry
-from designer.folders.design_source import model_file
+from designer.folders.model_source import model_file
 from designer.model.measured_values import read_measured
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.spread.part_rules import spread_of

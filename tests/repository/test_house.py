@@ -14,7 +14,18 @@ from graphlib import TopologicalSorter
 import pytest
 
 from designer.base import jit
-from tests.shared.house import HOUSE, ORDER, ROOT, Import, arrows, imports, public, trees
+from tests.shared.house import (
+    HOUSE,
+    ORDER,
+    ROOT,
+    Import,
+    arrows,
+    imports,
+    public,
+    reached,
+    sources,
+    trees,
+)
 
 DRAWS = "matplotlib takes a second to import, and nothing before a picture needs it"
 STARTS = "most verbs do not need it"
@@ -47,11 +58,28 @@ LAZY = {
         ("folders.json_answers", "model.mechanics"),
         ("folders.json_answers", "model.si_units"),
         ("folders.origin", "spice.batch_backend"),
+        ("check.simulation", "check.synthesis_result"),
+        ("jobs.bifurcation_job", "folders.design_source"),
         ("jobs.simulate_job", "centering.stage_choice"),
+        ("jobs.simulate_job", "folders.design_source"),
         ("jobs.study_stage", "jobs.dask_runner"),
     },
 }
 """Imports inside functions, outside the command line, each with its reason."""
+REACH = {
+    "simulate_job": 24_000,
+    "bifurcation_job": 30_000,
+    "rules_job": 51_000,
+    "stage_runner": 52_000,
+    "bench_job": 54_000,
+    "trade_job": 56_000,
+    "export_job": 56_500,
+    "cure_job": 58_500,
+    "synthesise_job": 60_500,
+    "study_job": 62_500,
+    "search_job": 62_500,
+}
+"""Lines that each verb may import; fewer is better."""
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +183,13 @@ def test_imports_inside_functions_have_a_reason(every: tuple[Import, ...]) -> No
     """Start-up time is the only one; whatever the command line uses may wait for its verb."""
     lazy = {(i.importer, i.module) for i in every if i.lazy and not i.importer.startswith("cli.")}
     assert lazy == {pair for pairs in LAZY.values() for pair in pairs}
+
+
+@pytest.mark.parametrize("verb", REACH)
+def test_a_verb_imports_what_it_uses(verb: str) -> None:
+    """Lines of the modules that a verb's module imports, with all that those import."""
+    lines = sum(len(sources()[m].read_text("utf-8").splitlines()) for m in reached(f"jobs.{verb}"))
+    assert lines <= REACH[verb]
 
 
 def test_a_class_name_stands_once() -> None:

@@ -59,6 +59,8 @@ class Import:
     """Whether the import stands inside a function."""
     line: int
     """Of the importing file."""
+    for_types: bool = False
+    """Whether only a type checker imports it."""
 
 
 def sources() -> dict[str, Path]:
@@ -92,6 +94,12 @@ def _imports() -> Iterator[Import]:
             if isinstance(function, ast.FunctionDef)
             for node in ast.walk(function)
         }
+        for_types = {
+            id(node)
+            for condition in ast.walk(tree)
+            if isinstance(condition, ast.If) and ast.unparse(condition.test) == "TYPE_CHECKING"
+            for node in ast.walk(condition)
+        }
         for node in ast.walk(tree):
             if not isinstance(node, ast.ImportFrom) or node.module is None:
                 continue
@@ -101,7 +109,31 @@ def _imports() -> Iterator[Import]:
             for alias in node.names:
                 whole = f"{source}.{alias.name}".removeprefix(".")
                 module, name = (whole, "") if whole in modules else (source, alias.name)
-                yield Import(importer, module, name, id(node) in lazy, node.lineno)
+                where = id(node) in lazy, node.lineno, id(node) in for_types
+                yield Import(importer, module, name, *where)
+
+
+@cache
+def _directly() -> dict[str, set[str]]:
+    """What each module imports when it is imported."""
+    out: dict[str, set[str]] = {module: set() for module in trees()}
+    for each in imports():
+        if not (each.lazy or each.for_types):
+            home = each.module
+            if home not in out:  # a package's own list, which says where the name is
+                home = f"{home}.{public(home).get(each.name) or each.name}"
+            out[each.importer].add(home)
+    return out
+
+
+def reached(start: str) -> set[str]:
+    """The modules that importing this one imports."""
+    found, todo = {start}, [start]
+    while todo:
+        more = _directly().get(todo.pop(), set()) - found
+        found |= more
+        todo += more
+    return found & trees().keys()
 
 
 @cache

@@ -24,7 +24,7 @@ from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.cli import entry
-from designer.folders import design_source, study_json
+from designer.folders import model_source, study_json
 from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
@@ -473,7 +473,7 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
 def test_a_model_without_a_title_has_the_same_name_in_its_folder(exact: Path) -> None:
     """The first file's, small.toml: the names of the KiCad project are made of it."""
     assert "title" not in SMALL
-    assert design_source.source(exact, None)[0].title == "small"
+    assert model_source.source(exact, None)[0].title == "small"
     assert (exact / "kicad" / "small.kicad_sch").is_file()
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from designer.base.defaults import Over
 from designer.base.errors import InputError
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
@@ -23,7 +24,7 @@ from designer.plots.map_plots import map_chart, map_files
 from designer.spread.spread import Spread, draw
 from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
 from designer.yields import yield_maps
-from designer.yields.yield_maps import SEED_SHIFT, Axis, Over, YieldMap, yield_map
+from designer.yields.yield_maps import SEED_SHIFT, Axis, YieldMap, yield_map
 from tests.shared import paper_cases
 
 B = 0.25
