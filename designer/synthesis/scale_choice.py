@@ -54,8 +54,8 @@ TANGENTS, CUTS = 12, 3
 """Tangents of it at the best point, at most; and at corners of each range of thresholds."""
 STEP = 1e-4
 """Of a logarithm: for the slope of a tangent."""
-TRIED = 6
-"""Choices of which a circuit is made, until one can be."""
+TRIED, MOST_TRIED = 6, 30
+"""Choices of which a circuit is made, until one can be; with those whose offsets are too large."""
 GOAL, ENOUGH = 0.1, 0.5
 """Of the resistors' grade: an error up to the first is worth nothing more; one up to the second is
 worth no lower thresholds."""
@@ -78,8 +78,6 @@ class RoundedChoice:
     """``ScaleBox.worth`` of it."""
     kinds: int
     """Distinct values."""
-    quiet: bool
-    """Whether its offsets keep the rule ``offset-force``, or no scales do."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +104,8 @@ class ScaleChoice:
     """Choices that keep all limits which are known before the circuit is made."""
     _noisy: bool = False
     """Whether no scales were found that keep the rule ``offset-force``."""
+    _known_quiet: dict[int, bool] = field(default_factory=dict)
+    """``_quiet`` by the candidate's identity."""
 
     @cached_property
     def program(self) -> ScaleProgram:
@@ -229,15 +229,19 @@ class ScaleChoice:
         why = Shortfall("coefficients", False)
         worse: list[tuple[bool, float, ScaleAttempt]] = []
         there = False
-        for candidate in list(self._ranked())[:TRIED]:
+        tried = 0
+        for candidate in list(self._ranked())[:MOST_TRIED]:
+            if tried == TRIED:
+                break
             made = self.circuit_of(candidate)
             if isinstance(made, Shortfall):
-                why = made
+                why, tried = made, tried + 1
                 continue
             own = ScaleAttempt(made, candidate.z, self._words(candidate))
             noisy = self._over_limit(made.circuit, made.errors.scales.volts) > 0.0
             error = made.errors.max_error
             as_meant = error <= max(self.goal, CLOSE * candidate.error)
+            tried += not noisy
             if as_meant and not noisy:
                 there = True
                 yield own
@@ -279,7 +283,8 @@ class ScaleChoice:
 
     @property
     def _least(self) -> float:
-        return min((c.error for c in self.candidates if c.quiet), default=np.inf)
+        ranked = sorted(self.candidates, key=lambda c: c.error)
+        return next((c.error for c in ranked if self._quiet(c)), np.inf)
 
     def _rounded(self, logs: Array) -> Array:
         """(rows,) the values nearest to these logarithms."""
@@ -289,21 +294,28 @@ class ScaleChoice:
     def _candidate(self, z: Array, rounded: Array, error: float) -> RoundedChoice:
         own = z[[k for k, values in enumerate(self.program.lists) if len(values)]]
         kinds = len(np.unique(np.round(np.concatenate([rounded, own]), 9)))
-        quiet = self._over(z) <= -float(np.log(ROOM))
-        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds, quiet)
+        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds)
+
+    def _quiet(self, candidate: RoundedChoice) -> bool:
+        """Whether its offsets keep the rule ``offset-force``, or no scales do."""
+        known = self._known_quiet.get(id(candidate))
+        if known is None:
+            known = self._over(candidate.z) <= -float(np.log(ROOM))
+            self._known_quiet[id(candidate)] = known
+        return known
 
     def _ranked(self) -> Iterator[RoundedChoice]:
         """The candidates, the best one first."""
-        good = [c for c in self.candidates if c.error <= self.goal and c.quiet]
+        good = [c for c in self.candidates if c.error <= self.goal and self._quiet(c)]
+        own = {id(c) for c in good}
         if good:
             top = max(c.worth for c in good)
             first = [c for c in good if c.worth >= top - ALIKE]
             yield from sorted(first, key=lambda c: (c.kinds, c.error))
             good = [c for c in good if c.worth < top - ALIKE]
             yield from sorted(good, key=lambda c: -c.worth)
-        rest = [c for c in self.candidates if c.error > self.goal or not c.quiet]
-        enough = self._at_most(ENOUGH)
-        yield from sorted(rest, key=lambda c: (c.error > enough, not c.quiet, c.error))
+        rest = [c for c in self.candidates if id(c) not in own]
+        yield from sorted(rest, key=lambda c: c.error)
 
     def _rounding(self) -> Rounding:
         program, bounds = self.program, [*self.program.bounds, *self.box.cuts]
