@@ -275,6 +275,23 @@ RULES: tuple[DesignRule, ...] = (
         board=True,
     ),
     _rule(
+        "kicad-errors",
+        "Errors of KiCad's own check beside those that other rules tell",
+        0, "",
+        "KiCad's check at its own severities, without the board's exclusions; a footprint that "
+        "differs from the library's is an error too",
+        "mend what KiCad's check names",
+        board=True,
+    ),
+    _rule(
+        "schematic-parity",
+        "Differences between the board and the schematic beside it",
+        0, "",
+        "KiCad's check of schematic parity",
+        "update the board from the schematic, or the schematic from the board",
+        board=True,
+    ),
+    _rule(
         "clearance",
         "Copper of different nets, by the largest voltage between them",
         "IPC-2221, table 6-1, column B2, at the voltage between the rails", "mm",

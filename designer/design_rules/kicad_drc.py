@@ -1,7 +1,8 @@
 """KiCad's design rule check of a board under our rules, and whether it understood them.
 
 Everything happens on copies in a scratch folder, without the board's project: its severities and
-exclusions hide nothing, and its net classes are not needed. Two checks are made. One of a board
+exclusions hide nothing, and its net classes are not needed. The library of footprints is ours, so
+that a footprint that was changed on the board is seen. Two checks are made. One of a board
 that breaks every rule (``drc_specimen``): what KiCad does not report there, it does not
 understand, be it a rule of ours or one of its own. One of the board itself with a track besides
 that breaks a rule of its own: unless that is reported, KiCad has dropped the rules, and nothing it
@@ -10,18 +11,22 @@ says of them counts.
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from designer.base.errors import InputError
-from designer.base.guarded_reading import parse_json
-from designer.base.sexpr import Expression, expression_text, read
-from designer.board.kicad_names import circuit_net
+from designer.base.guarded_reading import parse_json, read_text
+from designer.base.sexpr import Expression, expression, expression_text, read
+from designer.board.footprints import FootprintShape
+from designer.board.kicad_footprint import module
+from designer.board.kicad_names import LIBRARY, circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CANARY, CustomRule, canary, rules_text
 from designer.design_rules.drc_specimen import canary_track, specimen
@@ -30,11 +35,22 @@ from designer.design_rules.kicad_program import KicadFailed, call, last_words, n
 ASIDE = (-100.0, -100.0)
 """Where the canary's track lies [mm], from the board's uppermost, leftmost pad."""
 
+NEAR_CANARY = 10.0
+"""From there [mm]: what KiCad says of this is of the canary's track."""
+
 OPEN, SHORT = "unconnected", "short-circuit"
 """Rules that KiCad's check says by itself."""
+ERRORS, PARITY = "kicad-errors", "schematic-parity"
+"""Rules that stand for KiCad's own errors."""
+SEVERITIES = {"lib_footprint_mismatch": "error", "lib_footprint_issues": "ignore"}
+"""Other than KiCad's own: a mask or paste opening that is missing is no matter of taste, and a
+footprint of another library is a rule of ours (``part-footprint``)."""
+MOST_SCHEMATIC = 20_000_000
+"""Bytes of a schematic, at most."""
 SHORTS = frozenset({"shorting_items", "tracks_crossing", "zones_intersect"})
 """KiCad's types of violations in which copper of two nets touches."""
 
+_PARITY, _SHEET = "schematic_parity", "board.kicad_sch"
 _RULE = re.compile(r"\(rule '([^']*)' ")
 _ACTUAL = re.compile(r"actual ([0-9.]+)")
 _MINIMUM = re.compile(r"min width ([0-9.]+) mm")
@@ -67,10 +83,21 @@ class DesignRuleCheck:
     """Nets of the circuit that are not all routed, and how many connections are open on each."""
     shorts: tuple[str, ...] = ()
     """Places where copper of two nets touches, in KiCad's words."""
+    errors: tuple[str, ...] = ()
+    """Errors of no other rule, each with its type and place in KiCad's words."""
+    warnings: Mapping[str, int] = field(default_factory=dict)
+    """How many warnings there are, by type."""
+    parity: tuple[str, ...] | None = None
+    """Differences from the schematic, each with its type and place; None where there is none beside
+    the board."""
 
 
-def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
-    """Check a board against the rules.
+def check(
+    board: BoardFile, rules: Sequence[CustomRule], footprints: Sequence[FootprintShape] = ()
+) -> DesignRuleCheck:
+    """Check a board against the rules, and against the schematic beside it, where there is one.
+
+    footprints : as the design has them, by which those on the board are judged.
 
     Raises
     ------
@@ -84,7 +111,8 @@ def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
         reported = {v.rule for v in violations(broken, rules)}
         reported |= {OPEN} if _unconnected(broken) else set()
         reported |= {SHORT} if _shorts(broken) else set()
-        answer = report(_with_canary(board), text, place / "board")
+        files = _beside(board, footprints)
+        answer = report(_with_canary(board), text, place / "board", files)
     if not any(_is_canary(v) for v in answer["violations"]):
         raise KicadFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
@@ -93,21 +121,50 @@ def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
         frozenset([OPEN, SHORT, *(rule.id for rule in rules)]) - reported,
         _unconnected(answer),
         _shorts(answer),
+        tuple(map(_typed, _others(answer, rules, "error", _aside(board)))),
+        Counter(str(each.get("type")) for each in _others(answer, rules, "warning", _aside(board))),
+        tuple(map(_typed, answer[_PARITY])) if _SHEET in files else None,
     )
 
 
-def report(board: str, rules: str, place: Path) -> dict[str, Any]:
+def _beside(board: BoardFile, footprints: Sequence[FootprintShape]) -> dict[str, str]:
+    """Files that stand beside a board when it is checked, by name."""
+    files = {
+        f"{LIBRARY}.pretty/{shape.name}.kicad_mod": expression_text(module(shape))
+        for shape in footprints
+    }
+    table = {"name": LIBRARY, "type": "KiCad", "uri": f"${{KIPRJMOD}}/{LIBRARY}.pretty"}
+    files["fp-lib-table"] = expression_text(
+        expression("fp_lib_table", version=7, lib={**table, "options": "", "descr": ""})
+    )
+    design = {"rule_severities": SEVERITIES}
+    files["board.kicad_pro"] = json.dumps({"board": {"design_settings": design}})
+    sheet = board.path.with_suffix(".kicad_sch")
+    if sheet.is_file():
+        files[_SHEET] = read_text(sheet, "a schematic of KiCad", most=MOST_SCHEMATIC)
+    return files
+
+
+def report(
+    board: str, rules: str, place: Path, files: Mapping[str, str] | None = None
+) -> dict[str, Any]:
     """KiCad's report on the text of a board under the text of a ``.kicad_dru``.
+
+    files : that stand beside it, by name; with a schematic, parity is looked at too.
 
     Raises
     ------
     KicadFailed : there is none.
     """
     place.mkdir()
-    (place / "board.kicad_pcb").write_text(board, encoding="utf-8")
-    (place / "board.kicad_dru").write_text(rules, encoding="utf-8")
+    files = {} if files is None else files
+    every = {**files, "board.kicad_pcb": board, "board.kicad_dru": rules}
+    for name, text in every.items():
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text(text, encoding="utf-8")
     out = place / "report.json"
     options = ["--format", "json", "--units", "mm", "--severity-all", "--output", str(out)]
+    options += ["--schematic-parity"] if _SHEET in files else []
     process = call("pcb", "drc", *options, str(place / "board.kicad_pcb"), place=place)
     if not out.is_file():
         raise KicadFailed(f"kicad-cli wrote no report: {last_words(process)}")
@@ -115,7 +172,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
         answer = parse_json(out.read_bytes(), out)
     except InputError:
         raise KicadFailed("kicad-cli wrote a report that is no JSON") from None
-    lists = ("violations", "unconnected_items")
+    lists = ("violations", "unconnected_items", *([_PARITY] if _SHEET in files else []))
     if not isinstance(answer, dict) or not all(isinstance(answer.get(n), list) for n in lists):
         raise KicadFailed("kicad-cli wrote a report of another kind")
     return answer
@@ -134,6 +191,31 @@ def violations(answer: Mapping[str, Any], rules: Sequence[CustomRule]) -> tuple[
             value = float(actual[1]) if actual else float("nan")
             out.append(Violation(id_, value, _place(each)))
     return tuple(out)
+
+
+def _others(
+    answer: Mapping[str, Any],
+    rules: Sequence[CustomRule],
+    severity: str,
+    aside: tuple[float, float],
+) -> list[Mapping[str, Any]]:
+    """Violations of this severity that no rule of ours tells. aside : where the canary's track
+    lies, of which KiCad says more than one thing."""
+    ids = {rule.id for rule in rules}
+
+    def ours(each: Mapping[str, Any]) -> bool:
+        named = _RULE.search(str(each.get("description", "")))
+        id_ = named[1] if named else _width_rule(each, rules)
+        at = [item.get("pos", {}) for item in each.get("items", [])]
+        near = [math.dist((p.get("x", 0.0), p.get("y", 0.0)), aside) < NEAR_CANARY for p in at]
+        return id_ in ids or each.get("type") in SHORTS or (bool(near) and all(near))
+
+    return [v for v in answer["violations"] if v.get("severity") == severity and not ours(v)]
+
+
+def _typed(each: Mapping[str, Any]) -> str:
+    place = _place(each)
+    return f"{each.get('type')}: {place}" if place else str(each.get("type"))
 
 
 def _width_rule(each: Mapping[str, Any], rules: Sequence[CustomRule]) -> str:
@@ -185,9 +267,12 @@ def _place(each: Mapping[str, Any]) -> str:
     return "".join(ch if ch.isprintable() else "?" for ch in words)
 
 
-def _with_canary(board: BoardFile) -> str:
+def _aside(board: BoardFile) -> tuple[float, float]:
+    """Where the canary's track lies [mm]."""
     corners = [pad.at for footprint in board.footprints for pad in footprint.pads] or [(0.0, 0.0)]
-    x = min(at[0] for at in corners) + ASIDE[0]
-    y = min(at[1] for at in corners) + ASIDE[1]
+    return min(at[0] for at in corners) + ASIDE[0], min(at[1] for at in corners) + ASIDE[1]
+
+
+def _with_canary(board: BoardFile) -> str:
     tree = read(board.text, board.path)
-    return expression_text(Expression((*tree.items, canary_track(x, y))))
+    return expression_text(Expression((*tree.items, canary_track(*_aside(board)))))

@@ -37,7 +37,9 @@ from designer.catalog.design_rules import RULES
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
 from designer.design_rules import on_parts
 from designer.design_rules.kicad_drc import (
+    ERRORS,
     OPEN,
+    PARITY,
     SHORT,
     DesignRuleCheck,
     Violation,
@@ -73,7 +75,8 @@ def checked(
 ) -> tuple[RuleOutcome, ...]:
     """Every rule on a board, with KiCad where that is installed and answers."""
     try:
-        answer: DesignRuleCheck | str = check(board, rules)
+        shapes = {c.footprint: footprint(c.footprint) for c in components if c.footprint}
+        answer: DesignRuleCheck | str = check(board, rules, tuple(shapes.values()))
     except KicadFailed as why:
         answer = str(why)
     return on_board(board, components, rules, overrides, answer)
@@ -154,9 +157,12 @@ def _places(board: BoardFile, net: str) -> list[tuple[float, float]]:
 def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """From each pad of the design's components to the board's edge [mm]."""
     if not len(board.outline.sides):
-        raise NotRun(f"the board has no edge: nothing on {LAYER}")
+        yield Finding(float("nan"), more=f"the board has no edge: nothing on {LAYER}")
+        return
     if (at := board.outline.open_at) is not None:
-        raise NotRun(f"the edge on {LAYER} is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)")
+        where = f"({at[0]:.2f} mm, {at[1]:.2f} mm)"
+        yield Finding(float("nan"), where, more=f"the edge on {LAYER} is not closed there")
+        return
     for component in components:
         for pad in board.pads(component.reference):
             place = f"{component.reference}.{pad.number}"
@@ -187,9 +193,30 @@ def short_circuits(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Findin
     yield Finding(len(answer.shorts), more="; ".join(answer.shorts[:MOST]))
 
 
+def kicad_errors(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
+    """What KiCad's check calls an error and no other rule tells; warnings are named."""
+    warned = [f"{name} ({n})" for name, n in sorted(answer.warnings.items())]
+    more = [*answer.errors[:MOST], *(["warnings: " + ", ".join(warned)] if warned else [])]
+    yield Finding(len(answer.errors), more="; ".join(more))
+
+
+def schematic_parity(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
+    """Differences from the schematic.
+
+    Raises
+    ------
+    NotRun : there is none beside the board.
+    """
+    if answer.parity is None:
+        raise NotRun(f"no {board.path.with_suffix('.kicad_sch').name} beside the board")
+    yield Finding(len(answer.parity), more="; ".join(answer.parity[:MOST]))
+
+
 REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Finding]]] = {
     OPEN: unconnected,
     SHORT: short_circuits,
+    ERRORS: kicad_errors,
+    PARITY: schematic_parity,
 }
 """Rules that KiCad's check says by itself, without a custom rule."""
 READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]] = {

@@ -48,9 +48,9 @@ BY_KICAD = (
     "supply-width",
 )
 """Rules whose pair is a board that breaks them in KiCad's check, and one that just keeps them."""
-BY_REPORT = ("unconnected", "short-circuit")
+BY_REPORT = ("unconnected", "short-circuit", "kicad-errors", "schematic-parity")
 """Rules that KiCad's check says by itself: the pairs stand in
-tests/design_rules/test_rules_copper.py."""
+tests/design_rules/test_rules_copper.py and tests/design_rules/test_kicad_errors.py."""
 OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted")
 """Rules on the parts: the pairs stand in tests/design_rules/test_rules_parts.py."""
 BY_READING = ("decoupling-distance", "summing-span", "board-outline", *OF_PARTS)
@@ -521,7 +521,7 @@ def test_without_an_edge_or_with_a_gap_in_it_nothing_is_passed(tmp_path: Path) -
     edges = whole().all("gr_rect")
     bare = Expression(tuple(i for i in whole().items if i not in edges))
     found = by_reading(expression_text(bare), tmp_path)["board-outline"]
-    assert found.status == NOT_RUN
+    assert found.status == FAIL
     assert "no edge" in found.found
     corners = [(box["left"], box["top"]), (box["right"], box["top"]),
                (box["right"], box["bottom"]), (box["left"], box["bottom"])]  # fmt: skip
@@ -541,7 +541,7 @@ def test_without_an_edge_or_with_a_gap_in_it_nothing_is_passed(tmp_path: Path) -
 
     assert by_reading(drawn_in_lines(0.0), tmp_path)["board-outline"].status == PASS
     found = by_reading(drawn_in_lines(0.5), tmp_path)["board-outline"]
-    assert found.status == NOT_RUN
+    assert found.status == FAIL
     assert "not closed" in found.found
 
 
