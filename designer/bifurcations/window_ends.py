@@ -88,6 +88,45 @@ class WindowEnds:
         return sorted(out.values(), key=lambda end: (end.value or 0.0, end.side))
 
 
+@dataclass(frozen=True)
+class _Followed:
+    """What following the branches of one window has found."""
+
+    points: Sequence[Bifurcation] = ()
+    ends: tuple[SweptEnd, SweptEnd] | None = None
+    branches: Sequence[Branch] = ()
+
+    def judged_by(self, points: Sequence[Bifurcation]) -> tuple[SweptEnd, SweptEnd] | None:
+        """The ends, nearer where one of all windows' points says so.
+
+        Where a branch loses its stability and has it again between two of its points, neither
+        change was seen; another window's branch, with its points elsewhere, may have seen both.
+        """
+        if self.ends is None:
+            return None
+        low, high = (self._nearer(end, points) for end in self.ends)
+        return low, high
+
+    def _nearer(self, end: SweptEnd, points: Sequence[Bifurcation]) -> SweptEnd:
+        edge = end.window.high if end.side > 0 else end.window.low
+        if end.value is None or end.kind == NOT_SOUGHT:
+            return end
+        low, high = sorted((edge, end.value))
+        between = [p for p in points if low < p.value < high and _stability_ends(p, end.side)]
+        for point in sorted(between, key=lambda p: abs(p.value - edge)):
+            orbit = point.point.orbit
+            if any(passes(branch, point.value, orbit) for branch in self.branches):
+                where = str(point.kind), point.value, point.error
+                return SweptEnd(end.window, end.side, *where)
+        return end
+
+
+def _stability_ends(point: Bifurcation, side: int) -> bool:
+    """Whether a branch is stable on the other side of a point alone."""
+    stable = point.stable_sides
+    return stable is not None and stable[-side] and not stable[side]
+
+
 def windows(sweep: Sweep) -> list[Window]:
     """Those whose ends are looked for."""
     return [w for w in sweep.windows if not _left_out(w)]
@@ -118,23 +157,23 @@ def locate(
 def find(sweep: Sweep, jobs: int = 1, progress: Callable[[], None] = lambda: None) -> WindowEnds:
     """The points and the windows' ends; ``progress`` is called once a window that is followed."""
 
-    def one(window: Window) -> tuple[list[Bifurcation], tuple[SweptEnd, SweptEnd] | None]:
+    def one(window: Window) -> _Followed:
         if not period(window):
-            return [], None
+            return _Followed()
         if reason := _left_out(window):
             low, high = (_unknown(window, side, NOT_SOUGHT, reason) for side in (-1, 1))
-            return [], (low, high)
+            return _Followed(ends=(low, high))
         found = _follow(sweep, window, sweep.plan.subject.family(sweep.plan.parameter))
         progress()
         return found
 
     each = list(parallel(one, sweep.windows, jobs))
     out: list[Bifurcation] = []
-    for point in sorted((p for points, _ in each for p in points), key=_order):
+    for point in sorted((p for followed in each for p in followed.points), key=_order):
         same_kind = [p for p in out if p.kind is point.kind]
         if not any(abs(p.value - point.value) <= SAME * abs(point.value) for p in same_kind):
             out.append(point)
-    return WindowEnds(tuple(out), tuple(ends for _, ends in each))
+    return WindowEnds(tuple(out), tuple(followed.judged_by(out) for followed in each))
 
 
 def _order(point: Bifurcation) -> tuple[float, str]:
@@ -146,18 +185,14 @@ def _unknown(window: Window, side: int, kind: str, reason: str) -> SweptEnd:
     return SweptEnd(window, side, kind, window.high if side > 0 else window.low, None, reason)
 
 
-def _follow(
-    sweep: Sweep, window: Window, over: Family
-) -> tuple[list[Bifurcation], tuple[SweptEnd, SweptEnd]]:
+def _follow(sweep: Sweep, window: Window, over: Family) -> _Followed:
     """Bifurcation points on the branches of a window's orbits, and its lower and upper end."""
     values = [float(v) for v in sweep.plan.values]
     orbits = _orbits(sweep, window, over)
     if not orbits:
         reason = "none of its orbits was solved for"
-        return [], (
-            _unknown(window, -1, NOT_LOCATED, reason),
-            _unknown(window, 1, NOT_LOCATED, reason),
-        )
+        low_end, high_end = (_unknown(window, side, NOT_LOCATED, reason) for side in (-1, 1))
+        return _Followed(ends=(low_end, high_end))
     margin = BEYOND * (values[1] - values[0])
     low, high = window.low - margin, window.high + margin
     counts = orbits[0][1].counts.family
@@ -172,10 +207,11 @@ def _follow(
     first = min(orbits, key=lambda o: o[0])
     last = max(orbits, key=lambda o: o[0])
     points = [p for p in found.points if values[0] <= p.value <= values[-1]]
-    return points, (
+    ends = (
         _end(window, -1, found, stretches, *first),
         _end(window, 1, found, stretches, *last),
     )
+    return _Followed(points, ends, found.branches)
 
 
 def _orbits(sweep: Sweep, window: Window, over: Family) -> list[tuple[float, Orbit]]:

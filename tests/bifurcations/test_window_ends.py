@@ -19,7 +19,9 @@ from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.bifurcations.windows import NOT_LOCATED
 from designer.cli import entry
+from designer.dynamics.attractors import settle
 from designer.dynamics.steady_state import Course
+from designer.model.driven import model_flow
 from designer.model.model_file import read_model_file
 from designer.model.swept_model import ModelSubject
 from tests.dynamics.test_modal_tables import PAPER
@@ -247,3 +249,41 @@ def test_every_end_of_a_drawn_system(seed: int, tmp_path: Path) -> None:
             hold(system, point)
         seen.add(point.value)
     assert seen
+
+
+BASE_BEAM = system_text(
+    {"root": "60 g", "middle": "45 g", "tip": "30 g"},
+    {
+        ("root", "ground"): "24 kN/m",
+        ("middle", "root"): "12 kN/m",
+        ("tip", "middle"): "6 kN/m",
+    },
+    {
+        ("root", "ground"): "1.2 N s/m",
+        ("middle", "root"): "0.6 N s/m",
+        ("tip", "middle"): "0.3 N s/m",
+    },
+    clearance("stop", "tip", "ground", upper="0.6 mm", stiffness="60 kN/m"),
+    '[base]\namplitude = "0.5 g"\n',
+    table("response", frequency="44 Hz"),
+)
+"""A beam on a shaker. Right past its grazing 1-1-0 is unstable between two period doublings that
+lie within one step of a branch that comes from above."""
+
+
+def test_stability_that_is_lost_and_had_again_within_a_step_ends_a_window(tmp_path: Path) -> None:
+    made = swept(tmp_path / "beam.toml", BASE_BEAM, 37.0, 45.0, 9, "up")
+    found = window_ends.find(made)
+    ((low, _),) = [
+        ends
+        for window, ends in zip(made.windows, found.ends, strict=True)
+        if window.response == "1-1-0" and ends is not None
+    ]
+    assert low.kind == str(PointKind.DOUBLING)
+    assert low.value is not None
+    hertz = low.value / (2.0 * math.pi)
+    # The truth: just below it the response has twice the period.
+    model = read_model_file(tmp_path / "beam.toml").model
+    for step, response in ((-2e-3, "2-2-0"), (2e-3, "1-1-0")):
+        flow = model_flow(model, low.value * (1.0 + step))
+        assert settle(flow, np.zeros(6)).response == response, hertz
