@@ -24,8 +24,8 @@ def check_possible(
 
     Raises
     ------
-    InputError : n-p-q without a p-q for each clearance; impacts on a stop that is not there, by
-        ``expect`` and by its mirror twin; a period or a symmetry that such a motion cannot have.
+    InputError : n-p-q without a p-q for each clearance; impacts on a stop that is not there,
+        whatever its mirror twin has; a period or a symmetry that such a motion cannot have.
     """
     expect, system = response.expect, model.second_order()
     if expect is None:
@@ -36,10 +36,9 @@ def check_possible(
         shape = "1-" + ";".join(["p-q"] * count)
         listed = f", for the clearances {', '.join(s.name for s in stops)}" if count > 1 else ""
         raise InputError(file, field, str(expect), f"p-q for each clearance, as in {shape}{listed}")
-    wanted = [expect] if response.twin == "exact" else [expect, expect.mirrored]
-    missing = [list(_missing_stops(counts, system)) for counts in wanted]
-    if all(missing):
-        none = f"there is no {' and no '.join(missing[0])}" if stops else "the model has no stops"
+    missing = list(_missing_stops(expect, system))
+    if missing:
+        none = f"there is no {' and no '.join(missing)}" if stops else "the model has no stops"
         expected = f"0 for a stop that is not there, as in {_near(expect, system)}: {none}"
         raise InputError(file, field, str(expect), expected)
     if expect.n > 1 and not expect.total and _is_linear_between(system):

@@ -47,9 +47,9 @@ def wanted(model: str, keys: str) -> None:
 @pytest.mark.parametrize("sides", ["both", "upper", "lower"])
 @pytest.mark.parametrize("twin", ["either", "exact"])
 def test_what_one_clearance_can_be(n: int, p: int, q: int, sides: str, twin: str) -> None:
-    """By hand: without impacts a motion is linear; a missing stop is never hit, nor by the twin."""
-    pairs = {(p, q), (q, p)} if twin == "either" else {(p, q)}
-    hit = any((not up or sides != "lower") and (not down or sides != "upper") for up, down in pairs)
+    """By hand: without impacts a motion is linear; a missing stop is never hit. A model that lacks
+    one has no mirror twins, so ``twin`` changes nothing."""
+    hit = (not p or sides != "lower") and (not q or sides != "upper")
     possible = hit and not (n > 1 and p == q == 0)
     keys = f'"{n}-{p}-{q}"\ntwin = "{twin}"'
     if possible:
@@ -75,7 +75,7 @@ def test_a_model_without_stops_has_one_response(counts: str) -> None:
     [
         ('"1-1-1;0-1"', "as in 1-1-0;0-1: there is no lower stop of anvil"),
         ('"2-1-3;2-1"', "as in 2-1-0;0-1: there is no lower stop of anvil and no upper"),
-        ('"1-0-1;1-0"\ntwin = "exact"', "as in 1-1-0;0-1: there is no lower stop of anvil"),
+        ('"1-0-1;1-0"', "as in 1-1-0;0-1: there is no lower stop of anvil"),
         ('"1-1-0"', "p-q for each clearance, as in 1-p-q;p-q, for the clearances anvil, pad"),
         ('"1-0-0;0-0;0-0"', "p-q for each clearance, as in 1-p-q;p-q"),
         ('"3-0-0;0-0"', "n = 1"),
@@ -87,7 +87,7 @@ def test_of_several_clearances_the_stop_is_named(keys: str, expected: str) -> No
     assert expected in caught.value.expected
 
 
-@pytest.mark.parametrize("keys", ['"1-1-0;0-1"', '"1-0-1;1-0"', '"4-0-0;0-3"', '"1-0-0;0-0"'])
+@pytest.mark.parametrize("keys", ['"1-1-0;0-1"', '"4-0-0;0-3"', '"1-0-0;0-0"'])
 def test_what_two_one_sided_clearances_can_be_is_read(keys: str) -> None:
     wanted(HAMMER, keys)
 
@@ -102,6 +102,6 @@ def test_a_symmetric_motion_has_an_odd_period() -> None:
 
 def test_inside_a_stop_of_several_springs_a_motion_without_impacts_may_be_anything() -> None:
     wanted(HERTZ, '"2-0-0"')
-    wanted(HERTZ, '"2-1-0"')  # the twin of 2-0-1
-    with pytest.raises(InputError):
-        wanted(HERTZ, '"2-1-1"')
+    for missing in ('"2-1-1"', '"2-1-0"'):
+        with pytest.raises(InputError):
+            wanted(HERTZ, missing)
