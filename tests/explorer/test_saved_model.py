@@ -84,7 +84,7 @@ def test_a_file_in_hertz_millimetres_and_grams_is_saved_in_them() -> None:
     modelfile = parse_model_file(text.replace('mass = "2 kg"', 'mass = "2000g"', 1))
     omega = 72.0 * math.pi
     words = {"anvil.lower": 0.00123, "hammer.mass": 1.9}
-    pins = read_pins(modelfile, [f"{omega!r}~1-1-0~1.0"])
+    pins = read_pins(modelfile, [f"{omega!r}~1-0-1~1.0"])
     saved = saved_text(modelfile, read_place(modelfile, words), pins)
     assert 'frequency = "36 Hz"' in saved
     assert 'lower = "1.23 mm"' in saved
