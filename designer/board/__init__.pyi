@@ -32,6 +32,7 @@ from .component import (
     to_buy as to_buy,
 )
 from .footprints import (
+    FootprintShape as FootprintShape,
     footprint as footprint,
 )
 from .kicad_board import (
