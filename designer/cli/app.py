@@ -151,12 +151,10 @@ def verb(
             *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
         ) -> int:
             try:
-                with (
-                    _logged(log),
-                    progress_for(quiet) as progress,
-                    _announced(progress, words.get(SOURCE)) if computes else nullcontext(),
-                ):
-                    output = function(Session(progress, not (json or quiet)), **words)
+                with _logged(log), progress_for(quiet) as progress:
+                    _refuse_at_once(words.get(SOURCE))
+                    with _announced(progress) if computes else nullcontext():
+                        output = function(Session(progress, not (json or quiet)), **words)
             except ResponseNotFound as error:
                 if json:
                     print_json(error.answer)
@@ -225,14 +223,18 @@ def _logged(log: Path | None) -> Iterator[None]:
         logger.addHandler(logging.NullHandler())
 
 
-@contextmanager
-def _announced(progress: Progress, source: object) -> Iterator[None]:
-    """Says it when the engine has to be compiled. source : a model file is read before the engine
-    is imported, so that what is wrong in it is told at once."""
+def _refuse_at_once(source: object) -> None:
+    """Read a verb's model file, if that is what it is given, before the engine is imported: what is
+    wrong in it is told at once."""
     if isinstance(source, Path) and source.is_file():
         from designer.folders.model_source import model_file
 
         model_file(source)
+
+
+@contextmanager
+def _announced(progress: Progress) -> Iterator[None]:
+    """Says it when the engine has to be compiled."""
     from designer.base.jit_notice import announced
 
     with announced(progress.note):
