@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from designer.base.progress import doing
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
@@ -183,6 +184,8 @@ def measure(
         indices = range(len(letters), min(stop, most))
         letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
         result = MeasuredYield(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
+        shown = plan.questions[0].wanted.expect
+        doing(f"{result.counts.ok} of {len(letters)} boards show {shown or 'the response'}")
         progress()
     return result
 

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.centering.cure_result_json import words
 from designer.centering.cure_trial import Cure, Trial
 from designer.model.model_file import ModelFile
 
@@ -40,11 +39,13 @@ def front_chart(cure: Cure) -> Figure:
         top.set_xticks(along, ["as it is", *(f"round {k}" for k in range(1, len(front)))])
         top.set_xlabel("choices one after the other; none costs anything")
     else:
-        dearest = max(along)
+        # An upgrade may be cheaper than what it replaces.
+        cheapest, dearest = min(0.0, *along), max(0.0, *along)
         if cure.budget is not None and cure.budget <= FAR * dearest:
             top.axvline(cure.budget, color=MUTED, lw=0.8, ls=":", label="budget")
             dearest = max(dearest, cure.budget)
-        top.set_xlim(left=-0.04 * dearest, right=1.1 * dearest)
+        width = dearest - cheapest
+        top.set_xlim(left=cheapest - 0.04 * width, right=dearest + 0.1 * width)
         top.set_xlabel("price of the upgrades [euro, by the catalogue's price classes]")
     over = "round by round" if free else "against price"
     top.set_ylabel("yield of the worst response [%]")
@@ -88,7 +89,7 @@ def _listed(axes: Axes, front: Sequence[Trial], file: ModelFile) -> None:
     """What each number stands for."""
     axes.set_axis_off()
     for number, t in enumerate(front):
-        text = "; ".join(words(t.upgrades, file)) or "as it is"
+        text = "; ".join(t.upgrades.in_words(file)) or "as it is"
         text = text if len(text) <= MOST_WORDS else text[: MOST_WORDS - 1] + "…"
         axes.text(
             0.0, 1.0 - (number + 0.5) / max(len(front), 1), f"{number}  {t.price:.2f} euro: {text}",

@@ -8,7 +8,6 @@ from typing import Any
 from designer.base.csv_tables import csv_text
 from designer.base.plain_json import FORMAT
 from designer.centering.cure_trial import Cure, Trial
-from designer.centering.cure_upgrade import Upgrades
 from designer.model.model_file import ModelFile
 from designer.model.si_units import hertz_json
 
@@ -42,39 +41,14 @@ def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict
         "price": best.price,
         "branch": best.branch,
         "upgrades": best.upgrades.as_dict(),
-        "said": words(best.upgrades, file),
+        "said": best.upgrades.in_words(file),
         "responses": responses,
         "rounds": [_trial(t, file) for t in cure.rounds],
         "front": [_trial(t, file) for t in cure.front],
-        "refused": [{"upgrades": words(r.upgrades, file), "why": r.why} for r in cure.refused],
+        "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in cure.refused],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
-
-
-def words(upgrades: Upgrades, file: ModelFile) -> list[str]:
-    """Each upgrade in a few words, the same grade of several parts together.
-
-    file : the model file that is cured.
-    """
-    phrases = []
-    if upgrades.opamp is not None:
-        phrases.append(f"op-amp {upgrades.opamp}")
-    if upgrades.dead_zone is not None:
-        phrases.append(f"dead zone: {upgrades.dead_zone}")
-    if upgrades.reference is not None:
-        phrases.append(f"reference {upgrades.reference}")
-    for grade in sorted(set(upgrades.grades.values())):
-        names = [name for name, of_part in upgrades.grades.items() if of_part == grade]
-        phrases.append(f"{100.0 * grade:g} % {' '.join(names)}")
-    phrases += [f"array {n.family} for {' '.join(n.parts)}" for n in upgrades.networks]
-    for number, place in sorted(upgrades.places.items()):
-        phrases.append(f"response {number + 1} at {file.drive_text(place.omega)}, b = {place.b:g}")
-    if upgrades.trimmer:
-        phrases.append("trimmer fitted, set once on each board")
-    if upgrades.trim is not None:
-        phrases.append(f"DC offset trimmed on each board, ± {100.0 * upgrades.trim:g} %")
-    return phrases
 
 
 def front_csv(cure: Cure) -> str:
@@ -90,7 +64,7 @@ def front_csv(cure: Cure) -> str:
                 "low": f"{low:.5g}",
                 "high": f"{high:.5g}",
                 "samples": str(t.worst.counts.samples),
-                "upgrades": "; ".join(words(t.upgrades, cure.base.modelfile)),
+                "upgrades": "; ".join(t.upgrades.in_words(cure.base.modelfile)),
                 "failed": str(t.worst.counts.failed),
             }
         )
@@ -101,7 +75,7 @@ def _trial(t: Trial, file: ModelFile) -> dict[str, Any]:
     return {
         "branch": t.branch,
         "price": t.price,
-        "said": words(t.upgrades, file),
+        "said": t.upgrades.in_words(file),
         "upgrades": t.upgrades.as_dict(),
         "predicted": list(t.predicted),
         "measured": [m.as_dict() for m in t.measured],

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.base.defaults import cores
-from designer.base.progress import Progress
+from designer.base.progress import Progress, best_so_far, seeking
 from designer.centering.cure_branch import TRIMMER, CureBranch, Refused, branches
 from designer.centering.cure_couplings import finest
 from designer.centering.cure_linear_model import LinearModel, picture, pictured
@@ -88,7 +88,8 @@ def find_cure(
     book = Book() if book is None else book
     threads = cores() if jobs is None else jobs
     search = _Search(base, target, budget, trim, without, seed, threads, book, progress)
-    return search.run()
+    with seeking("cure"):
+        return search.run()
 
 
 class _Search:
@@ -115,6 +116,7 @@ class _Search:
         self.spoiled: set[tuple[int, int, int]] = set()
         self.fell_short: dict[tuple[int, tuple[int, ...]], list[int]] = {}
         self.unseen: list[int] = []
+        self.best: Trial | None = None
 
     def run(self) -> Cure:
         before = self.before = self._before()
@@ -154,7 +156,20 @@ class _Search:
             plans.append(None if plan is None else (plan, None))
         trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         rates = tuple(m.rate for m in trials)
-        return Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
+        return self._told(
+            "as it is", Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
+        )
+
+    def _told(self, name: str, trial: Trial) -> Trial:
+        """The trial, once its yields are said and the best of all so far is known."""
+        shares = ", ".join(_share(m) for m in trial.measured)
+        self.progress.note(f"  {name}: yield of each response: {shares}")
+        if self.best is None or trial.worst.rate > self.best.worst.rate:
+            self.best = trial
+            what = ", ".join(trial.upgrades.in_words(self.base.modelfile)) or "as it is"
+            worst = f"worst response {_share(trial.worst)}"
+            best_so_far(f"{worst} for {trial.price:.2f} euro: {what}")
+        return trial
 
     def _choice(self, target: float) -> tuple[int, tuple[int, ...], tuple[float, ...]] | None:
         """The cheapest choice over all branches: its picture's number, the options, the promise.
@@ -311,7 +326,8 @@ class _Search:
                 )
                 for plan, trim in plans
             )  # fmt: skip
-        return Trial(model.branch.name, upgrades, cost, predicted, measured, self.target)
+        trial = Trial(model.branch.name, upgrades, cost, predicted, measured, self.target)
+        return self._told(name, trial)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
         """Tighten the demands of ways that promised more than was measured.
@@ -438,3 +454,9 @@ def _shrink_factor(way: ResponseWay, boards: Boards, rate: float) -> float:
     if middle <= 0.0 or reach >= middle:
         return 1.0
     return max((reach / middle) ** 2, 1.0 / LARGEST_STEP**2)
+
+
+def _share(measured: MeasuredYield) -> str:
+    """A yield with its 95 % interval, in words."""
+    low, high = measured.counts.interval
+    return f"{measured.rate:.4f} ({low:.4f} to {high:.4f})"

@@ -77,6 +77,32 @@ class Upgrades:
     networks: tuple[PartNetwork, ...] = ()
     """Arrays in the places of parts."""
 
+    def in_words(self, file: ModelFile) -> list[str]:
+        """Each upgrade in a few words, the same grade of several parts together.
+
+        file : the model file that is cured.
+        """
+        phrases = []
+        if self.opamp is not None:
+            phrases.append(f"op-amp {self.opamp}")
+        if self.dead_zone is not None:
+            phrases.append(f"dead zone: {self.dead_zone}")
+        if self.reference is not None:
+            phrases.append(f"reference {self.reference}")
+        for grade in sorted(set(self.grades.values())):
+            names = [name for name, of_part in self.grades.items() if of_part == grade]
+            phrases.append(f"{100.0 * grade:g} % {' '.join(names)}")
+        phrases += [f"array {n.family} for {' '.join(n.parts)}" for n in self.networks]
+        for number, place in sorted(self.places.items()):
+            phrases.append(
+                f"response {number + 1} at {file.drive_text(place.omega)}, b = {place.b:g}"
+            )
+        if self.trimmer:
+            phrases.append("trimmer fitted, set once on each board")
+        if self.trim is not None:
+            phrases.append(f"DC offset trimmed on each board, ± {100.0 * self.trim:g} %")
+        return phrases
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; responses are counted from 1."""
         places = [{"response": i + 1, **asdict(p)} for i, p in sorted(self.places.items())]

@@ -43,6 +43,9 @@ GOOD = 4.0
 """Misfit up to which an orbit may shape the curve: the knots take up the rest."""
 ROOM = 1.25
 """How much more than the noise the curve may leave over."""
+ROUGH, CORNER = 2.0, 1e-3
+"""How much more than its noise the dead zone may leave of the output's samples; and of their range,
+what it may leave of those without noise."""
 ROUNDS = 2
 """Linear fits, one after the other: a gain times a displacement is not linear in both."""
 
@@ -135,6 +138,10 @@ def _beyond(
     moved = moved + np.interp(phase, grid, np.append(more.curve, more.curve[0]))
     like = replace(stop, ends=zone.ends, inside=zone.inside, gains=zone.gains)
     rough = float(np.std(volts - like.output_of(moved)))
+    # An output that no dead zone draws says nothing of where its stops are: it may be cut off.
+    quiet = math.hypot(float(samples.noise[nets.index(stop.output)]), CORNER * float(np.ptp(volts)))
+    if rough > ROUGH * quiet:
+        return
     error = float(more.error[0])
     first = fitted(moved, volts, (error, rough), like, len(volts))
     near = np.any([np.abs(moved - end) < NEAR * error for end in first.ends.values()], axis=0)

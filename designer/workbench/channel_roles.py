@@ -128,9 +128,14 @@ def _not_alone(
 ) -> None:
     """InputError for a record that shows nothing but the generator."""
     if tuple(nets) == (prediction.generator,):
-        found = f"{channel}, which is like the generator"
+        found = f"{channel}, which is like the generator{_cut_off(record, [channel])}"
         expected = f"a net of the board as well, or --channels, such as v1={channel}"
         raise InputError(record.source, "its channels", found, expected)
+
+
+def _cut_off(record: Record, shown: Sequence[str]) -> str:
+    """Words on the channels whose signal is beyond their range; "" where none is."""
+    return "".join(f"; {c} is cut off at its range's end" for c in shown if c in record.clipped)
 
 
 def _recognised(
@@ -332,8 +337,9 @@ def _found(
     if best[0] > ALIKE or (others and others[0] - best[0] < APART):
         alike = "like no nets of the board" if best[0] > ALIKE else "like several nets of the board"
         example = ",".join(f"{net}={channel}" for net, channel in best[1].items())
+        found = f"{', '.join(shown)} {alike}{_cut_off(record, shown)}"
         expected = f"--channels, such as {example}"
-        raise InputError(record.source, "its channels", f"{', '.join(shown)} {alike}", expected)
+        raise InputError(record.source, "its channels", found, expected)
     return best[1]
 
 

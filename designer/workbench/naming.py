@@ -45,6 +45,9 @@ from designer.workbench.record import NORMAL, RecordedMotion
 
 LAPS = 2.0
 """Laps of n periods that a record needs for n to be sure."""
+LAPS_OF_MANY, MANY = 10.0, 3
+"""The same for n of that many periods or more: an intermittent motion stays near one of these for
+several laps (Pomeau and Manneville, Commun. Math. Phys. 74, 1980)."""
 FEWEST_LAPS = 1.5
 """Laps with which a period is tried at all."""
 COARSE = 64
@@ -158,6 +161,11 @@ def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
         by_board = instead != counted
         counted, names = instead, list(_names(n, instead))
     reason, remedy = _why(names, counted, doubt, motion, n)
+    if not reason and n >= MANY and motion.periods < LAPS_OF_MANY * n:
+        reason = (
+            f"a motion may stay near {n} periods for {motion.periods / n:.2g} laps and leave it"
+        )
+        remedy = f"a record of {math.ceil(LAPS_OF_MANY * n)} drive periods or more"
     if not reason and all(net in limits for net in nets):
         reason, remedy = "every channel is cut off", "a larger range of the channels"
     if not reason and _laps_differ(samples, motion.frequency, curve):

@@ -149,6 +149,7 @@ def searched(
     picture: LinearModel | Callable[..., LinearModel],
     real: Any,
     budget: float | None = None,
+    progress: Progress | None = None,
 ) -> Cure:
     """The search with this picture, where ``real`` is what studies measure."""
     taken = (lambda *_, **__: picture) if isinstance(picture, LinearModel) else picture
@@ -157,7 +158,7 @@ def searched(
     monkeypatch.setattr(cure_measure, "measure", real)  # as measure_together calls it
     monkeypatch.setattr(cure_search, "questions_of", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(cure_search, "branches", lambda *_: iter([branch()]))
-    return find_cure(one_response(), TARGET, budget=budget, seed=1, jobs=1)
+    return find_cure(one_response(), TARGET, budget=budget, seed=1, jobs=1, progress=progress)
 
 
 @pytest.mark.slow
@@ -235,6 +236,19 @@ def test_the_picture_knows_what_missed(
     with contextlib.suppress(_Taken):
         searched(monkeypatch, taken, truth(nominal))
     assert told == ([] if missed is None else [missed])
+
+
+def test_what_boards_show_is_said_before_the_search_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing was told of the design as it is until the cure's report stood, minutes later."""
+    said: list[str] = []
+    heard = Progress()
+    monkeypatch.setattr(heard, "note", said.append)
+    with heard:
+        searched(monkeypatch, known_picture(60.0), truth(60.0), progress=heard)
+    (line,) = said
+    assert re.fullmatch(r" *as it is: yield of each response: 1\.0000 \(0\.\d+ to 1\.0000\)", line)
 
 
 @cache

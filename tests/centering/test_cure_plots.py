@@ -40,6 +40,13 @@ def test_prices_are_along_the_axis() -> None:
     assert points(found) == pytest.approx(np.array([[0.0, 20.0], [0.4, 99.8]]))
 
 
+def test_what_is_cheaper_than_the_design_as_it_is_is_drawn_too() -> None:
+    """Limits of the axis that are one and the same were a warning."""
+    before, first = trial(0.0, 100), trial(-0.3, 499, Upgrades(opamp="TL074H"))
+    found = cured(before, [first], [first, before])
+    assert points(found)[0] == pytest.approx(np.array([-0.3, 99.8]))
+
+
 def test_where_nothing_costs_anything_rounds_are_along_the_axis() -> None:
     """Each point has a place of its own, also one that the front leaves out."""
     places = [Upgrades(places={0: WindowPlace(w, 0.25)}) for w in (0.84, 0.86)]

@@ -159,6 +159,20 @@ def test_corners_between_few_samples_are_not_surely_aperiodic(n: int) -> None:
         assert name.would_tell == "more samples a drive period"
 
 
+@pytest.mark.parametrize(("laps", "sure"), [(7.3, False), (10.5, True)])
+def test_a_few_laps_of_three_periods_are_not_sure(laps: float, sure: bool) -> None:
+    """Of a rig whose motion was intermittent, 7.3 laps near 3-3-3 were sure."""
+    frequency, rng = stored(1).frequency, np.random.default_rng(8)
+    time = np.linspace(0.0, 3.0 * laps / frequency, 12_000)
+    angle = 2.0 * np.pi * frequency * time
+    volts = 7.0 * np.sin(angle) + np.sin(angle / 3.0) + 0.02 * rng.normal(size=len(time))
+    record = Record(time, {"CH1": volts}, "made")
+    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    name = named(motion, prediction())
+    assert (name.response.split("-")[0], name.sure) == ("3", sure)
+    assert sure or name.would_tell == "a record of 30 drive periods or more"
+
+
 @pytest.mark.parametrize(
     ("told", "field", "found"),
     [
@@ -184,7 +198,7 @@ def test_one_channel_that_is_like_the_generator_is_refused() -> None:
     """``v1``, cut off at 0, is: nothing was left to be named."""
     truth = stored(3)
     alone = {"CH1": np.maximum(truth.record.signals["CH1"], 0.0)}
-    with pytest.raises(InputError, match="--channels, such as v1=CH1"):
+    with pytest.raises(InputError, match=r"CH1 is cut off.*--channels, such as v1=CH1"):
         recorded_motion(Record(truth.record.time, alone, "made"), prediction())
 
 
