@@ -23,6 +23,9 @@ OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
 LARGEST = 30_000_000
 """Bytes of a board file; one of 60 parts, routed and with its pours, has 830,000."""
+MOST_LAID, MOST_CORNERS = 20_000, 3000
+"""Tracks and vias of a board; and corners of its zones' outlines. KiCad's check of so many takes 25
+s, where the outline crosses itself at random too."""
 SHOWN = 5
 """Differences that a message lists."""
 COURTYARDS = ("F.CrtYd", "B.CrtYd")
@@ -134,6 +137,7 @@ def _board(board: Expression, text: str, path: Path) -> BoardFile:
     if board.name != "kicad_pcb":
         raise InputError(path, "--board", f"({board.name[:40]} …)", EXPECTED)
     _check_version(board)
+    _check_size(board)
     names = {net.text(0): net.text(1) for net in board.all("net")}
     return BoardFile(
         path=path,
@@ -202,6 +206,18 @@ def _check_version(board: Expression) -> None:
     if version < OLDEST:
         expected = f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"
         raise InputError(file, "version", text, expected)
+
+
+def _check_size(board: Expression) -> None:
+    """InputError for a board that geometry would take minutes for."""
+    laid = sum(1 for each in board.children if each.name in (*TRACKS, "via"))
+    if laid > MOST_LAID:
+        raise board.error(f"{laid} tracks and vias", f"at most {MOST_LAID}")
+    outlines = (area for zone in board.all("zone") for area in zone.all("polygon"))
+    corners = sum(len(points.children) for area in outlines for points in area.all("pts"))
+    if corners > MOST_CORNERS:
+        found = f"zones whose outlines have {corners} corners"
+        raise board.error(found, f"at most {MOST_CORNERS}")
 
 
 def _footprint(item: Expression) -> PlacedFootprint:

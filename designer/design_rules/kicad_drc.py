@@ -23,6 +23,7 @@ from typing import Any
 
 from designer.base.errors import InputError
 from designer.base.guarded_reading import parse_json, read_text
+from designer.base.progress import doing
 from designer.base.sexpr import Expression, expression, expression_text, read
 from designer.board.footprints import FootprintShape
 from designer.board.kicad_footprint import module
@@ -104,6 +105,7 @@ def check(
     KicadFailed : no KiCad, one that is too old, no report, or rules that KiCad has dropped.
     """
     version = needed_version()
+    doing("KiCad's check of the board")
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
         place = Path(scratch)
         text = rules_text([*rules, canary()])

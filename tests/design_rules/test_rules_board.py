@@ -23,7 +23,7 @@ from designer.base.views import View
 from designer.board import kicad_rules
 from designer.board.component import Component, joined
 from designer.board.kicad_names import kicad_net
-from designer.board.kicad_reader import BoardFile, check_belongs, read_board
+from designer.board.kicad_reader import MOST_LAID, BoardFile, check_belongs, read_board
 from designer.board.kicad_rules import CustomRule, rules_text, spacing
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
@@ -209,6 +209,21 @@ def test_a_newer_board_and_an_older_one_are_refused(tmp_path: Path) -> None:
     assert "save the board with KiCad 9" in str(said)
     said = refused(drawn().replace("(version 20241229)", "(version new)"), tmp_path)
     assert "a file version" in str(said)
+
+
+@pytest.mark.parametrize(
+    ("drawn_item", "count", "found"),
+    [
+        ("(via (at 1 1) (size 0.6) (drill 0.3) (net 1))", MOST_LAID + 1, "tracks and vias"),
+        ("(zone (net 1) (polygon (pts (xy 0 0) (xy 1 0) (xy 1 1))))", 1001, "outlines have 3003"),
+    ],
+)
+def test_a_board_of_too_much_copper_is_refused_at_once(
+    tmp_path: Path, drawn_item: str, count: int, found: str
+) -> None:
+    """20,000 vias and a zone that crossed itself 20,000 times kept the rules busy for minutes."""
+    said = refused(small().rstrip()[:-1] + count * drawn_item + ")", tmp_path)
+    assert found in str(said)
 
 
 @given(cut=st.floats(0.0, 0.999))
