@@ -26,6 +26,7 @@ from scipy.optimize import brentq
 
 from designer.bifurcations.continuation import Branch, BranchPoint, End, at, joined, parted
 from designer.bifurcations.orbit_curve import CONVERGED, Curve
+from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE
 from designer.dynamics.turning_points import heights
 
@@ -317,7 +318,9 @@ def _symmetric(curve: Curve, p: BranchPoint) -> bool:
     """Whether an orbit is symmetric: by its branch, or by the tolerance without a mirror."""
     if curve.family.flow(p.value).system.mirror is not None:
         return curve.symmetric
-    return curve.n % 2 == 1 and p.orbit.asymmetry < SYMMETRY_TOLERANCE
+    counts = read_counts(p.response)
+    even = counts is not None and counts == counts.mirrored
+    return even and curve.n % 2 == 1 and p.orbit.asymmetry < SYMMETRY_TOLERANCE
 
 
 def _bisect(left: Callable[[float], bool]) -> float:

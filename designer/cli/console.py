@@ -43,7 +43,8 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
         say(f"\n{title}: none")
         return
     say(f"\n{title}")
-    rich_table = Table(*(Column(_text(head)) for head in heads), box=None)
+    # A word that is too long goes on in the next line: what is cut off may be the answer.
+    rich_table = Table(*(Column(_text(head), overflow="fold") for head in heads), box=None)
     rich_table.padding = (0, gap, 0, 0)
     for row in rows:
         rich_table.add_row(*(_text(cell) for cell in row))

@@ -203,7 +203,7 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
         rows += [("period", f"{orbit.n} of the drive"), ("symmetric", symmetric)]
         rows.append(("multipliers", multipliers_text(orbit.multipliers)))
         rows.append(("largest |μ|", f"{orbit.radius:.4g}"))
-    rows.append(("λ max", exponent_text(orbit)))
+    rows.append((f"λ max{' [1/s]' if place.in_si else ''}", exponent_text(orbit)))
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):

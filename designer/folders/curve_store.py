@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
 from designer.base.parquet_entry import ParquetForm
+from designer.base.si_unit import Unit
 from designer.bifurcations.border_curve import BorderCurve, CurveOrigin, read_curve
 from designer.bifurcations.border_curves import BLOCKS
 from designer.folders.work_files import WorkFiles
@@ -79,22 +80,34 @@ class CurveBlocks:
         self.files.write(self.name(block), _FORM, rows, block=block)
 
 
-def curves_csv(curves: Sequence[BorderCurve], first: str, second: str) -> str:
+def curves_csv(
+    curves: Sequence[BorderCurve], first: str, second: str, units: Mapping[str, Unit] | None = None
+) -> str:
     """A row a point: the curve's number, kind, response, symmetry, both values, whether the orbit
     is stable on one side, and where the curve was begun if it was switched to; points of
-    codimension two follow their curve, with their name as kind."""
-    columns = ("curve", "kind", "response", "symmetric", first, second, "stable", "begun_at")
+    codimension two follow their curve, with their name as kind. units : of the parameters that have
+    an SI unit; such a one's values stand in it too, last."""
+    in_si = {name: unit for name, unit in (units or {}).items() if name in (first, second)}
+    columns = [
+        "curve", "kind", "response", "symmetric", first, second, "stable", "begun_at",
+        *(f"{name}_{unit.suffix}" for name, unit in in_si.items()),
+    ]  # fmt: skip
+
+    def place(values: Sequence[float]) -> dict[str, str]:
+        at = dict(zip((first, second), values, strict=True))
+        si = {f"{n}_{unit.suffix}": repr(at[n] * unit.scale) for n, unit in in_si.items()}
+        return {first: repr(at[first]), second: repr(at[second]), **si}
+
     rows = []
     for number, c in enumerate(curves, 1):
         head = {"curve": str(number), "response": c.response, "symmetric": str(c.symmetric).lower()}
         head["begun_at"] = origin_text(c.begun_at)
-        for (a, b), stable in zip(c.points.tolist(), c.stable, strict=True):
-            at = {"kind": c.kind, first: repr(a), second: repr(b), "stable": str(stable).lower()}
-            rows.append({**head, **at})
-        for met in c.codimension_two:
-            a, b = met.values
-            at = {"kind": met.name, first: repr(a), second: repr(b), "stable": ""}
-            rows.append({**head, **at})
+        for values, stable in zip(c.points.tolist(), c.stable, strict=True):
+            rows.append({**head, "kind": c.kind, **place(values), "stable": str(stable).lower()})
+        rows += [
+            {**head, "kind": met.name, **place(met.values), "stable": ""}
+            for met in c.codimension_two
+        ]
     return csv_text(columns, rows)
 
 

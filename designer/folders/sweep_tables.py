@@ -15,22 +15,31 @@ _POINT = (
 )  # fmt: skip
 
 
-def windows_csv(windows: Sequence[Mapping[str, Any]]) -> str:
-    """A row a window, with what is known of its two ends."""
-    ends = [(side, key) for side in ("from", "to") for key in _END]
-    columns = (*_WINDOW, *(f"{side}_end_{key}" for side, key in ends))
+def windows_csv(windows: Sequence[Mapping[str, Any]], suffix: str = "") -> str:
+    """A row a window, with what is known of its two ends. suffix : of the keys with the swept
+    quantity in its SI unit, such as "hz"; "" where it has none."""
+    end_keys = (*_END, *_in_unit(("value",), suffix))
+    window_keys = (*_WINDOW, *_in_unit(("from", "to"), suffix))
+    ends = [(side, key) for side in ("from", "to") for key in end_keys]
+    columns = (*window_keys, *(f"{side}_end_{key}" for side, key in ends))
     rows = []
     for window in windows:
-        row = {key: window[key] for key in _WINDOW}
+        row = {key: window[key] for key in window_keys}
         for side, key in ends:
             row[f"{side}_end_{key}"] = window.get(f"{side}_end", {}).get(key)
         rows.append(row)
     return _csv(columns, rows)
 
 
-def points_csv(points: Sequence[Mapping[str, Any]]) -> str:
-    """A row a bifurcation point, or a window's end that was not located."""
-    return _csv(_POINT, [{key: point.get(key) for key in _POINT} for point in points])
+def points_csv(points: Sequence[Mapping[str, Any]], suffix: str = "") -> str:
+    """A row a bifurcation point, or a window's end that was not located. suffix : as of
+    ``windows_csv``."""
+    columns = (*_POINT, *_in_unit(("value",), suffix))
+    return _csv(columns, [{key: point.get(key) for key in columns} for point in points])
+
+
+def _in_unit(keys: Sequence[str], suffix: str) -> tuple[str, ...]:
+    return tuple(f"{key}_{suffix}" for key in keys) if suffix else ()
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:

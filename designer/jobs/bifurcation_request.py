@@ -237,7 +237,10 @@ def _checked(
         raise InputError(None, option, MISSING, f"a value of {name}")
     if name not in subject.parameters:
         over = option if option in ("--map", "--and") else "--over"
-        raise InputError(None, over, name, one_of(name, subject.parameters))
+        hint = ""
+        if name in ("frequency", "Omega") and "omega" in subject.parameters:
+            hint = 'omega, of which an end may be in hertz, such as "10 Hz"; or '
+        raise InputError(None, over, name, hint + one_of(name, subject.parameters))
     number = read.value(option, name, value)
     subject.check(option, name, number)
     return number

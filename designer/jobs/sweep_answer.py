@@ -96,7 +96,8 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
         )
         body["points"] = sorted([*body["points"], *missing], key=lambda row: float(row["value"]))
     shares = _shares(work, folder)
-    tables = (windows_csv(body["windows"]), points_csv(body["points"]))
+    suffix = "" if si is None else si.suffix
+    tables = (windows_csv(body["windows"], suffix), points_csv(body["points"], suffix))
     pictures: list[Callable[[], Files]] = [
         lambda: _diagram(work, swept, points, shares),
         lambda: dict(zip(TABLES, tables, strict=True)),
@@ -188,7 +189,7 @@ def _curve_files(
     assert work.curves is not None
     labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
     picture = curve_plots.curves(curves, work.curves, work.title, labels, region)
-    table = curves_csv(curves, work.curves.first, work.curves.second)
+    table = curves_csv(curves, work.curves.first, work.curves.second, swept.plan.subject.si)
     return {"curves.csv": table, **image_files("curves", picture)}
 
 

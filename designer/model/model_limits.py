@@ -134,6 +134,14 @@ LIMITS = (
         keys=r"gravity|weight|g|preload\w*|free_length|rest_length",
     ),
     ModelLimit(
+        "an acceleration by its own key",
+        "`[base] acceleration`",
+        'amplitude of [base] with a unit of acceleration, such as amplitude = "0.5 g"',
+        (2,),
+        keys=r"acc\w*|g\w*",
+        of=("base",),
+    ),
+    ModelLimit(
         "the tables of format 1",
         "`[model]`, `[mechanical]`",
         f"format = 1, or elements; {_REWRITTEN}",

@@ -33,9 +33,12 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
 
 
 def label(response: str, symmetric: bool | None) -> str:
-    """The response with its symmetry, where it has one."""
-    words = {True: " symmetric", False: " asymmetric", None: ""}
-    return response + words[symmetric if read_counts(response) else None]
+    """The response with its symmetry, where it has one. One with more impacts on one stop than on
+    the other is asymmetric, though at grazing the orbit that gains or loses the impact is not."""
+    counts = read_counts(response)
+    if counts is None or symmetric is None:
+        return response
+    return f"{response} {'symmetric' if symmetric and counts == counts.mirrored else 'asymmetric'}"
 
 
 def doubled(response: str) -> str:

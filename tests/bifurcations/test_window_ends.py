@@ -222,6 +222,9 @@ def test_an_end_that_is_not_located_is_a_row_that_says_so(
     lines = list(csv.DictReader((out / "windows.csv").read_text().splitlines()))
     assert [w["response"] for w in lines] == [w["response"] for w in answer["windows"]]
     assert any(w["from_end_kind"] == NOT_LOCATED for w in lines)
+    in_hertz = [float(w["from_hz"]) for w in lines]
+    assert in_hertz == [w["from_hz"] for w in answer["windows"]]
+    assert [float(p["value_hz"]) for p in points] == [p["value_hz"] for p in answer["points"]]
     assert entry.status(["bifurcation", str(path), *words]) == 0
     shown = " ".join(capfd.readouterr().err.split())
     assert "lower end of 1-0-0 symmetric not located, known down to" in shown

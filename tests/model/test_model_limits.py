@@ -104,6 +104,16 @@ def test_an_element_of_format_2_has_no_such_key(table: str, line: str, feature: 
     told(error, feature)
 
 
+def test_an_acceleration_of_the_base_is_its_amplitude() -> None:
+    force = HAMMER.index("[[force]]")
+    end = HAMMER.find("[", force + len("[[force]]"))
+    base = '[base]\nacceleration = "0.5 g"\n'
+    error = refused(HAMMER[:force] + base + (HAMMER[end:] if end > 0 else ""))
+    assert error.field == "base.acceleration"
+    told(error, "an acceleration by its own key")
+    assert 'amplitude = "0.5 g"' in error.expected
+
+
 def _element(table: str) -> type[FileTable]:
     record = nested_table(keys_of(FORMATS[1])[table])
     assert record is not None

@@ -24,12 +24,33 @@ from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course
+from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, captions, point_captions, titles
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.figure_text import clipped, overlapping
 
 QUICK = Course(40, 16, 400)
+ONE_STOP = """
+format = 2
+[[mass]]
+name = "m"
+mass = 1.0
+[[spring]]
+between = ["m", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["m", "ground"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["m", "ground"]
+upper = 0.5
+stiffness = 10.0
+[[force]]
+on = "m"
+amplitude = 1.0
+"""
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +113,15 @@ def test_a_point_that_no_track_meets_has_no_track(points: list[Bifurcation]) -> 
         "pitchfork of 1-1-1 symmetric: stable above, unstable below; "
         "its two asymmetric twins 1-1-1 are born below, stable"
     )
+
+
+def test_an_orbit_with_impacts_on_one_side_is_not_symmetric() -> None:
+    """At grazing 1-1-0 is the orbit without impacts, which is its own mirror image."""
+    values = np.linspace(1.6, 1.85, 11)
+    system = parse_model_file(ONE_STOP, Path("one.toml")).model
+    swept = sweep.run(SweepPlan(ModelSubject(system), "omega", values, ("down",), course=QUICK))
+    (touch,) = [p for p in window_ends.locate(swept) if p.kind == "grazing"]
+    assert "1-1-0 asymmetric below, 1-0-0 symmetric above" in point_captions.caption(touch)
 
 
 def _texts(figure: Any) -> str:
