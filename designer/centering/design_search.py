@@ -307,12 +307,20 @@ class _Hunt:
         unit = self.modelfile.model.second_order().own_frequency
         return candidate.design.errors.scales.frequency(unit)
 
+    def _time_scale(self, frequency: float) -> str:
+        """Which frequency of the generator [Hz] stands for the model's own, in words."""
+        si = self.modelfile.si
+        if si is None:
+            return f"{frequency:.4g} Hz at ω = 1"
+        own = si.hertz(self.modelfile.model.second_order().own_frequency)
+        return f"{frequency:.4g} Hz for {own:.4g} Hz of the mechanism"
+
     def _asked(
         self, candidate: Candidate, rung: str, listen: Listen
     ) -> tuple[Candidate, RungOutcome]:
         frequency = self._frequency(candidate)
         engine = "exact circuit with" if rung == BANDWIDTH else "ngspice, rung"
-        title = f"{engine} {rung}, {frequency:.4g} Hz at ω = 1"
+        title = f"{engine} {rung}, {self._time_scale(frequency)}"
         step = self.progress.stage(title, len(candidate.scored))
         responses, design = candidate.model_responses, candidate.design
         bench = self._bench(candidate.choice, responses, design, LISTENED)
