@@ -32,6 +32,8 @@ WATCHED = 20
 NEAR = 0.01
 """Of each state's peak: a board that has come as near to an orbit that is known to attract, and is
 nearer after one more of its periods, has arrived."""
+WAITS = (8, 8, 4)
+"""Of the last drive's periods, the parts after which a start may have come to its orbit."""
 STILL = 1e-3
 """Peaks below this share of the largest count as so much."""
 STREAM = "phase:"
@@ -110,24 +112,76 @@ def follow(
     """
     # One for all phases: its tables cost more than a few periods.
     general = Flow(system, stages[0][0], fast=False)
-    arrivals = [until_strobe(general, phase) for phase in phases]
-    known: dict[int, Arrival] = {}
-    if swept is not None:
-        begun = {k: arrival for k, arrival in enumerate(arrivals) if arrival is not None}
-        states = np.array([a.state for a in begun.values()]).reshape(len(begun), system.size)
-        periods = sum(count for _, count in stages)
-        for (k, arrival), end, whole in zip(begun.items(), *swept(stages, states), strict=True):
-            if whole:
-                known[k] = Arrival(end, arrival.periods + periods, arrival.clipped)
-                arrivals[k] = None
-    for number, (drive, periods) in enumerate(stages):
-        if not any(arrivals):
+    return _onwards(system, stages, [until_strobe(general, phase) for phase in phases], swept)
+
+
+def _onwards(
+    system: PiecewiseLinearSystem,
+    stages: Sequence[tuple[Drive, int]],
+    arrivals: Sequence[Arrival | None],
+    swept: Swept | None,
+    watch: bool = True,
+) -> list[Arrival | None]:
+    """The way on from these arrivals, as of ``follow``. watch : whether the first of the stages
+    begins with switching on, so that clipping is looked for."""
+    known = _swept(swept, stages, arrivals)
+    rest = [None if k in known else arrival for k, arrival in enumerate(arrivals)]
+    for number, stage in enumerate(stages):
+        if not any(rest):
             break
-        flow = Flow(system, drive)
-        watched = min(periods, WATCHED) if number == 0 else 0
-        arrivals = [_on(flow, a, watched, True) for a in arrivals]
-        arrivals = [_on(flow, a, periods - watched, False) for a in arrivals]
-    return [known.get(k, arrival) for k, arrival in enumerate(arrivals)]
+        # What clips in one stage need not do so in the next one.
+        through = _swept(swept, [stage], rest) if len(stages) > 1 else {}
+        left = [None if k in through else arrival for k, arrival in enumerate(rest)]
+        if any(left):
+            drive, periods = stage
+            flow = Flow(system, drive)
+            watched = min(periods, WATCHED) if watch and number == 0 else 0
+            left = [_on(flow, a, watched, True) for a in left]
+            left = [_on(flow, a, periods - watched, False) for a in left]
+        rest = [through.get(k, arrival) for k, arrival in enumerate(left)]
+    return [known.get(k, arrival) for k, arrival in enumerate(rest)]
+
+
+def _swept(
+    swept: Swept | None, stages: Sequence[tuple[Drive, int]], arrivals: Sequence[Arrival | None]
+) -> dict[int, Arrival]:
+    """Of these arrivals, by their places, those that the faster way knows after these stages."""
+    begun = {k: arrival for k, arrival in enumerate(arrivals) if arrival is not None}
+    if swept is None or not begun:
+        return {}
+    states, periods = np.array([a.state for a in begun.values()]), sum(n for _, n in stages)
+    ends = zip(begun.items(), *swept(stages, states), strict=True)
+    return {
+        k: Arrival(end, arrival.periods + periods, arrival.clipped)
+        for (k, arrival), end, whole in ends
+        if whole
+    }
+
+
+def _until_near(
+    system: PiecewiseLinearSystem,
+    stages: Sequence[tuple[Drive, int]],
+    phases: Sequence[float],
+    swept: Swept,
+    orbit: Orbit,
+) -> list[Arrival | None]:
+    """As ``follow``, but the last drive's periods end where a start has come to an orbit that
+    attracts."""
+    *before, (drive, periods) = stages
+    parts = [max(periods // share, 1) for share in WAITS]
+    parts.append(max(periods - sum(parts), 0))
+    arrivals = follow(system, [*before, (drive, parts[0])], phases, swept)
+    for part in parts[1:]:
+        there = [k for k, arrival in enumerate(arrivals) if arrival is not None]
+        states = np.array([a.state for a in arrivals if a is not None])
+        near = come_to(orbit, states, swept, drive) if there else np.zeros(0, dtype=bool)
+        left = dict(zip(there, ~near, strict=True))
+        rest = [arrival if left.get(k) else None for k, arrival in enumerate(arrivals)]
+        if not any(rest):
+            break
+        later = _onwards(system, [(drive, part)], rest, swept, watch=False)
+        arrivals = [later[k] if left.get(k) else one for k, one in enumerate(arrivals)]
+    return arrivals
 
 
 def _on(flow: Flow, arrival: Arrival | None, periods: int, measure: bool) -> Arrival | None:
@@ -154,7 +208,7 @@ def switched_on(
     known : of each start the board's own orbit of the response, where it has one that attracts; a
     start that has come to it is not settled again. brief : as of ``Ensemble.respond``.
     """
-    arrivals = _arrivals(ensemble, starts, jobs)
+    arrivals = _arrivals(ensemble, starts, known, jobs)
     orbits = _arrived(ensemble, starts, arrivals, known, jobs)
     cases: list[Case] = [
         (board, question, recipe.target, arrival.state)
@@ -176,9 +230,13 @@ def switched_on(
 
 
 def _arrivals(
-    ensemble: Ensemble, starts: Sequence[tuple[int, Question, Recipe, float]], jobs: int
+    ensemble: Ensemble,
+    starts: Sequence[tuple[int, Question, Recipe, float]],
+    known: Sequence[Orbit | None],
+    jobs: int,
 ) -> list[Arrival | str]:
-    """Where each start's recipe leads; the reason where the flow fails."""
+    """Where each start's recipe leads; the reason where the flow fails. known : as of
+    ``switched_on``: a start that has come to that orbit does not wait until the recipe's end."""
     groups: dict[tuple[int, Recipe], list[int]] = {}
     for k, (board, _, recipe, _) in enumerate(starts):
         groups.setdefault((board, recipe), []).append(k)
@@ -195,7 +253,11 @@ def _arrivals(
         try:
             system = ensemble.reduction(board).system()
             swept, phases = partial(ensemble.swept, board), [starts[k][3] for k in members]
-            arrivals = follow(system, recipe.drives, phases, swept)
+            orbit = known[members[0]] if known else None
+            if orbit is None:
+                arrivals = follow(system, recipe.drives, phases, swept)
+            else:
+                arrivals = _until_near(system, recipe.drives, phases, swept, orbit)
         except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
             return [str(error)] * len(members)
         return [a or "the flow did not get through the start" for a in arrivals]
