@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ from designer.base.manifest import (
     read_manifest,
 )
 from designer.base.plain_json import dumps, plain
+from designer.base.progress import note
 from designer.base.seal import sha256
 from designer.base.toml_reader import parse_toml
 
@@ -48,6 +51,8 @@ MADE_WITH = frozenset({"version", "catalogue"})
 """Inputs that nobody asks for: what the tool was when a stage was made."""
 BLOCKS = "block-*.parquet"
 """Files of a folder of blocks; others in it are not ours."""
+WORKED_ON = (".kicad_pcb", ".kicad_sch", ".kicad_pro", ".kicad_dru")
+"""Endings of files that people go on working on."""
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
 """Of every design; ``board_files.names`` has those of its board."""
 
@@ -66,6 +71,7 @@ class Folder:
         if self.manifest is None:
             _check_free(path)
         listed = {} if self.manifest is None else self.manifest.files
+        self._written: set[str] = set()
         self._digests = {name: digest for name, (_, digest) in listed.items() if digest}
 
     def __truediv__(self, name: str) -> Path:
@@ -213,10 +219,27 @@ class Folder:
         stage, _ = self.manifest.files[name]
         data = content.encode("utf-8") if isinstance(content, str) else content
         path = self / name
+        self._keep(name)
+        self._written.add(name)
         with appearing(path) as partial:
             path.parent.mkdir(parents=True, exist_ok=True)
             partial.write_bytes(data)
         self.manifest.files[name] = (stage, file_hash(name, data))
+
+    def _keep(self, name: str) -> None:
+        """Keep a copy of a file that somebody has worked on, before it is replaced or removed: a
+        board that was routed by hand cannot be made again."""
+        digest = self._digests.get(name)
+        if digest is None or name in self._written or not name.endswith(WORKED_ON):
+            return
+        path = self / name
+        with writing(path):
+            if not path.is_file() or file_hash(name, path.read_bytes()) == digest:
+                return
+            numbers = (path.with_name(f"{path.name}.kept-{k}") for k in count(1))
+            kept = next(free for free in numbers if not free.exists())
+            shutil.copy2(path, kept)
+        note(f"{path} was changed since the tool wrote it: it is kept as {kept.name}")
 
     def rewrite(self, name: str, content: str | bytes) -> None:
         """Write a file of a finished stage anew, unless it has this content already.
@@ -262,6 +285,7 @@ class Folder:
             obsolete += [n for n in self._there(name) if n not in manifest.files]
         for name in obsolete:
             if not name.endswith("/"):
+                self._keep(name)
                 with writing(self / name):
                     (self / name).unlink(missing_ok=True)
             manifest.files.pop(name, None)

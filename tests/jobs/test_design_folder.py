@@ -56,6 +56,28 @@ def _decide(path: Path, wanted: Any, *, overwrite: bool = False, resume: bool = 
     return list(Folder(path).decide(wanted, overwrite=overwrite, resume=resume))
 
 
+def test_a_board_that_somebody_has_worked_on_is_kept_beside_the_new_one(tmp_path: Path) -> None:
+    """Hours of routing were replaced by --overwrite without a word. What is as the tool wrote it is
+    replaced, and so is any other file."""
+    board = "kicad/a.kicad_pcb"
+    wanted: Any = {"design": ({"model": "a"}, ["model.toml", board])}
+    for text in ("routed by hand", "routed again"):
+        _fill(tmp_path, wanted)
+        (tmp_path / board).write_text(text)
+        (tmp_path / "model.toml").write_text("another")
+    _fill(tmp_path, wanted)
+    _fill(tmp_path, wanted)
+    kept = sorted(path.name for path in (tmp_path / "kicad").iterdir())
+    assert kept == ["a.kicad_pcb", "a.kicad_pcb.kept-1", "a.kicad_pcb.kept-2"]
+    assert (tmp_path / f"{board}.kept-1").read_text() == "routed by hand"
+    assert (tmp_path / f"{board}.kept-2").read_text() == "routed again"
+    assert not list(tmp_path.glob("model.toml.*"))
+    (tmp_path / board).write_text("routed once more")
+    renamed: Any = {"design": ({"model": "b"}, ["model.toml", "kicad/b.kicad_pcb"])}
+    _fill(tmp_path, renamed)
+    assert (tmp_path / f"{board}.kept-3").read_text() == "routed once more"
+
+
 def test_a_new_folder_does_everything(tmp_path: Path) -> None:
     out = tmp_path / "a" / "b"
     assert _decide(out, STUDY) == ["design", "study"]
