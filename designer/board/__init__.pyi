@@ -7,6 +7,11 @@ from . import (
 from .board_check import (
     check_board as check_board,
 )
+from .board_facts import (
+    BoardFacts as BoardFacts,
+    board_facts as board_facts,
+    check_edge as check_edge,
+)
 from .board_parts import (
     Designed as Designed,
     board_circuit as board_circuit,

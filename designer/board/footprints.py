@@ -201,7 +201,7 @@ def _two_holes(
 
 def _transistor_outline(name: str) -> FootprintShape:
     """TO-92 with its legs in a row at 1.27 mm; body 5.2 mm by 4.0 mm (JEDEC TO-226)."""
-    return FootprintShape(name, _row(3, (1.27, 0.0), (0.95, 1.5), 0.6), (5.2, 4.0), mark=True)
+    return FootprintShape(name, _row(3, (1.27, 0.0), (1.0, 1.5), 0.6), (5.2, 4.0), mark=True)
 
 
 def _header(name: str, count: str, pitch: str) -> FootprintShape:

@@ -18,7 +18,7 @@ from designer.board.kicad_names import (
     symbol_id,
 )
 from designer.board.kicad_placement import SCREW, Placement
-from designer.board.placed_component import LETTER, TEXT
+from designer.board.placed_component import LETTER, STROKE, TEXT
 
 LAYERS = (
     (0, "F.Cu", "signal"),
@@ -152,7 +152,7 @@ def _text(
         layer="F.SilkS",
         uuid=identifier("text", *ids),
         effects={
-            "font": {"size": (TEXT, TEXT), "thickness": 0.12},
+            "font": {"size": (TEXT, TEXT), "thickness": STROKE},
             **({} if justify is None else {"justify": word(justify)}),
         },
     )

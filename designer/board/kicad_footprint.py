@@ -10,9 +10,9 @@ from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.footprints import FootprintShape, PadShape
 from designer.board.kicad_names import BOARD_VERSION, HEAD, LIBRARY, identifier
 from designer.board.pins import Pin
-from designer.board.placed_component import TEXT, PlacedComponent
+from designer.board.placed_component import STROKE, TEXT, PlacedComponent
 
-LINE, BAR, SILK, NOTCH = 0.12, 0.3, 0.17, 0.7
+LINE, BAR, SILK, NOTCH = STROKE, 0.3, 0.18, 0.7
 """Silk: width of a line, of the bar at a cathode; from a pad to the middle of a line; radius of the
 notch of a case [mm]."""
 ROUND = 0.25
@@ -134,7 +134,7 @@ def _property(
         layer=layer,
         hide=True if hide else None,
         uuid=identifier(*ids, "field", key),
-        effects={"font": {"size": (TEXT, TEXT), "thickness": 0.12}},
+        effects={"font": {"size": (TEXT, TEXT), "thickness": STROKE}},
     )
 
 

@@ -32,6 +32,8 @@ COURTYARDS = ("F.CrtYd", "B.CrtYd")
 TRACKS = ("segment", "arc")
 WITHIN_SIZE = frozenset({"rect", "roundrect", "oval"})
 """Shapes of pads that fill ``size``, but for their corners."""
+EXCLUDED = {"exclude_from_pos_files": "the position file", "exclude_from_bom": "the bill"}
+"""KiCad's marks of a footprint that a file leaves out, and that file."""
 PART_NUMBER = "MPN"
 """The field that has a part's number, on the sheet and on the board."""
 EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
@@ -73,6 +75,8 @@ class PlacedFootprint:
     """The field ``MPN``, None where there is none."""
     fitted: bool
     """Whether it is fitted; False where it is marked DNP."""
+    excluded: frozenset[str] = frozenset()
+    """Which of the marks ``EXCLUDED`` it has."""
 
     @property
     def wired(self) -> bool:
@@ -225,6 +229,7 @@ def _footprint(item: Expression) -> PlacedFootprint:
     x, y = at.number(0), at.number(1)
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
     library, _, name = item.text(0).rpartition(":")
+    marks = frozenset(mark for each in item.all("attr") for mark in each.atoms)
     return PlacedFootprint(
         reference=_field(item, "Reference") or "",
         value=_field(item, "Value") or "",
@@ -235,7 +240,8 @@ def _footprint(item: Expression) -> PlacedFootprint:
         library=library,
         name=name,
         part_number=_field(item, PART_NUMBER),
-        fitted=not any("dnp" in each.atoms for each in item.all("attr")),
+        fitted="dnp" not in marks,
+        excluded=marks & EXCLUDED.keys(),
     )
 
 

@@ -20,6 +20,7 @@ from designer.board.kicad_names import kicad_net
 from designer.board.net_classes import CLASSES, SUMMING, SUPPLY
 from designer.catalog.design_rule import Override
 from designer.catalog.design_rules import BY_ID
+from designer.catalog.fab import FabLimits, Measure
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
 
 SPACING: tuple[tuple[float, float, float], ...] = (
@@ -124,6 +125,25 @@ def board_rules(
             usual=max(width, CLASSES[SUPPLY]["track_width"]),
         ),
     )
+
+
+def project_rules(fab: FabLimits) -> dict[str, float]:
+    """The object ``rules`` of the board's settings in a ``.kicad_pro`` [mm]: what KiCad's own check
+    asks for, beside the custom rules. A measure that no fab limits keeps KiCad's own."""
+    of: dict[str, Measure] = {
+        "min_track_width": "track",
+        "min_clearance": "gap",
+        "min_through_hole_diameter": "hole",
+        "min_via_annular_width": "via-ring",
+        "min_hole_to_hole": "hole-gap",
+        "min_copper_edge_clearance": "edge",
+        "min_text_height": "silk-height",
+        "min_text_thickness": "silk-stroke",
+    }
+    rules = {key: fab.least[measure] for key, measure in of.items() if measure in fab.least}
+    if {"hole", "via-ring"} <= fab.least.keys():
+        rules["min_via_diameter"] = round(fab.least["hole"] + 2.0 * fab.least["via-ring"], 6)
+    return rules
 
 
 def rules_text(rules: Sequence[CustomRule]) -> str:

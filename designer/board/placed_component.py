@@ -9,9 +9,10 @@ from typing import Literal, TypeAlias
 from designer.board.component import Component
 from designer.board.footprints import FootprintShape
 
-TEXT = 0.8
-"""Height of a reference on the board [mm]."""
-LETTER = 0.85
+TEXT, STROKE = 1.0, 0.15
+"""Height of a reference on the board, and width of its lines [mm]: the least of the shipped
+fabs."""
+LETTER = 1.06
 """Width of one of its letters [mm]."""
 ROOM = 0.4
 """Between cells [mm]."""

@@ -48,6 +48,14 @@ from .entries import (
     ReferenceEntry as ReferenceEntry,
     Use as Use,
 )
+from .fab import (
+    Fab as Fab,
+    FabLimits as FabLimits,
+    Measure as Measure,
+    PositionField as PositionField,
+    fab_limits as fab_limits,
+    fabs as fabs,
+)
 from .fields import (
     PRICE_CLASSES as PRICE_CLASSES,
     Figure as Figure,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from designer.catalog.design_rule import DesignRule
 
 OWN = "this tool's margin"
+FAB, FAB_SOURCE = "what the fab makes", "the fab's limits, catalogs/fabs"
 
 
 def _rule(
@@ -250,8 +251,8 @@ RULES: tuple[DesignRule, ...] = (
     ),
     _rule(
         "part-fitted",
-        "Parts that are marked DNP although the design needs them, and parts without the mark that "
-        "the design leaves out",
+        "Parts that are marked DNP, or left out of the positions or the bill, although the design "
+        "needs them; and parts without the mark that the design leaves out",
         0, "",
         "bom.csv of the design, which has the parts that are fitted",
         "set the footprint's attribute as the schematic has it (board.dc_trim in the model file "
@@ -324,6 +325,62 @@ RULES: tuple[DesignRule, ...] = (
         "check says nothing of what lies outside altogether",
         "move the component onto the board, or the edge outwards",
         least=True, board=True,
+    ),
+    _rule(
+        "fab-track",
+        "The finest track",
+        FAB, "mm",
+        FAB_SOURCE,
+        "widen the track, or order from a fab that makes it",
+        least=True, board=True,
+    ),
+    _rule(
+        "fab-hole",
+        "How far the diameter of a round hole is outside what the fab drills",
+        0, "mm",
+        FAB_SOURCE,
+        "change the via or the pad, or order from a fab that drills it",
+        board=True,
+    ),
+    _rule(
+        "fab-ring",
+        "Ring of copper round the hole of a via or of a plated pad",
+        FAB, "mm",
+        FAB_SOURCE,
+        "widen the via or the pad, or make its hole smaller",
+        least=True, board=True,
+    ),
+    _rule(
+        "fab-slot",
+        "How far the width of a slot in a pad is outside what the fab mills",
+        0, "mm",
+        FAB_SOURCE,
+        "widen the slot, or make it a round hole",
+        board=True,
+    ),
+    _rule(
+        "fab-silk",
+        "Height of letters in silk, and width of its lines",
+        FAB, "mm",
+        FAB_SOURCE,
+        "make the text larger and its lines wider, or hide it",
+        least=True, board=True,
+    ),
+    _rule(
+        "fab-layers",
+        "Copper layers",
+        FAB, "",
+        FAB_SOURCE,
+        "take fewer layers, or order from another fab",
+        board=True,
+    ),
+    _rule(
+        "fab-thickness",
+        "How far the board's thickness is outside what the fab makes",
+        0, "mm",
+        FAB_SOURCE,
+        "set the board's thickness in KiCad, or order from another fab",
+        board=True,
     ),
     _rule(
         "component-spacing",

@@ -62,7 +62,7 @@ ENVIRONMENT = "DESIGNER_CATALOGS"
 LAYOUTS = "bom-layouts"
 """Folder of layouts beside the catalogue's files (``board.bom_layouts``)."""
 FABS = "fabs"
-"""Folder of makers of boards beside the catalogue's files (``fabrication.fab``)."""
+"""Folder of makers of boards beside the catalogue's files (``catalog.fab``)."""
 STOCK = "stock"
 """Folder of distributors' lists beside the catalogue's files (``catalog.stock_list``)."""
 _MAX_BYTES = 4_000_000

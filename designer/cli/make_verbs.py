@@ -129,6 +129,10 @@ def rules(
     board: Annotated[
         Path | None, option("--board", "FILE", "Its board, a .kicad_pcb of KiCad 7 to 9.")
     ] = None,
+    fab: Annotated[
+        list[str] | None,
+        option("--fab", "NAME", "With --board: who shall make it, by its limits. May come twice."),
+    ] = None,
     junit: Annotated[Path | None, option("--junit", "FILE", "Also write a JUnit report.")] = None,
     **shared: Any,
 ) -> Output:
@@ -136,7 +140,9 @@ def rules(
     from designer.cli import tables
     from designer.jobs import rules_job
 
-    result = rules_job.rules(folder, board=board, junit=junit, progress=session.progress, **shared)
+    result = rules_job.rules(
+        folder, board=board, fab=fab or (), junit=junit, progress=session.progress, **shared
+    )
 
     def show() -> None:
         tables.rules(result.answer)

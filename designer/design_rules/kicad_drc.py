@@ -29,7 +29,8 @@ from designer.board.footprints import FootprintShape
 from designer.board.kicad_footprint import module
 from designer.board.kicad_names import LIBRARY, circuit_net
 from designer.board.kicad_reader import BoardFile
-from designer.board.kicad_rules import CANARY, CustomRule, canary, rules_text
+from designer.board.kicad_rules import CANARY, CustomRule, canary, project_rules, rules_text
+from designer.catalog.fab import FabLimits
 from designer.design_rules.drc_specimen import canary_track, specimen
 from designer.design_rules.kicad_program import KicadFailed, call, last_words, needed_version
 
@@ -94,11 +95,15 @@ class DesignRuleCheck:
 
 
 def check(
-    board: BoardFile, rules: Sequence[CustomRule], footprints: Sequence[FootprintShape] = ()
+    board: BoardFile,
+    rules: Sequence[CustomRule],
+    footprints: Sequence[FootprintShape] = (),
+    fab: FabLimits | None = None,
 ) -> DesignRuleCheck:
     """Check a board against the rules, and against the schematic beside it, where there is one.
 
-    footprints : as the design has them, by which those on the board are judged.
+    footprints : as the design has them, by which those on the board are judged. fab : what its
+    maker makes, which KiCad's own check asks for; None for KiCad's own limits.
 
     Raises
     ------
@@ -113,7 +118,7 @@ def check(
         reported = {v.rule for v in violations(broken, rules)}
         reported |= {OPEN} if _unconnected(broken) else set()
         reported |= {SHORT} if _shorts(broken) else set()
-        files = _beside(board, footprints)
+        files = _beside(board, footprints, fab)
         answer = report(_with_canary(board), text, place / "board", files)
     if not any(_is_canary(v) for v in answer["violations"]):
         raise KicadFailed("KiCad has dropped the custom rules: a planted violation went unreported")
@@ -129,7 +134,9 @@ def check(
     )
 
 
-def _beside(board: BoardFile, footprints: Sequence[FootprintShape]) -> dict[str, str]:
+def _beside(
+    board: BoardFile, footprints: Sequence[FootprintShape], fab: FabLimits | None
+) -> dict[str, str]:
     """Files that stand beside a board when it is checked, by name."""
     files = {
         f"{LIBRARY}.pretty/{shape.name}.kicad_mod": expression_text(module(shape))
@@ -139,7 +146,8 @@ def _beside(board: BoardFile, footprints: Sequence[FootprintShape]) -> dict[str,
     files["fp-lib-table"] = expression_text(
         expression("fp_lib_table", version=7, lib={**table, "options": "", "descr": ""})
     )
-    design = {"rule_severities": SEVERITIES}
+    limits = {} if fab is None else project_rules(fab)
+    design = {"rule_severities": SEVERITIES, "rules": limits}
     files["board.kicad_pro"] = json.dumps({"board": {"design_settings": design}})
     sheet = board.path.with_suffix(".kicad_sch")
     if sheet.is_file():

@@ -14,6 +14,7 @@ import numpy as np
 
 from designer.base.natural_sort import natural_key
 from designer.base.views import View
+from designer.board.board_facts import board_facts
 from designer.board.component import Component
 from designer.board.footprints import footprint
 from designer.board.kicad_names import POWER, circuit_net
@@ -34,8 +35,9 @@ from designer.catalog.design_rule import (
     value_text,
 )
 from designer.catalog.design_rules import RULES
+from designer.catalog.fab import FabLimits
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
-from designer.design_rules import on_parts
+from designer.design_rules import on_fab, on_parts
 from designer.design_rules.kicad_drc import (
     ERRORS,
     OPEN,
@@ -72,14 +74,16 @@ def checked(
     components: Sequence[Component],
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
+    fab: FabLimits,
 ) -> tuple[RuleOutcome, ...]:
-    """Every rule on a board, with KiCad where that is installed and answers."""
+    """Every rule on a board, with KiCad where that is installed and answers. fab : what its maker
+    makes."""
     try:
         shapes = {c.footprint: footprint(c.footprint) for c in components if c.footprint}
-        answer: DesignRuleCheck | str = check(board, rules, tuple(shapes.values()))
+        answer: DesignRuleCheck | str = check(board, rules, tuple(shapes.values()), fab)
     except KicadFailed as why:
         answer = str(why)
-    return on_board(board, components, rules, overrides, answer)
+    return on_board(board, components, rules, overrides, answer, fab)
 
 
 def on_board(
@@ -88,15 +92,20 @@ def on_board(
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
     answer: DesignRuleCheck | str,
+    fab: FabLimits,
 ) -> tuple[RuleOutcome, ...]:
-    """Every rule on a board. answer : what KiCad found, or why it was not asked."""
+    """Every rule on a board. answer : what KiCad found, or why it was not asked. fab : what its
+    maker makes."""
     by_id = {custom.id: custom for custom in rules}
+    facts = board_facts(board)
     out = []
     for rule in _wanted():
         override = overrides.get(rule.id)
         try:
             if rule.id in READ:
                 out.append(judged(rule, READ[rule.id](board, components), override))
+            elif rule.id in on_fab.READ:
+                out.append(judged(rule, on_fab.READ[rule.id](facts, fab), override))
             elif isinstance(answer, str):
                 out.append(_idle(rule, rules, overrides, answer))
             elif rule.id in REPORTED:

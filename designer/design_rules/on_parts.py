@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from designer.base.units import parse_quantity
 from designer.base.views import View
 from designer.board.component import Component
+from designer.board.footprints import footprint
 from designer.board.kicad_names import LIBRARY, footprint_name
-from designer.board.kicad_reader import PART_NUMBER, BoardFile, PlacedFootprint
+from designer.board.kicad_reader import EXCLUDED, PART_NUMBER, BoardFile, PlacedFootprint
 from designer.catalog.design_rule import Finding, NotRun
 
 MOST = 5
@@ -50,7 +51,8 @@ def footprints(board: BoardFile, components: Sequence[Component]) -> Iterator[Fi
 
 
 def fitted(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
-    """Parts that are left out on the board and not by the design, or the other way round."""
+    """Parts that are left out on the board, or of the files of an order, and not by the design; or
+    the other way round."""
     yield from _count(_pairs(board, components), _other_mark)
 
 
@@ -112,11 +114,15 @@ def _other_footprint(component: Component, there: PlacedFootprint) -> str:
 
 
 def _other_mark(component: Component, there: PlacedFootprint) -> str:
-    if there.fitted == component.fitted:
+    if there.fitted and not component.fitted:
+        return "is not marked DNP, and the design leaves it out"
+    if component.fitted and not there.fitted:
+        return "is marked DNP"
+    missed = there.excluded if component.fitted and component.bought is not None else ()
+    soldered = not component.footprint or footprint(component.footprint).soldered
+    if not (missed and soldered):
         return ""
-    return (
-        "is marked DNP" if component.fitted else "is not marked DNP, and the design leaves it out"
-    )
+    return f"is left out of {' and '.join(EXCLUDED[mark] for mark in sorted(missed))}"
 
 
 def _plain(text: str) -> str:

@@ -5,16 +5,9 @@ from .board_cost import (
     cost_or_none as cost_or_none,
     cost_words as cost_words,
 )
-from .board_facts import (
-    check_edge as check_edge,
-)
 from .board_picture import (
     Side as Side,
     board_svg as board_svg,
-)
-from .fab import (
-    Fab as Fab,
-    fabs as fabs,
 )
 from .interactive_bom import (
     bom_page as bom_page,

@@ -10,13 +10,13 @@ from typing import get_args
 
 from designer.base.csv_tables import csv_text
 from designer.base.seal import sha256
+from designer.board.board_facts import board_facts
 from designer.board.bom import Line
 from designer.board.bom_layouts import Layout
 from designer.board.kicad_reader import BoardFile
+from designer.catalog.fab import Fab, FabLimits, PositionField
 from designer.catalog.stock_list import order_number
-from designer.fabrication.board_facts import board_facts
 from designer.fabrication.board_picture import Side, board_svg
-from designer.fabrication.fab import Fab, PositionField
 from designer.fabrication.interactive_bom import bom_page
 from designer.fabrication.kicad_plot import PartPosition, plot
 from designer.fabrication.order_notes import notes
@@ -46,10 +46,10 @@ class BoardOrder:
     """Rules that fail and are accepted, with what was found."""
 
 
-def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]:
+def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) -> dict[str, bytes]:
     """Every file of the order, by its name inside the fab's folder.
 
-    layout : of the fab's bill.
+    layout : of the fab's bill. limits : what the fab makes.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout) -> dict[str, bytes]
         *(f"Not checked: {rule}" for rule in order.not_checked),
         *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
     ]
-    text = notes(order.title, order.name, fab, board_facts(order.board), remarks)
+    text = notes(order.title, order.name, fab, board_facts(order.board), limits, remarks)
     files[NOTES] = text.encode("utf-8")
     files[f"{order.name}-bom.html"] = bom_page(order.title, order.board, order.bought).encode(
         "utf-8"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from designer.fabrication.board_facts import BoardFacts
-from designer.fabrication.fab import Fab
+from designer.board.board_facts import BoardFacts
+from designer.catalog.fab import Fab, FabLimits, Measure
 from designer.fabrication.kicad_plot import DATE
 
 FINISH = "any; lead-free solder (HASL) is the usual one"
@@ -17,11 +17,13 @@ def notes(
     name: str,
     fab: Fab,
     facts: BoardFacts,
+    limits: FabLimits,
     remarks: Sequence[str],
 ) -> str:
     """The page as Markdown.
 
-    title : of the model file. name : of the files. remarks : what is to be looked at, a line each.
+    title : of the model file. name : of the files. limits : what the fab makes. remarks : what is
+    to be looked at, a line each.
     """
     parts = [
         "# Order",
@@ -29,7 +31,7 @@ def notes(
         "\n".join(_indented(title)),
         "\n".join(_files(name)),
         "## Options of the board",
-        "\n".join(_options(facts)),
+        "\n".join(_options(facts, limits)),
         "## Steps",
         "\n".join(f"{i}. {step}" for i, step in enumerate(fab.table.steps, start=1)),
         "## To be looked at" if remarks else "",
@@ -53,19 +55,37 @@ def _files(name: str) -> Iterator[str]:
     yield f"- All files carry the date {DATE[:10]}, so that equal boards give equal files."
 
 
-def _options(facts: BoardFacts) -> Iterator[str]:
-    yield "| option | value |"
-    yield "|---|---|"
-    yield f"| size | {facts.width:.2f} mm × {facts.height:.2f} mm |"
-    yield f"| copper layers | {facts.layers} |"
-    yield f"| thickness | {facts.thickness:g} mm |"
-    yield "| copper | 35 µm (1 oz) |"
-    yield f"| surface | {FINISH} |"
-    yield f"| finest track | {_millimetres(facts.finest_track)} |"
-    yield f"| smallest hole | {_millimetres(facts.smallest_hole)} |"
-    yield f"| holes in pads, vias | {facts.holes}, {facts.vias} |"
-    yield f"| parts on the surface, through holes | {facts.surface_parts}, {facts.through_parts} |"
+def _options(facts: BoardFacts, limits: FabLimits) -> Iterator[str]:
+    yield "| option | value | the fab makes |"
+    yield "|---|---|---|"
+    yield f"| size | {facts.width:.2f} mm × {facts.height:.2f} mm | |"
+    yield f"| copper layers | {facts.layers} | {_made(limits, 'layers')} |"
+    yield f"| thickness | {facts.thickness:g} mm | {_made(limits, 'thickness')} |"
+    yield "| copper | 35 µm (1 oz) | |"
+    yield f"| surface | {FINISH} | |"
+    measured: tuple[tuple[str, float | None, Measure], ...] = (
+        ("finest track", facts.finest_track, "track"),
+        ("smallest hole", facts.smallest_hole, "hole"),
+        ("narrowest slot", facts.narrowest_slot, "slot"),
+        ("thinnest ring of a via", facts.via_ring, "via-ring"),
+        ("thinnest ring of a pad", facts.pad_ring, "pad-ring"),
+        ("lowest letters in silk", facts.silk_height, "silk-height"),
+        ("finest line in silk", facts.silk_stroke, "silk-stroke"),
+    )
+    for words, value, measure in measured:
+        yield f"| {words} | {_millimetres(value)} | {_made(limits, measure)} |"
+    yield f"| holes in pads, vias | {facts.holes}, {facts.vias} | |"
+    parts = f"{facts.surface_parts}, {facts.through_parts}"
+    yield f"| parts on the surface, through holes | {parts} | |"
+
+
+def _made(limits: FabLimits, measure: Measure) -> str:
+    """What the fab makes, in words."""
+    unit = "" if measure == "layers" else " mm"
+    words = [f"at least {limits.least[measure]:g}{unit}"] if measure in limits.least else []
+    words += [f"at most {limits.most[measure]:g}{unit}"] if measure in limits.most else []
+    return ", ".join(words) + (" (assumed)" if measure in limits.assumed else "")
 
 
 def _millimetres(value: float | None) -> str:
-    return "none" if value is None else f"{value:g} mm"
+    return "none" if value is None else f"{value:.3g} mm"

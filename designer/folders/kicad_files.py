@@ -16,7 +16,8 @@ from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_reader import BoardFile, read_board
-from designer.board.kicad_rules import board_rules, rules_text
+from designer.board.kicad_rules import board_rules, project_rules, rules_text
+from designer.catalog.fab import fab_limits
 from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import first_run
 from designer.check.synthesis_result import Synthesis
@@ -41,9 +42,10 @@ def texts(synthesis: Synthesis, checked: CheckedResponse | None = None) -> dict[
         circuit, choice = board_circuit(synthesis)
         parts = components(circuit, synthesis.catalog, choice)
         rules = rules_text(board_rules(circuit, synthesis.modelfile.rules))
+        limits = project_rules(fab_limits([], synthesis.catalog.folders))
         run = first_run(synthesis, checked)
         file = synthesis.modelfile
-        project = Project(file.title, circuit, parts, run, rules, file.board.date)
+        project = Project(file.title, circuit, parts, run, rules, limits, file.board.date)
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 

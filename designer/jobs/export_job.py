@@ -18,16 +18,16 @@ from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
+from designer.board.board_facts import check_edge
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import BoardFile, read_board
 from designer.catalog.catalog import load_catalog
+from designer.catalog.fab import Fab, fab_limits, fabs
 from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules.kicad_program import KicadFailed, needed_version
-from designer.fabrication.board_facts import check_edge
-from designer.fabrication.fab import Fab, fabs
 from designer.fabrication.order import BoardOrder, order_files
 from designer.fabrication.order_refusal import (
     accepted_failures,
@@ -281,7 +281,7 @@ def export_orders(
     if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
         return _ordered(runner, names, True)
     progress.stage("design rules")
-    outcomes = checked(synthesis, board).outcomes
+    outcomes = checked(synthesis, board, inputs["fabs"]).outcomes
     if reasons := refusals(outcomes, asked.accepted):
         answer = _result(runner, [], False).answer
         refused = {**answer, "fabs": list(names), "refused": list(reasons)}
@@ -329,7 +329,8 @@ def _order_texts(order: BoardOrder, wanted: Sequence[Fab], runner: StageRunner) 
     for fab in wanted:
         (layout,) = layouts([fab.table.bom], runner.catalog.folders)
         try:
-            content = order_files(order, fab, layout)
+            limits = fab_limits([fab.name], runner.catalog.folders)
+            content = order_files(order, fab, layout, limits)
         except KicadFailed as why:
             raise EnvironmentMissing(str(why)) from None
         files |= {f"{ORDERS}/{fab.name}/{name}": text for name, text in content.items()}

@@ -22,6 +22,7 @@ from designer.board.kicad_reader import BoardFile, check_belongs, read_board
 from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
+from designer.catalog.fab import fab_limits, fabs
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board as rule_board, rule_reports, run_rules
 from designer.design_rules.kicad_program import kicad_version
@@ -76,6 +77,7 @@ def rules(
     folder: Path | str,
     *,
     board: Path | str | None = None,
+    fab: Sequence[str] = (),
     junit: Path | str | None = None,
     progress: Progress | None = None,
 ) -> RulesResult:
@@ -83,11 +85,13 @@ def rules(
 
     An earlier ``rules.json`` is replaced, since a board changes while it is drawn. Where the folder
     cannot be written the answer stands and says so.
-    board : a .kicad_pcb of this design. junit : where to write a JUnit report.
+    board : a .kicad_pcb of this design. fab : the makers whose limits it is held against; of none
+    those of most. junit : where to write a JUnit report.
 
     Raises
     ------
-    InputError : no design folder, or a board that is not of this design; nothing is written then.
+    InputError : no design folder, a board that is not of this design, or a fab without a file;
+        nothing is written then.
     """
     began, path = time.perf_counter(), Path(folder)
     report = None if junit is None else Path(junit)
@@ -99,18 +103,22 @@ def rules(
         there = "a folder" if report.is_dir() else "no such folder"
         raise InputError(report, "--junit", there, "a file in a folder that exists")
     catalog = load_catalog()
+    if fab and board is None:
+        raise InputError(None, "--fab", ", ".join(fab), "a board to hold against it: --board FILE")
+    fabs(fab, catalog.folders)
     synthesis = read_design(path, catalog, progress)
     board_file = None if board is None else read_board(Path(board))
     progress.stage("rules")
-    checks = checked(synthesis, board_file)
+    checks = checked(synthesis, board_file, fab)
     inputs = {
         "model": synthesis.modelfile.sha256,
         "catalogue": catalog.hash,
         "version": __version__,
         "board": None if board_file is None else sha256(board_file.text.encode("utf-8")),
         "kicad": checks.kicad,
+        "fabs": list(fab),
     }
-    settings = {"board_sha256": inputs["board"], "kicad": checks.kicad}
+    settings = {"board_sha256": inputs["board"], "kicad": checks.kicad, "fabs": list(fab)}
     origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
     answer = plain(
         _json(synthesis, board_file, checks.outcomes, origin, time.perf_counter() - began)
@@ -132,8 +140,11 @@ def rules(
     return RulesResult(answer, checks.passed)
 
 
-def checked(synthesis: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
-    """Every rule on a design, and on its board if there is one.
+def checked(
+    synthesis: Synthesis, board: BoardFile | None = None, makers: Sequence[str] = ()
+) -> RulesAnswer:
+    """Every rule on a design, and on its board if there is one. makers : the fabs that shall make
+    it; of none the limits of most hold.
 
     Raises
     ------
@@ -149,7 +160,8 @@ def checked(synthesis: Synthesis, board: BoardFile | None = None) -> RulesAnswer
     on_circuit = run_rules.on_circuit(subject, limits)
     if board is None:
         return RulesAnswer((*on_circuit, *rule_board.without_board(custom, limits)), None)
-    on_board = rule_board.checked(board, listed, custom, limits)
+    fab = fab_limits(makers, synthesis.catalog.folders)
+    on_board = rule_board.checked(board, listed, custom, limits, fab)
     return RulesAnswer((*on_circuit, *on_board), kicad_version())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +38,8 @@ class Project:
     """What the simulation of the project shows."""
     rules: str
     """Text of the ``.kicad_dru``."""
+    limits: Mapping[str, float]
+    """Limits of KiCad's own check (``kicad_rules.project_rules``) [mm]."""
     date: str = ""
     """Date in the title blocks, such as "2026-11-23"; "" where there is none."""
 
@@ -64,7 +67,7 @@ def files(project: Project) -> dict[str, str]:
     out = {
         f"{name}.kicad_sch": expression_text(drawn),
         f"{name}.kicad_pcb": expression_text(pads),
-        f"{name}.kicad_pro": settings(name, circuit),
+        f"{name}.kicad_pro": settings(name, circuit, project.limits),
         f"{name}.net": expression_text(netlist(name, listed)),
         models: kicad_sim.models(circuit, project.components),
         f"{LIBRARY}.kicad_sym": expression_text(library(shapes(sheet))),
@@ -77,12 +80,13 @@ def files(project: Project) -> dict[str, str]:
     return out
 
 
-def settings(name: str, circuit: Circuit) -> str:
-    """The file ``.kicad_pro``: net classes, and which nets are in them."""
+def settings(name: str, circuit: Circuit, limits: Mapping[str, float]) -> str:
+    """The file ``.kicad_pro``: net classes, which nets are in them, and the limits of KiCad's own
+    check [mm]."""
     summing = sorted({s.inverting for s in circuit.sections} - {GROUND})
     supply = (GROUND, POSITIVE, NEGATIVE, *circuit.supply_inputs)
     value: dict[str, Any] = {
-        "board": {"design_settings": {"defaults": {}, "rules": {}, "track_widths": []}},
+        "board": {"design_settings": {"defaults": {}, "rules": dict(limits), "track_widths": []}},
         "meta": {"filename": f"{name}.kicad_pro", "version": 3},
         "net_settings": net_settings(map(kicad_net, summing), map(kicad_net, supply)),
         "schematic": {"legacy_lib_dir": "", "legacy_lib_list": []},

@@ -58,7 +58,7 @@ def test_every_rule_looks_at_it() -> None:
 
 def test_it_is_exported() -> None:
     at = subject()
-    made = files(Project("the paper's values", at.circuit, tuple(at.components), RUN, ""))
+    made = files(Project("the paper's values", at.circuit, tuple(at.components), RUN, "", {}))
     (board,) = (text for name, text in made.items() if name.endswith(".kicad_pcb"))
     for component in at.components:
         assert f'"{component.reference}"' in board

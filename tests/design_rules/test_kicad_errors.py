@@ -14,7 +14,7 @@ from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.design_rules import kicad_drc, on_board
 from designer.folders import kicad_files
 from tests.design_rules.test_rules_board import custom
-from tests.shared.rule_cases import base
+from tests.shared.rule_cases import base, generic
 
 pytestmark = pytest.mark.kicad
 Change = Callable[[str], str]
@@ -33,7 +33,7 @@ def looked(folder: Path, board: str, schematic: str | None) -> dict[str, RuleOut
     path.write_text(board, encoding="utf-8")
     if schematic is not None:
         path.with_suffix(".kicad_sch").write_text(schematic, encoding="utf-8")
-    found = on_board.checked(read_board(path), base().components, custom(), {})
+    found = on_board.checked(read_board(path), base().components, custom(), {}, generic())
     return {outcome.rule.id: outcome for outcome in found}
 
 

@@ -27,13 +27,13 @@ from designer.board.kicad_reader import MOST_LAID, BoardFile, check_belongs, rea
 from designer.board.kicad_rules import CustomRule, rules_text, spacing
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
-from designer.design_rules import drc_specimen, kicad_drc, on_board
+from designer.design_rules import drc_specimen, kicad_drc, on_board, on_fab
 from designer.design_rules.kicad_drc import DesignRuleCheck
 from designer.design_rules.kicad_program import KicadFailed
 from designer.folders import kicad_files
 from designer.jobs import rules_job
 from tests.circuit.test_reduction import EXACT
-from tests.shared.rule_cases import base
+from tests.shared.rule_cases import base, generic
 from tests.shared.stages import stage
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -53,7 +53,9 @@ BY_REPORT = ("unconnected", "short-circuit", "kicad-errors", "schematic-parity")
 tests/design_rules/test_rules_copper.py and tests/design_rules/test_kicad_errors.py."""
 OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted")
 """Rules on the parts: the pairs stand in tests/design_rules/test_rules_parts.py."""
-BY_READING = ("decoupling-distance", "summing-span", "board-outline", *OF_PARTS)
+BY_FAB = tuple(on_fab.READ)
+"""Rules by what a fab makes: the pairs stand in tests/design_rules/test_on_fab.py."""
+BY_READING = ("decoupling-distance", "summing-span", "board-outline", *OF_PARTS, *BY_FAB)
 NOTHING: Mapping[str, int] = {}
 
 
@@ -121,7 +123,7 @@ def by_id(outcomes: tuple[RuleOutcome, ...]) -> dict[str, RuleOutcome]:
 def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board of the design."""
     board = board_of(text, folder)
-    return by_id(on_board.checked(board, base().components, custom(), {}))
+    return by_id(on_board.checked(board, base().components, custom(), {}, generic()))
 
 
 @cache
@@ -303,7 +305,7 @@ def shifted(name: str, by: tuple[float, float]) -> str:
 def by_reading(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What is said of a board without KiCad."""
     board = board_of(text, folder)
-    return by_id(on_board.on_board(board, base().components, custom(), {}, "not asked"))
+    return by_id(on_board.on_board(board, base().components, custom(), {}, "not asked", generic()))
 
 
 def decoupled(distance: float, folder: Path) -> RuleOutcome:
@@ -327,7 +329,7 @@ def test_a_far_decoupling_capacitor_is_caught_and_a_near_miss_is_not(tmp_path: P
 def test_a_capacitor_on_the_other_rail_does_not_decouple_this_one(tmp_path: Path) -> None:
     listed = [c for c in base().components if c.reference != "C903"]
     board = board_of(drawn(), tmp_path)
-    found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked"))
+    found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked", generic()))
     assert found["decoupling-distance"].status == NOT_RUN
 
 
@@ -364,7 +366,9 @@ def test_a_far_part_of_a_summing_node_is_caught_and_a_near_miss_is_not(tmp_path:
     listed = [replace(c, footprint=axial) if c.reference == "R4" else c for c in base().components]
     for length, status in ((44.95, PASS), (45.05, FAIL)):
         board = board_of(spanning(length)[1], tmp_path)
-        found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked"))["summing-span"]
+        found = by_id(on_board.on_board(board, listed, custom(), {}, "not asked", generic()))[
+            "summing-span"
+        ]
         assert (found.status, found.limit) == (status, 45.0)
 
 
@@ -597,7 +601,8 @@ def test_without_kicad_only_what_is_read_is_run(
     for id_ in (*BY_KICAD, *BY_REPORT):
         assert of_board[id_].status == NOT_RUN
         assert "not installed" in of_board[id_].found
-    assert {of_board[id_].status for id_ in BY_READING} == {PASS}
+    not_read = {id_ for id_ in BY_READING if of_board[id_].status != PASS}
+    assert not_read == {"fab-track"}  # the board has no track yet
 
 
 def program(folder: Path, script: str) -> None:
@@ -644,7 +649,7 @@ def answer(*misunderstood: str, unconnected: Mapping[str, int] = NOTHING) -> Des
 
 def on_drawn(text: str, folder: Path, told: DesignRuleCheck) -> dict[str, RuleOutcome]:
     board = board_of(text, folder)
-    return by_id(on_board.on_board(board, base().components, custom(), {}, told))
+    return by_id(on_board.on_board(board, base().components, custom(), {}, told, generic()))
 
 
 def test_a_rule_that_kicad_does_not_understand_is_not_run(tmp_path: Path) -> None:
@@ -764,7 +769,9 @@ def examples(*, breaking: bool, folder: Path) -> dict[str, RuleOutcome]:
     folder.mkdir(exist_ok=True)
     board = board_of(drc_specimen.specimen(custom(), breaking=breaking), folder)
     listed: list[Component] = []
-    return by_id(on_board.on_board(board, listed, custom(), {}, kicad_drc.check(board, custom())))
+    return by_id(
+        on_board.on_board(board, listed, custom(), {}, kicad_drc.check(board, custom()), generic())
+    )
 
 
 @pytest.fixture(scope="module")

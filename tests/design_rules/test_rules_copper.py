@@ -19,6 +19,7 @@ from tests.design_rules.test_rules_board import (
     track,
     with_items,
 )
+from tests.shared.rule_cases import generic
 
 NETS = ("/v1", "/v2", "GND")
 
@@ -70,7 +71,7 @@ def segment(net: int, start: tuple[float, float], end: tuple[float, float]) -> E
 
 def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     board = board_of(text, folder)
-    return by_id(on_board.checked(board, [], custom(), {}))
+    return by_id(on_board.checked(board, [], custom(), {}, generic()))
 
 
 @pytest.mark.kicad

@@ -20,7 +20,7 @@ from tests.design_rules.test_rules_board import (
     edited,
     reference,
 )
-from tests.shared.rule_cases import base
+from tests.shared.rule_cases import base, generic
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -70,7 +70,7 @@ def written(name: str, key: str, text: str) -> str:
 def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board of the design, without KiCad."""
     found = on_board.on_board(
-        board_of(text, folder), base().components, custom(), {}, "no KiCad in this test"
+        board_of(text, folder), base().components, custom(), {}, "no KiCad in this test", generic()
     )
     return by_id(found)
 
@@ -168,6 +168,17 @@ def test_a_needed_part_that_is_left_out_is_caught(tmp_path: Path) -> None:
     caught(left_out, "part-fitted", "R4 is marked DNP", tmp_path)
     # Another mark of a footprint is not that one.
     passes(changed("R4", lambda t: t.replace("(attr smd", "(attr smd board_only")), tmp_path)
+
+
+def left_out_of(mark: str) -> Callable[[str], str]:
+    return lambda text: text.replace("(attr smd", f"(attr smd exclude_from_{mark}")
+
+
+def test_a_part_that_an_order_s_files_leave_out_is_caught(tmp_path: Path) -> None:
+    """Such a one was fitted by hand, said the read-me of an order that had no place for it."""
+    for mark, file in (("pos_files", "the position file"), ("bom", "the bill")):
+        text = changed("R4", left_out_of(mark))
+        caught(text, "part-fitted", f"R4 is left out of {file}", tmp_path)
 
 
 def test_a_part_that_the_design_leaves_out_is_caught_where_it_is_fitted(tmp_path: Path) -> None:

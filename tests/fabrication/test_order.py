@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from designer.base.sexpr import Expression, expression, expression_text, read
+from designer.board.board_facts import board_facts
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import BoardFile, PlacedFootprint, read_board
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome, Status
 from designer.catalog.design_rules import BY_ID
-from designer.fabrication.board_facts import board_facts
-from designer.fabrication.fab import fabs
+from designer.catalog.fab import fab_limits, fabs
 from designer.fabrication.kicad_plot import undated
 from designer.fabrication.order import BoardOrder, order_files, packed
 from designer.fabrication.order_refusal import accepted_failures, not_checked, refusals
@@ -62,7 +62,8 @@ def soldered(footprint: PlacedFootprint) -> bool:
 def ordered(board: BoardFile, name: str, title: str = "A board") -> dict[str, bytes]:
     (fab,) = fabs([name], CATALOG.folders)
     (layout,) = layouts([fab.table.bom], CATALOG.folders)
-    return order_files(BoardOrder("board", title, board, (), ("slew: why",)), fab, layout)
+    limits = fab_limits([name], CATALOG.folders)
+    return order_files(BoardOrder("board", title, board, (), ("slew: why",)), fab, layout, limits)
 
 
 @pytest.mark.kicad

@@ -20,6 +20,7 @@ from designer.jobs.board_routing import board_file
 from designer.routing.board_layers import with_layers
 from designer.routing.routed_board import route_board
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
+from tests.shared.rule_cases import generic
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 OFTEN = [("paper", 4), ("surface", 2)]
@@ -76,5 +77,5 @@ def nothing_is_found(board: Path, parts: Sequence[Component], rules: Sequence[Cu
     assert found["violations"] == []
     assert found["unconnected_items"] == []
     assert found["schematic_parity"] == []
-    outcomes = on_board.checked(read_board(board), parts, rules, {})
+    outcomes = on_board.checked(read_board(board), parts, rules, {}, generic())
     assert {o.rule.id: o.found for o in outcomes if o.status != PASS} == {}

@@ -60,7 +60,7 @@ def project(
     board = fitted(circuit, choice, catalog)
     found = components(board, catalog, choice)
     run = replace(RUN, initial=np.zeros(len(circuit.states)))
-    return Project(title, board, found, run, rules_text(board_rules(board)))
+    return Project(title, board, found, run, rules_text(board_rules(board)), {})
 
 
 @cache

@@ -16,6 +16,7 @@ from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
 from designer.board.pins import Pin
 from designer.catalog.design_rule import RuleOutcome
+from designer.catalog.fab import FabLimits, fab_limits
 from designer.catalog.fields import Figure
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
@@ -28,6 +29,13 @@ from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.stages import CATALOG, PAPER, bought, rectifier, stage
+
+
+@cache
+def generic() -> FabLimits:
+    """What most makers of boards make."""
+    return fab_limits([], CATALOG.folders)
+
 
 TEXT = (
     """

@@ -8,8 +8,8 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.board.bom_layouts import layouts
+from designer.catalog.fab import Fab, fabs
 from designer.catalog.read import FABS
-from designer.fabrication.fab import Fab, fabs
 from tests.shared.stages import CATALOG
 
 HEAD = 'format = 1\ntitle = "A"\nbom = "kicad"\n'
