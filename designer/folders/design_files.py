@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,6 +15,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
 from designer.base.progress import doing
+from designer.base.threads import alongside
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
@@ -72,9 +74,11 @@ def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> Non
 def write_last(folder: Folder, synthesis: Synthesis, jobs: int) -> None:
     """Write the rest of the stage: how to start each response, and ``design.json``."""
     design, responses = synthesis.design, synthesis.model_responses
-    recipes = start_recipes(synthesis, jobs)
-    folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
-    folder.write(DESIGN, dumps(answer(synthesis)))
+    with alongside(partial(start_recipes, synthesis, jobs), jobs) as recipes:
+        document = dumps(answer(synthesis))
+        text = setup_csv(design, responses, recipes(), synthesis.modelfile.si)
+    folder.write(SETUP, text)
+    folder.write(DESIGN, document)
 
 
 def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
