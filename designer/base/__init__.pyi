@@ -269,6 +269,7 @@ from .si_unit import (
     value_text as value_text,
 )
 from .threads import (
+    alongside as alongside,
     heed as heed,
     interrupt as interrupt,
     parallel as parallel,

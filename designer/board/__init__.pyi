@@ -9,8 +9,8 @@ from .board_check import (
 )
 from .board_facts import (
     BoardFacts as BoardFacts,
-    board_facts as board_facts,
     check_edge as check_edge,
+    facts_of as facts_of,
 )
 from .board_parts import (
     Designed as Designed,
@@ -77,6 +77,7 @@ from .kicad_placement import (
     place as place,
 )
 from .kicad_reader import (
+    EXCLUDED as EXCLUDED,
     PART_NUMBER as PART_NUMBER,
     TRACKS as TRACKS,
     BoardFile as BoardFile,
@@ -93,6 +94,7 @@ from .kicad_rules import (
     CustomRule as CustomRule,
     board_rules as board_rules,
     canary as canary,
+    project_rules as project_rules,
     rules_text as rules_text,
 )
 from .kicad_symbols import (

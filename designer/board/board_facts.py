@@ -70,7 +70,7 @@ def check_edge(board: BoardFile) -> None:
         raise InputError(board.path, LAYER, found, f"a closed line on {LAYER}")
 
 
-def board_facts(board: BoardFile) -> BoardFacts:
+def facts_of(board: BoardFile) -> BoardFacts:
     """The figures of a board; of one without an edge, width and height are nan (``check_edge``).
 
     Raises

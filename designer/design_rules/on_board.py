@@ -14,7 +14,7 @@ import numpy as np
 
 from designer.base.natural_sort import natural_key
 from designer.base.views import View
-from designer.board.board_facts import board_facts
+from designer.board.board_facts import facts_of
 from designer.board.component import Component
 from designer.board.footprints import footprint
 from designer.board.kicad_names import POWER, circuit_net
@@ -97,7 +97,7 @@ def on_board(
     """Every rule on a board. answer : what KiCad found, or why it was not asked. fab : what its
     maker makes."""
     by_id = {custom.id: custom for custom in rules}
-    facts = board_facts(board)
+    facts = facts_of(board)
     out = []
     for rule in _wanted():
         override = overrides.get(rule.id)

@@ -10,7 +10,7 @@ from typing import get_args
 
 from designer.base.csv_tables import csv_text
 from designer.base.seal import sha256
-from designer.board.board_facts import board_facts
+from designer.board.board_facts import facts_of
 from designer.board.bom import Line
 from designer.board.bom_layouts import Layout
 from designer.board.kicad_reader import BoardFile
@@ -72,7 +72,7 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) 
         *(f"Not checked: {rule}" for rule in order.not_checked),
         *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
     ]
-    text = notes(order.title, order.name, fab, board_facts(order.board), limits, remarks)
+    text = notes(order.title, order.name, fab, facts_of(order.board), limits, remarks)
     files[NOTES] = text.encode("utf-8")
     files[f"{order.name}-bom.html"] = bom_page(order.title, order.board, order.bought).encode(
         "utf-8"

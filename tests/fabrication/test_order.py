@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from designer.base.sexpr import Expression, expression, expression_text, read
-from designer.board.board_facts import board_facts
+from designer.board.board_facts import facts_of
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import BoardFile, PlacedFootprint, read_board
@@ -169,7 +169,7 @@ def test_equal_boards_give_equal_files_whose_hashes_are_stated(tmp_path: Path) -
 
 def test_what_a_fab_asks_is_read_from_the_board(tmp_path: Path) -> None:
     board = board_of(board_text(), tmp_path)
-    facts = board_facts(board)
+    facts = facts_of(board)
     edge = read(board.text).get("gr_rect")
     size = [edge.get("end").number(i) - edge.get("start").number(i) for i in (0, 1)]
     assert (facts.width, facts.height) == pytest.approx(size)
