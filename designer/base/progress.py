@@ -121,7 +121,6 @@ class Progress:
     _clock: Callable[[], float] = staticmethod(time.monotonic)
     _stage: ProgressStage | None = None
     _sought: Sought | None = None
-    _parts: tuple[str, ...] = ()
     _ended: threading.Event | None = None
     _token: Token[Progress | None] | None = None
 
@@ -134,18 +133,18 @@ class Progress:
     def doing(self, text: str) -> None:
         """What the stage works on just now; it is only shown where the stage lasts."""
         if self._stage is not None:
-            self._stage.detail = ", ".join(filter(None, (*self._parts, text)))
+            self._stage.detail = ", ".join(filter(None, (*_PARTS.get(), text)))
 
     def best_so_far(self, text: str, *, step: bool = False) -> None:
         """The best that is known of what is sought. step : only on the way to it, which is told
         until there is one."""
         if self._sought is not None:
-            self._sought.found[len(self._parts) + 0.5 * step] = text
+            self._sought.found[len(_PARTS.get()) + 0.5 * step] = text
 
     def forget_parts(self) -> None:
         """What was found within parts of the work that have ended is known no more."""
         if self._sought is not None:
-            found, depth = self._sought.found, len(self._parts)
+            found, depth = self._sought.found, len(_PARTS.get())
             self._sought.found = {k: text for k, text in found.items() if k <= depth}
 
     def idle(self) -> None:
@@ -194,6 +193,8 @@ class Progress:
 
 _WATCHED: ContextVar[Progress | None] = ContextVar("watched", default=None)
 """Who is told by `doing`, `part`, `note`, `seeking` and `best_so_far`."""
+_PARTS: ContextVar[tuple[str, ...]] = ContextVar("parts", default=())
+"""The parts of the work that are under way, the outermost first; a thread beside has its own."""
 
 
 def doing(text: str) -> None:
@@ -210,13 +211,12 @@ def part(text: str) -> Iterator[None]:
     if watched is None:
         yield
         return
-    above = watched._parts
-    watched._parts = (*above, text)
+    above = _PARTS.set((*_PARTS.get(), text))
     watched.doing("")
     try:
         yield
     finally:
-        watched._parts = above
+        _PARTS.reset(above)
         watched.forget_parts()
 
 

@@ -319,8 +319,8 @@ def _symmetric(curve: Curve, p: BranchPoint) -> bool:
     if curve.family.flow(p.value).system.mirror is not None:
         return curve.symmetric
     counts = read_counts(p.response)
-    even = counts is not None and counts == counts.mirrored
-    return even and curve.n % 2 == 1 and p.orbit.asymmetry < SYMMETRY_TOLERANCE
+    alike = counts is not None and counts.symmetric
+    return alike and curve.n % 2 == 1 and p.orbit.asymmetry < SYMMETRY_TOLERANCE
 
 
 def _bisect(left: Callable[[float], bool]) -> float:

@@ -113,8 +113,10 @@ def facts_of(board: BoardFile) -> BoardFacts:
 def _hole(pad: Expression) -> tuple[float, float] | None:
     """Width and height of a pad's hole [mm]; None on the surface. Only a slot states two."""
     drill = pad.find("drill")
-    sizes = [] if drill is None else [float(a) for a in drill.atoms if a != "oval"]
-    return (sizes[0], sizes[-1]) if sizes else None
+    if drill is None or not drill.atoms:
+        return None
+    first, last = int(drill.text() == "oval"), len(drill.atoms) - 1
+    return drill.number(first), drill.number(max(first, last))
 
 
 def _plated(pad: Expression) -> bool:

@@ -69,6 +69,11 @@ class Counts:
         return Counts(self.n, tuple((q, p) for p, q in self.impacts))
 
     @property
+    def symmetric(self) -> bool:
+        """Whether they are their mirror twin's too, as those of a symmetric orbit are."""
+        return self == self.mirrored
+
+    @property
     def family(self) -> Counts:
         """One and the same for both mirror twins: the lesser of the two."""
         return min(self, self.mirrored)

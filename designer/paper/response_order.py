@@ -121,4 +121,4 @@ def strays(windows: Sequence[BranchWindow], mains: Sequence[tuple[int, BranchWin
 def equal(name: str) -> int | None:
     """q of "1-q-q", or None."""
     counts = read_counts(name)
-    return counts.p if counts and counts.n == 1 and counts == counts.mirrored else None
+    return counts.p if counts and counts.n == 1 and counts.symmetric else None

@@ -38,7 +38,7 @@ def label(response: str, symmetric: bool | None) -> str:
     counts = read_counts(response)
     if counts is None or symmetric is None:
         return response
-    return f"{response} {'symmetric' if symmetric and counts == counts.mirrored else 'asymmetric'}"
+    return f"{response} {'symmetric' if symmetric and counts.symmetric else 'asymmetric'}"
 
 
 def doubled(response: str) -> str:

@@ -57,6 +57,11 @@ def test_what_no_fab_makes_fails(
     assert looked(tmp_path, item.format(keeps))[id_].status == PASS
 
 
+def test_a_hole_that_is_no_number_is_refused_with_its_place(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"some\.kicad_pcb.*wide.*a number"):
+        looked(tmp_path, HOLE.replace("(drill {0})", "(drill wide)").format(1.0))
+
+
 def test_thickness_and_layers_are_those_of_the_file(tmp_path: Path) -> None:
     thick = drawn().replace("(thickness 1.6)", "(thickness 3.2)")
     assert thick != drawn()

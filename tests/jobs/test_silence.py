@@ -13,6 +13,7 @@ import pytest
 
 from designer.base import progress
 from designer.base.progress import SILENCE, Progress, ProgressLines, Terminal, doing, part
+from designer.base.threads import alongside
 from designer.cli import entry
 from designer.jobs import study_job
 from designer.jobs.options import Options
@@ -208,6 +209,28 @@ STAGES = {
 
 
 @pytest.mark.slow
+def test_work_beside_other_work_has_parts_of_its_own() -> None:
+    """The rules of a circuit were told as the part of a start recipe, which is sought beside."""
+    inside, told = threading.Event(), threading.Event()
+
+    def beside() -> str:
+        with part("start recipe"):
+            inside.set()
+            assert told.wait(5.0)
+            doing("direct")
+            assert stage is not None
+            return stage.detail
+
+    with Progress() as watched, alongside(beside, 2) as result:
+        stage = watched._stage
+        assert stage is not None
+        assert inside.wait(5.0)
+        doing("design rules")
+        assert stage.detail == "design rules"
+        told.set()
+        assert result() == "start recipe, direct"
+
+
 def test_no_stage_of_a_run_is_silent(tmp_path: Path) -> None:
     options = Options(samples=2, jobs=2)
     with Walk() as walk:
