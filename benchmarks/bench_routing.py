@@ -26,6 +26,7 @@ from designer.board.component import components
 from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import board_rules
 from designer.catalog.design_rule import FAIL, NOT_RUN
+from designer.catalog.fab import fab_limits
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board
 from designer.folders.kicad_files import texts
@@ -145,7 +146,8 @@ def broken(made: Synthesis, routed: RoutedBoard, folder: Path) -> tuple[str, ...
     path.write_text(routed.text, encoding="utf-8")
     listed = components(circuit, made.catalog, choice)
     rules = board_rules(circuit, made.modelfile.rules)
-    outcomes = on_board.checked(read_board(path), listed, rules, {})
+    limits = fab_limits([], made.catalog.folders)
+    outcomes = on_board.checked(read_board(path), listed, rules, {}, limits)
     if all(o.status == NOT_RUN for o in outcomes if o.rule.id in ("clearance", "unconnected")):
         return None
     return tuple(o.rule.id for o in outcomes if o.status in (FAIL, NOT_RUN))
