@@ -8,8 +8,9 @@ No stage is silent: whoever is watched (``with progress:``) says every `SILENCE`
 the stage has lasted, how far it is, and what it works on just now, if nothing else was said. What
 is worked on comes from `doing` and `part`, which any function may call: they reach who is watched,
 or nobody, and so do `note` and `best_so_far`. What is sought (``with seeking:``) is told a minute
-after the search began, as good as it is known then, and each minute from there on. The same lines
-stand in the log.
+after the search began, as good as it is known then, and each minute from there on. A work of
+several stages (``with progress.whole(…):``) says beside each of them how far the whole is. The same
+lines stand in the log.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import logging
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar, Token
 from typing import TYPE_CHECKING, Self
@@ -39,6 +40,10 @@ MINUTE = 60.0
 """s between two lines about the best answer so far."""
 BEAT = 1.0
 """s between two looks at whether it was silent too long."""
+TRUST = 5.0
+"""s of usual work whose pace is taken for granted: less of it says little of the machine."""
+LONGER = 0.25
+"""A phase that has lasted longer than usual is taken to last this share of that time again."""
 
 
 class Laps:
@@ -68,7 +73,7 @@ class ProgressStage:
         self.detail = ""
         self._say, self._clock = say, clock
         self._began = self._last = clock()
-        self._done, self._lock = 0, threading.Lock()
+        self._done, self._lock = 0, threading.RLock()
 
     def step(self) -> None:
         """One more step is done."""
@@ -83,6 +88,14 @@ class ProgressStage:
         with self._lock:
             self._report(SILENCE)
 
+    @property
+    def left(self) -> float:
+        """Time that the steps which are not done will take [s]; 0 where too little is known."""
+        with self._lock:
+            if self.total is None or 10 * self._done < self.total:
+                return 0.0
+            return (self._clock() - self._began) * (self.total - self._done) / self._done
+
     def _report(self, after: float) -> None:
         now = self._clock()
         if now - self._last < after:
@@ -90,6 +103,50 @@ class ProgressStage:
         self._last, spent = now, now - self._began
         far = how_far(self._done, self.total, spent) if self._done else f"{duration(spent)} so far"
         self._say(f"  {far}" + (f": {self.detail}" if self.detail else ""))
+
+
+class WholeWork:
+    """How far a work of several phases is, each of which takes some time as a rule.
+
+    usual : that time [s], in the order of the work, by how the name of the phase's first stage
+    begins. What has ended says by how much this work is slower than usual.
+    """
+
+    def __init__(self, usual: Mapping[str, float], clock: Callable[[], float]) -> None:
+        self.usual = dict(usual)
+        self._clock = clock
+        self._began = self._phase_began = clock()
+        self._at = -1
+        self._seconds = self._expected = 0.0
+
+    def enter(self, stage: str) -> None:
+        """A stage begins: with it the phase that it is the first of, and the one before ends."""
+        names = list(self.usual)
+        place = next((i for i, name in enumerate(names) if stage.startswith(name)), self._at)
+        if place <= self._at:  # a stage of the phase, or one that is gone through again
+            return
+        now = self._clock()
+        if self._at >= 0:
+            self._seconds += now - self._phase_began
+            self._expected += self.usual[names[self._at]]
+        self._at, self._phase_began = place, now
+
+    def far(self, steps_left: float) -> tuple[float, float] | None:
+        """Share of the work that is done, and the time that is left [s]; None before the first
+        phase. steps_left : of the stage that is under way [s]."""
+        if self._at < 0:
+            return None
+        times, now = list(self.usual.values()), self._clock()
+        pace = (TRUST + self._seconds) / (TRUST + self._expected)
+        spent = now - self._phase_began
+        rest = max(times[self._at] * pace - spent, LONGER * spent, steps_left)
+        left = rest + pace * sum(times[self._at + 1 :])
+        return 1.0 - left / (self.spent + left), left
+
+    @property
+    def spent(self) -> float:
+        """Time since it began [s]."""
+        return self._clock() - self._began
 
 
 class Sought:
@@ -121,14 +178,30 @@ class Progress:
     _clock: Callable[[], float] = staticmethod(time.monotonic)
     _stage: ProgressStage | None = None
     _sought: Sought | None = None
+    _work: WholeWork | None = None
     _ended: threading.Event | None = None
     _token: Token[Progress | None] | None = None
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         """A stage begins, with ``total`` steps if that is known; call the result at each step."""
         LOG.info("%s", text)
-        self._stage = ProgressStage(total, self._say, self._clock)
+        if self._work is not None:
+            self._work.enter(text)
+        self._stage = ProgressStage(total, self._say_far, self._clock)
         return self._stage.step
+
+    @contextmanager
+    def whole(self, usual: Mapping[str, float]) -> Iterator[None]:
+        """Inside, a whole is worked on: how far it is stands beside each stage. usual : as of
+        ``WholeWork``. A whole within another one is a part of it."""
+        if self._work is not None:
+            yield
+            return
+        self._work = WholeWork(usual, self._clock)
+        try:
+            yield
+        finally:
+            self._work = None
 
     def doing(self, text: str) -> None:
         """What the stage works on just now; it is only shown where the stage lasts."""
@@ -185,6 +258,16 @@ class Progress:
     def _say(self, line: str) -> None:
         """A line about the stage."""
         LOG.info("%s", line)
+
+    def _say_far(self, line: str) -> None:
+        """A line about the stage, with how far the whole is."""
+        far = self._far()
+        self._say(line if far is None else f"{line}; whole: {in_words(*far)}")
+
+    def _far(self) -> tuple[float, float] | None:
+        """``WholeWork.far`` as it is now."""
+        left = 0.0 if self._stage is None else self._stage.left
+        return None if self._work is None else self._work.far(left)
 
     def _watch(self, ended: threading.Event) -> None:
         while not ended.wait(BEAT):
@@ -298,11 +381,14 @@ class Terminal(Progress):
         self._open: list[Callable[[], None]] = []
         self._shown: tuple[TaskID, str] | None = None
         self._drawn = 0.0
+        self._above: TaskID | None = None
+        self._drawing = threading.Lock()
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         counted = super().stage(text, total)
         text = printable(text)
         self._finish()
+        self._draw_whole()  # it stands above the stages
         bars, task = self._bars, self._bars.add_task(text, total=total, rate="")
         self._shown = task, text
 
@@ -335,6 +421,30 @@ class Terminal(Progress):
         self._finish()
         self._shown = None
 
+    def beat(self) -> None:
+        super().beat()
+        self._draw_whole()
+
+    @contextmanager
+    def whole(self, usual: Mapping[str, float]) -> Iterator[None]:
+        with super().whole(usual):
+            yield
+        with self._drawing:
+            if self._work is None and self._above is not None:
+                self._bars.update(self._above, completed=100, rate="")
+                self._above = None
+
+    def _draw_whole(self) -> None:
+        with self._drawing:
+            work, far = self._work, self._far()
+            if work is None or far is None:
+                return
+            if self._above is None:
+                self._above = self._bars.add_task("whole", total=100, rate="")
+                self._bars.tasks[-1].start_time = self._bars.get_time() - work.spent
+            left = f"about {duration(far[1])} left"
+            self._bars.update(self._above, completed=round(100.0 * far[0]), rate=left)
+
     def note(self, text: str) -> None:
         super().note(text)
         self._bars.console.print(printable(text), markup=False, highlight=False)
@@ -342,9 +452,11 @@ class Terminal(Progress):
     @contextmanager
     def aside(self) -> Iterator[None]:
         self._finish()
-        self._bars.stop()
-        for task in self._bars.task_ids:  # they stand above, and are not to be drawn again
-            self._bars.remove_task(task)
+        with self._drawing:
+            self._bars.stop()
+            for task in self._bars.task_ids:  # they stand above, and are not to be drawn again
+                self._bars.remove_task(task)
+            self._above = None
         try:
             yield
         finally:
@@ -377,6 +489,11 @@ def pace(count: int, total: int | None, seconds: float) -> str:
     if total is None or 10 * count < total:
         return rate(speed)
     return f"{rate(speed)}, {duration((total - count) / speed)} left"
+
+
+def in_words(share: float, left: float) -> str:
+    """How far a whole is. left : the time that it will still take [s]."""
+    return f"{100.0 * share:.0f} %, about {duration(left)} left"
 
 
 def duration(seconds: float) -> str:

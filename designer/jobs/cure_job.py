@@ -33,7 +33,7 @@ from designer.folders.design_source import design_inputs, design_stage, grade_in
 from designer.folders.model_source import design_inputs_of
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
-from designer.jobs import folder_numbers, rung_choice
+from designer.jobs import folder_numbers, rung_choice, usual_times
 from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
@@ -112,15 +112,17 @@ def cure(
     )
     if "yield" not in settings:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
-    return cure_into(
-        path,
-        target=settings["yield"],
-        budget=settings.get("budget"),
-        out=None if out is None else Path(out),
-        without=settings.get("without", ()),
-        options=Options(settings.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
-        progress=progress,
-    )
+    progress = Progress() if progress is None else progress
+    with progress.whole(usual_times.CURED):
+        return cure_into(
+            path,
+            target=settings["yield"],
+            budget=settings.get("budget"),
+            out=None if out is None else Path(out),
+            without=settings.get("without", ()),
+            options=Options(settings.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
+            progress=progress,
+        )
 
 
 def cure_into(

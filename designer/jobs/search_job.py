@@ -26,7 +26,7 @@ from designer.folders.design_source import grade_inputs
 from designer.folders.model_source import design_inputs_of, source
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
-from designer.jobs import folder_numbers, rung_choice
+from designer.jobs import folder_numbers, rung_choice, usual_times
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options, stated_options
 from designer.jobs.rung_choice import LEAST, SEARCH
@@ -85,7 +85,8 @@ def search(
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(Options.command, verb="search", model=name, out=place)
     progress = Progress() if progress is None else progress
-    return search_into(modelfile, folder, options, progress, command)
+    with progress.whole(usual_times.SEARCH):
+        return search_into(modelfile, folder, options, progress, command)
 
 
 def search_into(

@@ -22,7 +22,7 @@ from designer.folders import design_files, kicad_files
 from designer.folders.design_source import bills_are_of_old, design_inputs
 from designer.folders.json_answers import run_json
 from designer.folders.model_source import source
-from designer.jobs import folder_numbers, rung_choice, search_stage
+from designer.jobs import folder_numbers, rung_choice, search_stage, usual_times
 from designer.jobs.board_routing import route_own_board
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options, stated_options
@@ -171,11 +171,13 @@ def _study(
     argument = argument if isinstance(argument, ModelFile) else Path(argument)
     modelfile, folder = source(argument, out)
     options = folder_numbers.of_study(argument, folder, modelfile, options, words)
-    modelfile = search_stage.design_file(modelfile, folder, options, progress)
-    path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
     place = None if out is None else Path(out)
-    command = partial(Options.command, verb=verb, model=path, out=place)
-    return run_into(modelfile, folder, options, progress, command, shown, routed=verb == "run")
+    usual = usual_times.RUN if verb == "run" else usual_times.STUDIED
+    with progress.whole({**usual_times.of_design(modelfile), **usual}):
+        modelfile = search_stage.design_file(modelfile, folder, options, progress)
+        path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
+        command = partial(Options.command, verb=verb, model=path, out=place)
+        return run_into(modelfile, folder, options, progress, command, shown, routed=verb == "run")
 
 
 def _in_memory(

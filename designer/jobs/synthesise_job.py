@@ -22,7 +22,7 @@ from designer.folders import design_files
 from designer.folders.design_source import design_answer
 from designer.folders.json_answers import cost_of
 from designer.folders.model_source import source
-from designer.jobs import search_stage
+from designer.jobs import search_stage, usual_times
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
@@ -67,8 +67,9 @@ def synthesise(
         modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
         return _in_memory(modelfile, catalog, compare, options.workers, progress)
     modelfile, folder = source(model, out)
-    modelfile = search_stage.design_file(modelfile, folder, options, progress)
-    return synthesise_into(modelfile, folder, options, progress, compare=compare)
+    with progress.whole(usual_times.of_design(modelfile)):
+        modelfile = search_stage.design_file(modelfile, folder, options, progress)
+        return synthesise_into(modelfile, folder, options, progress, compare=compare)
 
 
 synthesize = synthesise

@@ -407,7 +407,7 @@ class Work:
         old = f", {len(asks) - new} more are there" if new < len(asks) else ""
         step: layers.Step = _no_step
         if new:
-            step = self.progress.stage(f"ngspice, {new} runs{old}", len(asks))
+            step = self.progress.stage(f"boards in ngspice, {new} runs{old}", len(asks))
         return tuple(
             layers.fill_cross_checks(
                 plan, asks, rows, self.pool, self.jobs, step, earlier=earlier, last=last

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from designer.base.progress import (
     EVERY,
     MINUTE,
+    SILENCE,
     Progress,
     ProgressLines,
     Terminal,
@@ -106,9 +108,13 @@ def test_a_terminal_shows_a_bar_with_the_time_left(monkeypatch: pytest.MonkeyPat
         unknown = progress.stage("blame")
         for _ in range(5):
             unknown()
+        with progress.whole({"design": 60.0}):
+            progress.stage("design")
+            progress.beat()
     assert "5/5" in shown.getvalue()
     assert "3/3" in shown.getvalue()
     assert " left" in shown.getvalue()
+    assert re.search(r"✓.* whole .*100/100", shown.getvalue())
 
 
 def test_what_is_printed_aside_stands_between_the_bars(capfd: pytest.CaptureFixture[str]) -> None:
@@ -125,6 +131,39 @@ def test_what_is_printed_aside_stands_between_the_bars(capfd: pytest.CaptureFixt
     assert "boards" not in said[said.index("a table") :]
     with Progress().aside():
         pass
+
+
+def test_a_whole_says_how_far_it_is_beside_each_stage(capsys: pytest.CaptureFixture[str]) -> None:
+    """A work that is twice as slow as usual in its first phase is taken to be so in the others."""
+    now = [0.0]
+
+    def later(seconds: float) -> str:
+        now[0] += seconds
+        lines.beat()
+        said = capsys.readouterr().err.splitlines()
+        return said[-1] if said else ""
+
+    usual = {"design": 100.0, "boards": 200.0, "ngspice": 100.0}
+    with ProgressLines(lambda: now[0]) as lines:
+        assert "whole" not in later(SILENCE)
+        with lines.whole(usual):
+            assert later(SILENCE) == "  0:00:20 so far: starting"  # no phase has begun
+            lines.stage("design of the paper's system")
+            assert later(20.0) == "  0:00:20 so far; whole: 7 %, about 0:06:20 left"
+            with lines.whole({"within": 1.0}):  # is a part of it
+                lines.stage("a stage within")
+            assert later(190.0) == "  0:03:10 so far; whole: 38 %, about 0:05:52 left"
+            step = lines.stage("boards, 200 of them", 200)
+            for _ in range(50):
+                step()
+            assert later(100.0).endswith("whole: 38 %, about 0:08:34 left")
+            lines.stage("report")  # of no phase: it belongs to the one that is under way
+            lines.stage("ngspice")
+            assert later(700.0).endswith("whole: 85 %, about 0:02:55 left")
+            lines.stage("design of another")
+            assert later(SILENCE).endswith("whole: 85 %, about 0:02:58 left")
+        lines.stage("one more")
+        assert later(SILENCE) == "  0:00:10 so far"
 
 
 def test_the_best_so_far_is_told_after_a_minute_and_each_minute(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import sys
@@ -11,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
+import designer
 from designer.base import progress
 from designer.base.progress import SILENCE, Progress, ProgressLines, Terminal, doing, part
 from designer.base.threads import alongside
 from designer.cli import entry
-from designer.jobs import study_job
+from designer.jobs import study_job, usual_times
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
@@ -23,6 +25,7 @@ from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
 TEXT = f'format = 1\n{PAPER_TABLE}[[response]]\nomega = 0.54\nexpect = "1-3-3"\n{COARSE_CIRCUIT}'
+PACKAGE = Path(designer.__file__).parent
 Captured = pytest.CaptureFixture[str]
 
 
@@ -201,14 +204,13 @@ STAGES = {
     "exact circuit": "",
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
     "tolerance study, 2 boards, responses: 1": "",
-    "ngspice, 4 runs": "",
+    "boards in ngspice, 4 runs": "",
     "report": "",  # the yields are written before the blame
     "blame, boards asked again": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""
 
 
-@pytest.mark.slow
 def test_work_beside_other_work_has_parts_of_its_own() -> None:
     """The rules of a circuit were told as the part of a start recipe, which is sought beside."""
     inside, told = threading.Event(), threading.Event()
@@ -231,13 +233,30 @@ def test_work_beside_other_work_has_parts_of_its_own() -> None:
         assert result() == "start recipe, direct"
 
 
+@pytest.mark.slow
 def test_no_stage_of_a_run_is_silent(tmp_path: Path) -> None:
-    options = Options(samples=2, jobs=2)
-    with Walk() as walk:
-        study_job.run_into(parse_model_file(TEXT), tmp_path / "out", options, walk, lambda _: "run")
+    options, modelfile = Options(samples=2, jobs=2), parse_model_file(TEXT)
+    usual = {**usual_times.of_design(modelfile), **usual_times.STUDIED}
+    with Walk() as walk, walk.whole(usual):
+        study_job.run_into(modelfile, tmp_path / "out", options, walk, lambda _: "run")
     assert list(walk.stages) == list(STAGES)
+    assert [next(n for n in walk.stages if n.startswith(phase)) for phase in usual] == [
+        name for name in walk.stages if name.startswith(tuple(usual))
+    ]
+    told = [line for name in list(walk.stages)[1:] for line in walk.stages[name]]
+    assert all("; whole: " in line for line in told)
     for name, wanted in STAGES.items():
         lines = walk.stages[name]
         assert any("so far" in line or "/" in line for line in lines), name
         for text in filter(None, wanted.split("|")):
             assert any(text in line for line in lines), (name, text)
+
+
+def test_each_usual_time_is_of_a_stage_that_there_is() -> None:
+    """Names of stages are texts, here as there."""
+    sources = [p for p in PACKAGE.rglob("*.py") if p.name != Path(usual_times.__file__).name]
+    nodes = [node for p in sources for node in ast.walk(ast.parse(p.read_text("utf-8")))]
+    texts = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    for phase in {**usual_times.SEARCH, **usual_times.RUN, **usual_times.CURED}:
+        # A title may be made of pieces, of which the first is no shorter than a word.
+        assert any(t.startswith(phase) or (t in phase[: len(t)] and len(t) > 4) for t in texts)

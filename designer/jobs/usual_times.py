@@ -1,0 +1,64 @@
+"""How long the phases of a verb take as a rule, for what is said of the time that is left.
+
+Wall times [s] on two cores of a system with three masses, its program compiled; the key is how the
+name of a phase's first stage begins (``WholeWork``). A work that is slower or faster than this
+says so as it goes on, so that it is the ratios that matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from designer.model.model_file import ModelFile
+
+SEARCHED: Final[Mapping[str, float]] = {
+    "windows of the responses": 1.0,
+    "designs": 120.0,
+    "exact circuit with bandwidth": 35.0,
+    "ngspice, rung": 26.0,
+    "what each lever is worth": 30.0,
+    "the design that was found": 8.0,
+}
+"""Of the search for the design of the highest yield."""
+CHOSEN: Final[Mapping[str, float]] = {"responses of the model, parts": 12.0}
+"""Of the choice of parts by the match."""
+WRITTEN: Final[Mapping[str, float]] = {
+    "files of the design": 5.0,
+    "KiCad project": 4.0,
+    "start recipes": 6.0,
+}
+"""Of the files of a design."""
+
+
+STUDIED: Final[Mapping[str, float]] = {
+    "tolerance study": 3.0,
+    "boards in ngspice": 48.0,
+    "report": 20.0,
+    "blame": 10.0,
+}
+"""Of a study of 200 boards."""
+RUN: Final[Mapping[str, float]] = {"routing": 12.0, "ngspice, equation check": 9.0, **STUDIED}
+"""Of what ``run`` does once there is a design."""
+SEARCH: Final[Mapping[str, float]] = {
+    **SEARCHED,
+    **WRITTEN,
+    "tolerance study": 28.0,
+    "report": 30.0,
+    "what limits each response": 8.0,
+    "ngspice, rung dynamic, numerics": 48.0,
+}
+"""Of the search, the study and the confirmation of a design."""
+CURED: Final[Mapping[str, float]] = {
+    "the design as it is": 10.0,
+    "linear picture": 60.0,
+    "round": 60.0,
+    "cured design": 1.0,
+    **WRITTEN,
+}
+"""Of the search for a cure."""
+
+
+def of_design(modelfile: ModelFile) -> dict[str, float]:
+    """Of the design of this model file, made and written."""
+    return {**(SEARCHED if modelfile.circuit.objective == "yield" else CHOSEN), **WRITTEN}
