@@ -17,6 +17,7 @@ import pytest
 from hypothesis import settings
 
 from tests.shared.blank_figures import blank_figures
+from tests.shared.this_process import in_this_process
 
 # Many processes read the same sources: without bytecode files each compiles all of them anew.
 sys.dont_write_bytecode = False
@@ -104,6 +105,14 @@ def pytest_make_collect_report(
     if collector.config.getoption("--no-skips"):
         _fail_if_skipped(report)
     return report
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_process() -> Iterator[None]:
+    """``tests/base/test_second_process.py`` takes it back, and so does all that starts a verb as a
+    process."""
+    with in_this_process():
+        yield
 
 
 @pytest.fixture(scope="module")

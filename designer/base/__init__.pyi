@@ -246,6 +246,10 @@ from .seal import (
     BLANK as BLANK,
     sha256 as sha256,
 )
+from .second_process import (
+    Ask as Ask,
+    other_process as other_process,
+)
 from .sexpr import (
     Atom as Atom,
     Contents as Contents,
@@ -269,7 +273,6 @@ from .si_unit import (
     value_text as value_text,
 )
 from .threads import (
-    alongside as alongside,
     heed as heed,
     interrupt as interrupt,
     parallel as parallel,

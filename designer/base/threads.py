@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import copy_context
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -37,28 +36,6 @@ def parallel(
         try:
             for future in futures:
                 yield future.result()
-        except BaseException:
-            interrupt.set()
-            raise
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def alongside(function: Callable[[], Result], jobs: int) -> Iterator[Callable[[], Result]]:
-    """function() while the block goes on, in a thread of its own, unless there is one job only:
-    then when its result is asked for. What is yielded waits for the result.
-
-    Ctrl-C, or an error in the block, stops the flows that are under way within a second.
-    """
-    if jobs == 1:
-        yield function
-        return
-    with _counted():
-        pool = ThreadPoolExecutor(1)
-        future = pool.submit(copy_context().run, function)
-        try:
-            yield future.result
         except BaseException:
             interrupt.set()
             raise

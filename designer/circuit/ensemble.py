@@ -30,7 +30,7 @@ from designer.kernels import kernel_boards as kernel
 from designer.kernels.kernel_orbit import CHAOS, DONE, FOUND, LEFT
 
 CHUNK = 32
-"""Questions that one thread takes at a time; no answer depends on it."""
+"""Questions that one thread takes at a time, at most; no answer depends on it."""
 TOGETHER = 125
 """Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
 QUICK = 3
@@ -119,10 +119,11 @@ class Ensemble:
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
+        size = _chunk(len(index), jobs)
 
         def chunk(first: int) -> list[SettledBoard]:
             heed()
-            part = slice(first, first + CHUNK)
+            part = slice(first, first + size)
             settled = self._compiled(index[part], drives[part], states[part], len(kernel.STAGES))
             for k, response in enumerate(settled):
                 if response is None:
@@ -132,7 +133,7 @@ class Ensemble:
                 progress()
             return [r for r in settled if r is not None]
 
-        chunks = parallel(chunk, range(0, len(index), CHUNK), jobs)
+        chunks = parallel(chunk, range(0, len(index), size), jobs)
         return [response for settled in chunks for response in settled]
 
     def quick(
@@ -151,15 +152,16 @@ class Ensemble:
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
+        size = _chunk(len(index), jobs)
 
         def chunk(first: int) -> list[Orbit | None]:
             heed()
-            part = slice(first, first + CHUNK)
+            part = slice(first, first + size)
             settled = self._compiled(index[part], drives[part], states[part], QUICK)
             progress()
             return [None if r is None else r.orbit for r in settled]
 
-        chunks = parallel(chunk, range(0, len(index), CHUNK), jobs)
+        chunks = parallel(chunk, range(0, len(index), size), jobs)
         return [orbit for settled in chunks for orbit in settled]
 
     def run(
@@ -387,6 +389,11 @@ def _faint(orbit: Orbit, drive: Drive) -> bool:
     if orbit.status is OrbitStatus.APERIODIC:
         return orbit.lyapunov * drive.period < FAINT
     return orbit.status is OrbitStatus.NOT_SETTLED
+
+
+def _chunk(questions: int, jobs: int) -> int:
+    """How many questions a thread takes at a time, so that there is something for each."""
+    return max(1, min(CHUNK, -(-questions // jobs)))
 
 
 def _reduced(boards: Boards, jobs: int) -> working.BoardModes:

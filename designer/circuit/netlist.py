@@ -8,9 +8,10 @@ has them, and the role they play: the term of Eq. (10) that they realise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -374,6 +375,44 @@ class Circuit:
     def _moved(self, key: tuple[int, ...], moved: Mapping[str, int]) -> tuple[int, ...]:
         pairs = zip(self.switches, key, strict=True)
         return tuple(moved.get(name, position) for name, position in pairs)
+
+    @cached_property
+    def working(self) -> tuple[tuple[int, ...], ...]:
+        """Position of each switch in the modes between which a good board moves, the open one
+        first: each clearance open, or on the way into a contact one switch after the other,
+        whatever the others do."""
+        ways = [[turned for way in stop for turned in way] for stop in self._ways]
+        return tuple(dict.fromkeys(self._turned(each) for each in product(*ways)))
+
+    @cached_property
+    def ways_in(self) -> tuple[frozenset[tuple[int, ...]], ...]:
+        """Of those the ones on the way into the same contacts, for all contacts that there may be
+        at once."""
+        return tuple(
+            frozenset(self._turned(each) for each in product(*ways))
+            for ways in product(*self._ways)
+        )
+
+    @cached_property
+    def _ways(self) -> list[list[list[dict[str, int]]]]:
+        """For each clearance the positions of its switches: open, then on the way into each
+        contact."""
+        out = []
+        for stop in self.stops:
+            ways: list[list[dict[str, int]]] = [[{}]]
+            for _, contact in stop.contacts:
+                turned: dict[str, int] = {}
+                way = []
+                for switch, position in ((contact.switch, contact.position), *contact.others):
+                    turned = {**turned, switch: position}
+                    way.append(turned)
+                ways.append(way)
+            out.append(ways)
+        return out
+
+    def _turned(self, turned: Iterable[Mapping[str, int]]) -> tuple[int, ...]:
+        """Position of each switch with every clearance open, but for these."""
+        return self._moved(self.open, {name: at for each in turned for name, at in each.items()})
 
     def may_limit(self, section: Section, position: int) -> bool:
         """Whether a section may stand at this limit, 1 upper or -1 lower: those of the dead-zone

@@ -20,7 +20,6 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import NodalEquations, Solution
 from designer.circuit.nodal_bandwidth import LaggingEquations
 from designer.circuit.stop import Stop
-from designer.circuit.working_modes import working_keys
 from designer.dynamics.piecewise_linear import (
     Guard,
     Mode,
@@ -88,7 +87,7 @@ class Reduction:
             mirror=self._equations.mirror if self._even() else None,
             reflection=self._equations.mirror,
             continuous=self._equations.states == c.states,
-            working=working_keys(c),
+            working=c.working,
         )
 
     def state(self, capacitors: Array) -> Array:

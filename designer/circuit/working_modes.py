@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -19,57 +18,16 @@ from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
 from designer.kernels import kernel_mode_tables as kernel
 
 
-def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
-    """Keys of the modes between which a good board moves, the open one first: each clearance
-    open, or on the way into a contact one switch after the other, whatever the others do."""
-    ways = [[turned for way in stop for turned in way] for stop in _ways(circuit)]
-    return tuple(dict.fromkeys(_key(circuit, turned) for turned in product(*ways)))
-
-
-def keys_beside(circuit: Circuit, key: ModeKey) -> frozenset[ModeKey]:
-    """Keys of the working modes on the way into the same contacts as this one: a board that enters
-    one of them mostly enters the others."""
-    for ways in product(*_ways(circuit)):
-        keys = frozenset(_key(circuit, turned) for turned in product(*ways))
-        if key in keys:
-            return keys
-    return frozenset()
-
-
-def _ways(circuit: Circuit) -> list[list[list[dict[str, int]]]]:
-    """For each clearance the positions of its switches: open, then on the way into each contact."""
-    out = []
-    for stop in circuit.stops:
-        ways: list[list[dict[str, int]]] = [[{}]]
-        for _, contact in stop.contacts:
-            turned: dict[str, int] = {}
-            way = []
-            for switch, position in ((contact.switch, contact.position), *contact.others):
-                turned = {**turned, switch: position}
-                way.append(turned)
-            ways.append(way)
-        out.append(ways)
-    return out
-
-
 def first_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
-    """Of those the ones in which at most one clearance is not open: others are solved for the
-    boards that enter them."""
+    """Keys of the working modes in which at most one clearance is not open: others are solved for
+    the boards that enter them."""
 
     def moved(key: ModeKey) -> int:
         pairs = zip(circuit.switches, key, circuit.open, strict=True)
         turned = {name for name, here, there in pairs if here != there}
         return sum(not turned.isdisjoint(stop.switches) for stop in circuit.stops)
 
-    return tuple(key for key in working_keys(circuit) if moved(key) <= 1)
-
-
-def _key(circuit: Circuit, turned: Iterable[Mapping[str, int]]) -> ModeKey:
-    """The key with every clearance open, but for these switches."""
-    positions = dict(zip(circuit.switches, circuit.open, strict=True))
-    for each in turned:
-        positions |= each
-    return tuple(positions[name] for name in circuit.switches)
+    return tuple(key for key in circuit.working if moved(key) <= 1)
 
 
 @dataclass(frozen=True)
@@ -127,7 +85,7 @@ class BoardModes:
 
     def __init__(self, boards: Boards) -> None:
         circuit, self._boards = boards.circuit, boards
-        self.targets = GuardTargets(working_keys(circuit))
+        self.targets = GuardTargets(circuit.working)
         between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
         self.modes = empty_modes(
             len(boards), 0, len(circuit.states), len(circuit.stops), 0, between
@@ -170,14 +128,16 @@ class BoardModes:
         return out
 
     def enter(self, keys: Iterable[ModeKey]) -> None:
-        """Solve these working modes and those beside them."""
-        beside = (keys_beside(self._boards.circuit, key) for key in keys)
+        """Solve these working modes, and those on the way into the same contacts: a board that
+        enters one of them mostly enters the others."""
+        ways = self._boards.circuit.ways_in
+        beside = (next((way for way in ways if key in way), frozenset()) for key in keys)
         self.add(sorted(frozenset().union(*beside)))
 
     def enter_all(self) -> bool:
         """Solve all working modes; returns whether one was not there yet."""
         before = len(self.targets.keys)
-        self.add(working_keys(self._boards.circuit))
+        self.add(self._boards.circuit.working)
         return len(self.targets.keys) > before
 
     def add(self, keys: Iterable[ModeKey]) -> None:

@@ -78,12 +78,18 @@ def fill(
             rows_of_terms(augmented_row(past, drive), powers, tables.depth[i, j])
     for r, row in enumerate(watched):
         rows_of_terms(augmented_row(row, drive), powers, tables.watched[i, r])
-    for g, guard in enumerate(mode.guards):
-        row, taylor = np.concatenate([guard.C, [guard.D, guard.e]]), tables.guard[i, g]
-        rows_of_terms(augmented_row(row, drive), powers, taylor)
-        tables.chord[i, g] = CHORD @ np.abs(taylor) * (1.0 + 1e-9)
-        tables.target[i, g] = -1
-        tables.clearance[i, g] = guard.clearance
+    count, taylors = len(mode.guards), tables.guard[i]
+    if count:
+        C, D, e = mode.guard_rows
+        ahead = np.column_stack(
+            [C, D * drive.amplitude, np.zeros(count), e + D * drive.offset]
+        )  # as of ``augmented_row``
+        for g in range(count):
+            rows_of_terms(ahead[g], powers, taylors[g])
+        chords = np.einsum("k,gkj->gj", CHORD, np.abs(taylors[:count]))
+        tables.chord[i, :count] = chords * (1.0 + 1e-9)
+        tables.target[i, :count] = -1
+        tables.clearance[i, :count] = [guard.clearance for guard in mode.guards]
 
 
 def empty_tables(

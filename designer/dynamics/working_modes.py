@@ -100,12 +100,13 @@ class GuardTargets:
         self.keys: list[ModeKey] = []
         self._working = frozenset(working)
         self._beyond: list[list[ModeKey]] = []
+        self._guards_of: dict[ModeKey, list[tuple[int, int]]] | None = None
 
     def copy(self) -> GuardTargets:
         """The same, to which modes may be added apart from these."""
-        out = GuardTargets(self._working)
+        out = GuardTargets(())
         out.numbers, out.keys = dict(self.numbers), list(self.keys)
-        out._beyond = list(self._beyond)
+        out._working, out._beyond = self._working, list(self._beyond)
         return out
 
     def may_enter(self, key: ModeKey) -> bool:
@@ -114,15 +115,28 @@ class GuardTargets:
 
     def add(self, modes: kernel.Modes, key: ModeKey, beyond: list[ModeKey]) -> int:
         """Give the next mode its key and the keys beyond its guards; its number."""
+        guards_of = self._before()
         number = self.numbers[key] = len(self.keys)
         self.keys.append(key)
         self._beyond.append(beyond)
         modes.guards[number] = len(beyond)
-        for m, targets in enumerate(self._beyond):
-            for g, target in enumerate(targets):
-                unknown = kernel.UNBUILT if self.may_enter(target) else kernel.FAR
-                modes.target[m, g] = self.numbers.get(target, unknown)
+        for g, target in enumerate(beyond):
+            guards_of.setdefault(target, []).append((number, g))
+            unknown = kernel.UNBUILT if self.may_enter(target) else kernel.FAR
+            modes.target[number, g] = self.numbers.get(target, unknown)
+        for m, g in guards_of.get(key, ()):
+            modes.target[m, g] = number
         return number
+
+    def _before(self) -> dict[ModeKey, list[tuple[int, int]]]:
+        """The guards before each mode, known or not, as (number, guard); listed on first use, for
+        most copies get no mode."""
+        if self._guards_of is None:
+            self._guards_of = {}
+            for m, targets in enumerate(self._beyond):
+                for g, target in enumerate(targets):
+                    self._guards_of.setdefault(target, []).append((m, g))
+        return self._guards_of
 
     def beyond(self, number: int, guard: int) -> ModeKey:
         """Key of the mode beyond a guard."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
+from designer.base.second_process import Ask
 from designer.base.units import distinct_texts
 from designer.check import checked_design
 from designer.circuit.design import Design, settings
@@ -82,9 +83,11 @@ def _start(recipe: Recipe | None, si: SiScales | None) -> str:
     return (recipe if si is None else replace(recipe, hertz_scale=si.hertz(1.0))).text
 
 
-def start_recipes(synthesis: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
+def start_recipes(
+    synthesis: Synthesis, jobs: int = 1, other: Ask | None = None
+) -> tuple[Recipe | None, ...]:
     """A start recipe for each response of a design, found on its circuit; None where the model or
-    the nominal circuit does not show it."""
+    the nominal circuit does not show it. other : as of ``find_recipes``."""
     checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
     indices = [
         i
@@ -99,7 +102,7 @@ def start_recipes(synthesis: Synthesis, jobs: int = 1) -> tuple[Recipe | None, .
         samples=1,  # neither this nor the seed matters to a recipe
         seed=0,
     )
-    recipe_of = dict(zip(indices, find_recipes(plan, jobs), strict=True))
+    recipe_of = dict(zip(indices, find_recipes(plan, jobs, other), strict=True))
     return tuple(recipe_of.get(i) for i in range(len(checked)))
 
 

@@ -25,24 +25,20 @@ def names(modelfile: ModelFile) -> list[str]:
 
 
 def texts(synthesis: Synthesis) -> dict[str, str]:
-    """The content of all but the picture, by name.
+    """The content of all but the drawing, by name.
 
     Raises
     ------
     InputError : a case, a part or a layout that the catalogue does not have.
     Unreachable : a value that cannot be bought.
     """
-    # With matplotlib, which nothing before this needs.
-    from designer.schematic import schematic_drawing
-
-    doing("bill of materials, drawing")
+    doing("bill of materials")
     circuit, choice = board_circuit(synthesis)
     parts = components(circuit, synthesis.catalog, choice)
     cost = cost_or_none(synthesis)
     notes = board_notes.markdown(synthesis, circuit, choice, parts)
     return {
         NOTES: notes if cost is None else f"{notes}\n{cost_markdown(cost)}",
-        DRAWING: schematic_drawing.svg(circuit, synthesis.modelfile.title, pin_numbers(parts)),
         **_bills(synthesis, parts, choice),
     }
 
@@ -69,11 +65,15 @@ def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice
     }
 
 
-def picture(synthesis: Synthesis) -> bytes:
-    """The drawing once more, as points."""
-    from designer.schematic import schematic_drawing
+def drawing(synthesis: Synthesis) -> dict[str, str | bytes]:
+    """The drawing, as lines and as points, by name."""
+    from designer.schematic import schematic_drawing  # with matplotlib, which all else needs not
 
     doing("drawing")
     circuit, choice = board_circuit(synthesis)
     numbers = pin_numbers(components(circuit, synthesis.catalog, choice))
-    return schematic_drawing.png(circuit, synthesis.modelfile.title, numbers=numbers)
+    title = synthesis.modelfile.title
+    return {
+        DRAWING: schematic_drawing.svg(circuit, title, numbers),
+        PICTURE: schematic_drawing.png(circuit, title, numbers=numbers),
+    }

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,8 +13,7 @@ from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
-from designer.base.progress import doing
-from designer.base.threads import alongside
+from designer.base.second_process import Ask
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
@@ -51,8 +49,8 @@ def check(modelfile: ModelFile, catalog: Catalog) -> None:
 
 
 def texts(synthesis: Synthesis) -> dict[str, str]:
-    """Every file of the design stage but ``setup.csv`` and ``design.json``; made before the folder
-    is touched."""
+    """Every file of the design stage but the drawing, ``setup.csv`` and ``design.json``; made
+    before the folder is touched."""
     modelfile, design = synthesis.modelfile, synthesis.design
     return {
         MODEL: modelfile.text,
@@ -62,23 +60,28 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     }
 
 
-def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:
-    """Write what is known without a look at how the circuit moves. files : ``texts``."""
-    for name, text in files.items():
-        folder.write(name, text)
-    folder.write(board_files.PICTURE, board_files.picture(synthesis))
+def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str | bytes]) -> None:
+    """Write what is known without a look at how the circuit moves. files : ``texts``, and the
+    drawing."""
+    for name, content in files.items():
+        folder.write(name, content)
     if synthesis.modelfile.measured is not None:
         folder.write(MEASURED, synthesis.modelfile.measured.content)
 
 
-def write_last(folder: Folder, synthesis: Synthesis, jobs: int) -> None:
-    """Write the rest of the stage: how to start each response, and ``design.json``."""
+def write_last(
+    folder: Folder,
+    synthesis: Synthesis,
+    jobs: int,
+    other: Ask,
+    found: Callable[[], Mapping[str, Any]],
+) -> None:
+    """Write the rest of the stage: how to start each response, and ``design.json``. other : as of
+    ``find_recipes``. found : waits for the design's ``findings``."""
     design, responses = synthesis.design, synthesis.model_responses
-    with alongside(partial(start_recipes, synthesis, jobs), jobs) as recipes:
-        document = dumps(answer(synthesis))
-        text = setup_csv(design, responses, recipes(), synthesis.modelfile.si)
-    folder.write(SETUP, text)
-    folder.write(DESIGN, document)
+    recipes = start_recipes(synthesis, jobs, other)
+    folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
+    folder.write(DESIGN, dumps(_answer(synthesis, found())))
 
 
 def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
@@ -91,6 +94,10 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
 
 def answer(synthesis: Synthesis) -> dict[str, Any]:
     """The JSON object of ``design.json``."""
+    return _answer(synthesis, findings(synthesis))
+
+
+def _answer(synthesis: Synthesis, found: Mapping[str, Any]) -> dict[str, Any]:
     cost = cost_or_none(synthesis)
     document = synthesis_json(
         synthesis.modelfile,
@@ -102,9 +109,7 @@ def answer(synthesis: Synthesis) -> dict[str, Any]:
     )
     if synthesis.stage_reason:
         document["dead_zone"]["reason"] = synthesis.stage_reason
-    document |= {"board_cost": None if cost is None else cost.as_dict()}
-    doing("design rules of the circuit")
-    return document | findings(synthesis)
+    return {**document, "board_cost": None if cost is None else cost.as_dict(), **found}
 
 
 def design_provenance(synthesis: Synthesis) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.schema import one_of
+from designer.base.second_process import other_process
 from designer.centering.cure_branch import KINDS, cured, kind_named
 from designer.centering.cure_measure import Book
 from designer.centering.cure_result_json import cure_json, front_csv
@@ -257,7 +258,8 @@ def _write_design(
         synthesis.modelfile, design_inputs(synthesis.modelfile, synthesis.catalog)
     )
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
-        write_design(folder, synthesis, stages, options, progress)
+        with other_process(options.workers) as other:
+            write_design(folder, synthesis, stages, options, progress, other)
 
 
 def _checked(target: float, budget: float | None, without: Collection[str]) -> frozenset[str]:

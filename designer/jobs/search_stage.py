@@ -16,6 +16,7 @@ from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.base.second_process import other_process
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
 from designer.centering.answer_cache import AnswerCache
@@ -113,7 +114,8 @@ def searched_into(
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)
     synthesis = replace(searched.synthesis, modelfile=final, seconds=time.perf_counter() - began)
     stages = design_stage(final, design_inputs(final, catalog))
-    write_design(folder, synthesis, stages, options, progress)
+    with other_process(options.workers) as other:
+        write_design(folder, synthesis, stages, options, progress, other)
     if trade is not None:
         trade = {**trade, "model": final.sha256}
     cost = {"seconds": time.perf_counter() - began}

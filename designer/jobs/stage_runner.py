@@ -14,14 +14,19 @@ from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
+from designer.base.second_process import Ask, other_process
 from designer.catalog.catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
-from designer.folders import design_files, kicad_files
+from designer.folders import board_files, design_files, kicad_files
+from designer.folders.design_findings import findings
 from designer.folders.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, naming
+
+WRITING = "designer.schematic.schematic_drawing", "designer.folders.design_findings"
+"""Modules that are imported while the parts are chosen, and needed once they stand."""
 
 
 class StageRunner:
@@ -81,12 +86,14 @@ class StageRunner:
         stages = {stage: self.stages[stage] for stage in self.todo}
         if "design" in stages:
             self.progress.stage("responses of the model, parts")
-            with compiling_ahead(self.options.jobs or cores()) as compiled:
-                synthesis = stage_choice.synthesise(
-                    self.modelfile, self.catalog, jobs=self.options.workers
-                )
+            jobs = self.options.workers
+            with (
+                compiling_ahead(self.options.jobs or cores()) as compiled,
+                other_process(jobs, *WRITING) as other,
+            ):
+                synthesis = stage_choice.synthesise(self.modelfile, self.catalog, jobs=jobs)
                 compiled()
-                write_design(self.folder, synthesis, stages, self.options, self.progress)
+                write_design(self.folder, synthesis, stages, self.options, self.progress, other)
         else:
             synthesis = design_files.load(self.folder, self.modelfile, self.catalog)
             if stages:
@@ -95,19 +102,26 @@ class StageRunner:
 
 
 def write_design(
-    folder: Folder, synthesis: Synthesis, stages: Stages, options: Options, progress: Progress
+    folder: Folder,
+    synthesis: Synthesis,
+    stages: Stages,
+    options: Options,
+    progress: Progress,
+    other: Ask,
 ) -> None:
     """Write a design and its KiCad project, what takes longest at the end: parts can be looked at
-    while start recipes are sought. stages : that begin now, the design among them."""
+    while start recipes are sought. stages : that begin now, the design among them. other : draws
+    and looks at the design rules, since both are work of one core."""
     progress.stage("files of the design")
     with naming(synthesis.modelfile):
         files = design_files.texts(synthesis)
+        drawing, found = other(board_files.drawing, synthesis), other(findings, synthesis)
     inputs = stages["design"][0]
     project = kicad_files.beside(folder, synthesis, inputs, options.overwrite, progress)
     folder.begin(stages, design_files.design_provenance(synthesis))
-    design_files.write(folder, synthesis, files)
+    design_files.write(folder, synthesis, {**files, **drawing()})
     # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
     progress.stage("start recipes, design rules of the circuit")
-    design_files.write_last(folder, synthesis, options.workers)
+    design_files.write_last(folder, synthesis, options.workers, other, found)
     folder.finish("design")

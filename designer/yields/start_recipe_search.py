@@ -6,12 +6,15 @@ a person does with a generator.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
 from designer.base.progress import doing, part
+from designer.base.second_process import Ask
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit
@@ -53,16 +56,53 @@ ABOVE = 1.1
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
-def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
-    """A recipe for each question of the plan; its seed and number of samples do not matter."""
+def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tuple[Recipe, ...]:
+    """A recipe for each question of the plan; its seed and number of samples do not matter.
+
+    other : a process that takes every other question, or half of the trials of a single one; no
+    recipe depends on it.
+    """
+    count = len(plan.questions)
+    if other is None or jobs < 2 or not count:
+        return tuple(_named(bench, n, count) for n, bench in enumerate(_benches(plan, jobs)))
+    pickled, here, there = pickle.dumps(plan), jobs - jobs // 2, jobs // 2
+    benches = _benches(plan, here)
+    if count == 1:
+        elsewhere = partial(other, _worked_there, pickled, there)
+        return (_named(replace(benches[0], elsewhere=elsewhere), 0, count),)
+    waiting = {n: other(_found_there, pickled, there, n) for n in range(1, count, 2)}
+    mine = {n: _named(benches[n], n, count) for n in range(0, count, 2)}
+    return tuple(waiting[n]() if n in waiting else mine[n] for n in range(count))
+
+
+def _named(bench: _Bench, number: int, count: int) -> Recipe:
+    with part(f"start recipe of response {number + 1} of {count}"):
+        return _find(bench)
+
+
+def _benches(plan: StudyPlan, jobs: int) -> tuple[_Bench, ...]:
+    """Where the recipes of each question are tried."""
     nominal = Ensemble(plan.nominal())
     drawn = draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL)
     sample = Ensemble(plan.modelled(drawn))
-    recipes = []
-    for number, question in enumerate(plan.questions, start=1):
-        with part(f"start recipe of response {number} of {len(plan.questions)}"):
-            recipes.append(_find(question, nominal, sample, jobs))
-    return tuple(recipes)
+    return tuple(_Bench(question, nominal, sample, jobs) for question in plan.questions)
+
+
+@lru_cache(maxsize=1)
+def _benches_of(pickled: bytes, jobs: int) -> tuple[_Bench, ...]:
+    return _benches(pickle.loads(pickled), jobs)
+
+
+def _worked_there(
+    pickled: bytes, jobs: int, are_samples: bool, trials: Sequence[_Trial]
+) -> list[bool]:
+    """``_Bench.worked`` of a plan's one question, for a process that is asked often about it."""
+    return _benches_of(pickled, jobs)[0].worked(are_samples, trials)
+
+
+def _found_there(pickled: bytes, jobs: int, number: int) -> Recipe:
+    """The recipe of the question of this number, for a process that is asked about several."""
+    return _find(_benches_of(pickled, jobs)[number])
 
 
 def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Recipe]:
@@ -139,54 +179,84 @@ class _Trials:
 
 
 @dataclass(frozen=True)
+class _Trial:
+    """A start that is tried. known : the board's own orbit, if it attracts."""
+
+    board: int
+    recipe: Recipe
+    phase: float
+    known: Orbit | None
+
+
+@dataclass(frozen=True)
 class _Bench:
     """Where the recipes of a question are tried. able : sample boards that show it as built, with
-    the orbits that they show."""
+    the orbits that they show. elsewhere : ``worked`` by another process; what it gives waits for
+    the answer."""
 
     question: Question
     nominal: Ensemble
     sample: Ensemble
-    able: Mapping[int, Orbit]
     jobs: int
+    able: Mapping[int, Orbit] = field(default_factory=dict)
+    elsewhere: Callable[[bool, Sequence[_Trial]], Callable[[], list[bool]]] | None = None
 
     def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
         """From the first ``count`` phases, without those that were tried before."""
-        rest = range(len(trials.nominal), count)
-        starts = [(0, self.question, trials.recipe, phase(k)) for k in rest]
         own = self.question.start
-        known = [own if own.radius < 1.0 else None] * len(starts)
-        more = self._worked(self.nominal, starts, known)
-        return replace(trials, nominal=(*trials.nominal, *more))
+        known = own if own.radius < 1.0 else None
+        starts = [
+            _Trial(0, trials.recipe, phase(k), known) for k in range(len(trials.nominal), count)
+        ]
+        return replace(trials, nominal=(*trials.nominal, *self._shared(False, starts)))
 
     def on_boards(self, trials: _Trials, boards: int = BOARDS, each: int = STARTS) -> _Trials:
         """On the first ``boards`` able ones, from the first ``each`` phases of each."""
         able = list(self.able.items())[:boards]
         starts = [
-            (i, self.question, trials.recipe, phase(STARTS * i + k))
+            _Trial(i, trials.recipe, phase(STARTS * i + k), orbit)
             for k in range(each)
-            for i, _ in able
+            for i, orbit in able
         ]
-        known = [orbit for _ in range(each) for _, orbit in able]
-        return replace(trials, boards=self._worked(self.sample, starts, known))
+        return replace(trials, boards=tuple(self._shared(True, starts)))
 
-    def _worked(
-        self,
-        ensemble: Ensemble,
-        starts: Sequence[tuple[int, Question, Recipe, float]],
-        known: Sequence[Orbit | None],
-    ) -> tuple[bool, ...]:
-        ends = switched_on(ensemble, starts, self.jobs, known, brief=True)
-        return tuple(end.verdict is Verdict.OK for end in ends)
+    def _shared(self, are_samples: bool, trials: Sequence[_Trial]) -> list[bool]:
+        """``worked``, half of it elsewhere: by boards, for the starts of one share its tables."""
+        boards = list(dict.fromkeys(t.board for t in trials))
+        if self.elsewhere is None or len(trials) < 2:
+            return self.worked(are_samples, trials)
+        others = set(boards[1::2])
+        away = [t.board in others if others else k % 2 == 1 for k, t in enumerate(trials)]
+        halves = [
+            [t for t, at in zip(trials, away, strict=True) if at is is_away]
+            for is_away in (False, True)
+        ]
+        there = self.elsewhere(are_samples, halves[1])
+        found = iter(self.worked(are_samples, halves[0])), iter(there())
+        return [next(found[is_away]) for is_away in away]
+
+    def worked(self, are_samples: bool, trials: Sequence[_Trial]) -> list[bool]:
+        """Whether each of these starts leads to the response. are_samples : on the sample boards,
+        not the nominal one."""
+        ends = switched_on(
+            self.sample if are_samples else self.nominal,
+            [(t.board, self.question, t.recipe, t.phase) for t in trials],
+            self.jobs,
+            [t.known for t in trials],
+            brief=True,
+        )
+        return [end.verdict is Verdict.OK for end in ends]
 
 
-def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
+def _find(bench: _Bench) -> Recipe:
+    question, sample = bench.question, bench.sample
     start = question.start.start
     cases: list[Case] = [(i, question, question.excitation, start) for i in range(BOARDS)]
-    as_built = enumerate(settled(sample, cases, jobs, brief=True))
+    as_built = enumerate(settled(sample, cases, bench.jobs, brief=True))
     able = {i: orbit for i, (orbit, verdict, _) in as_built if verdict is Verdict.OK}
-    bench = _Bench(question, nominal, sample, able, jobs)
+    bench = replace(bench, able=able)
     every: list[_Trials] = []
-    for option in candidates(question, nominal.reduction(0).system()):
+    for option in candidates(question, bench.nominal.reduction(0).system()):
         doing(str(option.way))
         trials = _Trials(replace(option, boards=BOARDS, able=len(able)))
         trials = bench.on_nominal(trials, FEW_TRIALS)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.base.threads import alongside, interrupt, parallel
+from designer.base.threads import interrupt, parallel
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
@@ -227,28 +227,4 @@ def test_leaving_the_iterator_stops_the_threads() -> None:
     assert next(results) == 0
     results.close()  # type: ignore[attr-defined]
     assert time.monotonic() - began < PROMPT
-    assert not interrupt.is_set()
-
-
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_work_goes_on_beside_other_work(jobs: int) -> None:
-    """With one job it is done when it is asked for. An error in the block stops its flows."""
-    begun = threading.Event()
-
-    def work() -> int:
-        begun.set()
-        return 7
-
-    with alongside(work, jobs) as result:
-        assert begun.wait(5.0) if jobs > 1 else not begun.is_set()
-        assert result() == 7
-
-    def stopped() -> None:
-        begun.set()
-        assert interrupt.wait(30.0)
-
-    begun.clear()
-    with pytest.raises(ZeroDivisionError), alongside(stopped, 2):  # noqa: PT012
-        assert begun.wait(5.0)
-        raise ZeroDivisionError
     assert not interrupt.is_set()

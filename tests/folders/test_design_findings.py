@@ -69,7 +69,7 @@ def test_a_design_is_told_first_and_its_files_are_there_before_its_starts(
     model.write_text(SMALL + LOW_SWING, encoding="utf-8")
     there: list[bool] = []
 
-    def starts(made: Any, jobs: int) -> list[None]:
+    def starts(made: Any, *_: object) -> list[None]:
         names = ("bom.csv", "circuit.cir", "schematic.svg", "scales.csv")
         there.extend((out / name).is_file() for name in names)
         assert "\nparts stand after" in capfd.readouterr().err
@@ -111,7 +111,7 @@ def test_starts_that_are_interrupted_are_sought_again(
     words = ["synthesise", str(model), "--out", str(out)]
     assert entry.status(words) == 130
     assert not (out / "design.json").exists()
-    monkeypatch.setattr(design_files, "start_recipes", lambda made, _: [None])
+    monkeypatch.setattr(design_files, "start_recipes", lambda made, *_: [None])
     assert entry.status(words) == 2  # unfinished: only --resume goes on
     assert entry.status([*words, "--resume"]) == 0
     assert (out / "design.json").is_file()

@@ -15,7 +15,6 @@ import pytest
 import designer
 from designer.base import progress
 from designer.base.progress import SILENCE, Progress, ProgressLines, Terminal, doing, part
-from designer.base.threads import alongside
 from designer.cli import entry
 from designer.jobs import study_job, usual_times
 from designer.jobs.options import Options
@@ -197,9 +196,9 @@ class Walk(ProgressLines):
 STAGES = {
     "ngspice": "",
     "responses of the model, parts": "swing|integrators|dead zone|cost",
-    "files of the design": "drawing",
-    "KiCad project": "drawing",
-    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct|rules",
+    "files of the design": "bill",
+    "KiCad project": "",
+    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct",
     "ngspice, equation check": "6 of 6 runs",
     "exact circuit": "",
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
@@ -209,28 +208,6 @@ STAGES = {
     "blame, boards asked again": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""
-
-
-def test_work_beside_other_work_has_parts_of_its_own() -> None:
-    """The rules of a circuit were told as the part of a start recipe, which is sought beside."""
-    inside, told = threading.Event(), threading.Event()
-
-    def beside() -> str:
-        with part("start recipe"):
-            inside.set()
-            assert told.wait(5.0)
-            doing("direct")
-            assert stage is not None
-            return stage.detail
-
-    with Progress() as watched, alongside(beside, 2) as result:
-        stage = watched._stage
-        assert stage is not None
-        assert inside.wait(5.0)
-        doing("design rules")
-        assert stage.detail == "design rules"
-        told.set()
-        assert result() == "start recipe, direct"
 
 
 @pytest.mark.slow

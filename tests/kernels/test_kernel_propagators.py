@@ -162,7 +162,7 @@ def test_boards_reduced_together_are_the_single_reductions(kind: str) -> None:
     boards = draw_many(circuit, SPREAD, 5, range(6))
     found = working.BoardModes(boards)
     assert found.good.all()
-    keys, modes = working.working_keys(circuit), found.modes
+    keys, modes = circuit.working, found.modes
     assert found.targets.keys == list(keys)
     for index in range(len(boards)):
         system = Reduction(circuit, boards.board(index)).system()

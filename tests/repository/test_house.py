@@ -69,11 +69,11 @@ LAZY = {
 REACH = {
     "simulate_job": 24_000,
     "bifurcation_job": 30_000,
-    "rules_job": 51_000,
+    "rules_job": 51_300,
     "stage_runner": 52_000,
     "bench_job": 54_000,
     "trade_job": 56_000,
-    "export_job": 56_500,
+    "export_job": 56_600,
     "cure_job": 58_500,
     "synthesise_job": 60_500,
     "study_job": 62_500,

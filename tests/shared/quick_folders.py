@@ -10,6 +10,7 @@ import pytest
 from designer.base.progress import Progress
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
+from designer.jobs import stage_runner
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
@@ -19,12 +20,13 @@ from designer.yields.start_recipe import Recipe
 def without_starts(patched: pytest.MonkeyPatch) -> None:
     """No way to start any response is sought; ``setup.csv`` says so. No rule is looked at."""
 
-    def none(made: Synthesis, jobs: int) -> list[Recipe | None]:
+    def none(made: Synthesis, jobs: int, other: object) -> list[Recipe | None]:
         return [None] * len(made.model_responses)
 
     patched.setattr(design_files, "start_recipes", none)
     nothing: dict[str, list[str]] = {"warnings": [], "failed_rules": []}
-    patched.setattr(design_files, "findings", lambda _: nothing)
+    for module in (design_files, stage_runner):
+        patched.setattr(module, "findings", lambda _: nothing)
 
 
 def quick_folder(text: str, out: Path) -> Path:

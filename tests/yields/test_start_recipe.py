@@ -10,6 +10,7 @@ from itertools import pairwise
 import pytest
 
 from designer.base.proportion import wilson
+from designer.base.second_process import other_process
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
@@ -280,8 +281,13 @@ def test_recipes_found_keep_their_word_at_other_phases() -> None:
         by_hand = replace(found[0], steps=found[0].steps * HOLD, hold=periods)
         starts = [(0, question(1), by_hand, 0.1 + 0.77 * k) for k in range(8)]
         assert {e.verdict for e in switched_on(nominal(1), starts)} == {Verdict.OK}
-    other = replace(of, seed=99, samples=1000, questions=of.questions[1:])
-    assert find_recipes(other, 1) == found[1:]
+    third = replace(of, seed=99, samples=1000, questions=of.questions[1:])
+    assert find_recipes(third, 1) == found[1:]
+    # A second process changes nothing, whether it takes a recipe or half of the trials of one.
+    first = replace(of, questions=of.questions[:1])
+    with other_process(2) as other:
+        assert find_recipes(of, 2, other) == found
+        assert find_recipes(first, 2, other) == found[:1]
 
 
 def test_one_recipe_beats_another_by_more_than_chance() -> None:
@@ -375,9 +381,7 @@ def test_recipes_are_tried_on_boards_that_no_study_has(
     """Not those of the seed 0, nor of one that the search once had for its own."""
     of = replace(plan(3), seed=seed)
     tried: list[Ensemble] = []
-    monkeypatch.setattr(
-        start_recipe_search, "_find", lambda _q, _n, sample, _j: tried.append(sample)
-    )
+    monkeypatch.setattr(start_recipe_search, "_find", lambda bench: tried.append(bench.sample))
     find_recipes(of)
     theirs = draw_many(of.circuit, of.spread, seed, range(start_recipe_search.BOARDS))
     for name, values in theirs.values.items():

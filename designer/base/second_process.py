@@ -1,0 +1,108 @@
+"""A second Python process for work that holds the interpreter, which threads cannot share.
+
+It is started early, imports what it will need while the first one is busy, and is given functions
+and their arguments. Whatever goes wrong there is done again here: nothing depends on it but time.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any, BinaryIO, TypeVar
+
+from designer.base.environment import python_command
+
+Result = TypeVar("Result")
+Ask = Callable[..., Callable[[], Any]]
+CALL = "from designer.base.second_process import serve; serve({modules!r})"
+
+
+class OtherProcess:
+    """The process, from this one's side.
+
+    modules : names of modules that it imports at once. It takes no module from its working
+    directory.
+    """
+
+    def __init__(self, modules: Sequence[str]) -> None:
+        self._process = subprocess.Popen(
+            python_command("-c", CALL.format(modules=list(modules))),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,  # what goes wrong there goes wrong again here
+            start_new_session=True,  # Ctrl-C is for this process, which ends that one
+        )
+        self._one_at_a_time = ThreadPoolExecutor(1)
+
+    def __call__(self, function: Callable[..., Result], *arguments: Any) -> Callable[[], Result]:
+        """function(*arguments), there; both must pickle. What is returned waits for the result, and
+        raises what the function raises."""
+        answer = self._one_at_a_time.submit(self._answer, function, arguments)
+
+        def result() -> Result:
+            answered = answer.result()
+            return function(*arguments) if answered is None else answered[0]
+
+        return result
+
+    def _answer(self, function: Callable[..., Result], arguments: object) -> tuple[Result] | None:
+        """The result; None where that process has none."""
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        try:
+            pickle.dump((function, arguments), stdin)
+            stdin.flush()
+            answered: tuple[Result] | None = pickle.load(stdout)
+        except (OSError, EOFError, ValueError, pickle.PickleError, AttributeError, TypeError):
+            self._process.kill()
+            return None
+        return answered
+
+    def close(self) -> None:
+        """End it, whatever it is at."""
+        self._process.kill()
+        self._one_at_a_time.shutdown(wait=True, cancel_futures=True)
+        self._process.communicate()
+
+
+@contextmanager
+def other_process(jobs: int, *modules: str) -> Iterator[Ask]:
+    """Asks another process where there is a core for it; with one job the function is called here,
+    when its result is asked for. It ends with the block."""
+    if jobs < 2:
+        yield lambda function, *arguments: lambda: function(*arguments)
+        return
+    other = OtherProcess(modules)
+    try:
+        yield other
+    finally:
+        other.close()
+
+
+def serve(modules: Sequence[str]) -> None:
+    """The process, from its own side: answers until nobody asks any more.
+
+    An answer is a tuple with the result, or None where there is none.
+    """
+    answers: BinaryIO = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a function prints is no answer
+    for name in modules:
+        importlib.import_module(name)
+    while True:
+        try:
+            function, arguments = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        try:
+            answer = pickle.dumps((function(*arguments),))
+        except Exception:
+            answer = pickle.dumps(None)
+        answers.write(answer)
+        answers.flush()
