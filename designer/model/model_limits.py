@@ -212,10 +212,17 @@ LIMITS = (
         value=_is_list,
     ),
     ModelLimit(
+        "a drive by a table of its own",
+        "`[drive]`, `[excitation]`",
+        "a [[force]] on a mass or a [base] in format = 2, P1 and P2 of [mechanical] or f20 of "
+        "[model] in format = 1, and a [[response]] for each drive frequency",
+        tables=r"drives?|excitations?|inputs?|loads?",
+    ),
+    ModelLimit(
         "a drive that is no sine",
         "`waveform`, `harmonics`, `[[waveform]]`",
         "its first harmonic, as an amplitude",
-        tables=r"waveforms?|harmonics?|drives?|signals?|sweep|chirp|noise",
+        tables=r"waveforms?|harmonics?|signals?|sweep|chirp|noise",
         keys=r"waveform\w*|harmonics?|shape|square|triangle|sawtooth|pulse\w*|terms|noise|"
         r"random\w*|signal|chirp|sweep",
     ),

@@ -131,6 +131,7 @@ def _element(table: str) -> type[FileTable]:
         ("[initial]\nx = 1", "initial conditions"),
         ("[[delay]]\ntime = 1", "a delay"),
         ("[waveform]\nterms = 1", "no sine"),
+        ('[drive]\non = "hammer"\namplitude = 1.0', "a drive by a table of its own"),
         ("[model]\nm = 0.5", "the tables of format 1"),
     ],
 )  # fmt: skip
