@@ -350,8 +350,9 @@ class _Hunt:
         try:
             model_peaks = find_responses.peaks(model, responses)
             design = parts_choice.synthesise(
-                model, spec, self.catalog, model_peaks, responses, aims=choice.aims, binding=False
-            )
+                model, spec, self.catalog, model_peaks, responses,
+                aims=choice.aims, binding=False, jobs=self.jobs,
+            )  # fmt: skip
             most, error = self.modelfile.search.match_error, design.errors.max_error
             if error > most:
                 raise Unreachable(
@@ -449,8 +450,9 @@ class _Hunt:
         responses = best.model_responses
         model_peaks = find_responses.peaks(model, responses)
         design = parts_choice.synthesise(
-            model, spec, self.catalog, model_peaks, responses, aims=best.choice.aims
-        )
+            model, spec, self.catalog, model_peaks, responses,
+            aims=best.choice.aims, jobs=self.jobs,
+        )  # fmt: skip
         modelfile = self._resolved(best.choice, responses)
         return Synthesis(modelfile, self.catalog, responses, design)
 

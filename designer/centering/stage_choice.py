@@ -109,7 +109,7 @@ def synthesise(
         kind for kind in get_args(DeadZone) if stage_refusal(clearances, kind) is None
     ]
     if modelfile.circuit.dead_zone is not None or not clearances or len(able) < 2:
-        return synthesis_result.synthesise(modelfile, catalog, all_found=all_found)
+        return synthesis_result.synthesise(modelfile, catalog, all_found=all_found, jobs=jobs)
     began = time.perf_counter()
     forecasts: list[StageForecast] = []
     refusals: list[InputError] = []
@@ -117,7 +117,7 @@ def synthesise(
         with part(f"with the {kind} stage"):
             try:
                 made = synthesis_result.synthesise(
-                    with_stage(modelfile, kind), catalog, all_found=all_found
+                    with_stage(modelfile, kind), catalog, all_found=all_found, jobs=jobs
                 )
                 forecasts.append(forecast(made, jobs))
             except Unreachable as error:

@@ -59,12 +59,16 @@ class Synthesis:
 
 
 def synthesise(
-    modelfile: ModelFile, catalog: Catalog | None = None, *, all_found: bool = False
+    modelfile: ModelFile,
+    catalog: Catalog | None = None,
+    *,
+    all_found: bool = False,
+    jobs: int = 1,
 ) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
 
     all_found : whether there have to be all of them before a part is chosen; one that is not there
-    has the swing of what was found instead otherwise.
+    has the swing of what was found instead otherwise. jobs : threads; no part depends on it.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def synthesise(
             need_found(dict(enumerate(responses, start=1)), modelfile.si, modelfile.source)
         held = peaks(modelfile.model, responses)
         with seeking("parts"):
-            design = parts_choice.synthesise(*choice, held, responses)
+            design = parts_choice.synthesise(*choice, held, responses, jobs=jobs)
         note(stands(design, time.perf_counter() - began))
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)

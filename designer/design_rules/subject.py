@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from designer.base.second_process import Ask
 from designer.base.units import parse_quantity
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
@@ -40,9 +41,11 @@ class RuleSubject:
     """The circuit with its fittings."""
     components: Sequence[Component]
     """The components of its board."""
+    other: Ask | None = None
+    """A process that may take half of what takes long."""
 
     @classmethod
-    def of(cls, synthesis: Synthesis) -> Self:
+    def of(cls, synthesis: Synthesis, other: Ask | None = None) -> Self:
         """A design with the board that its model file asks for.
 
         Raises
@@ -51,7 +54,7 @@ class RuleSubject:
             ``component.components`` say.
         """
         circuit, choice = board_circuit(synthesis)
-        return cls(synthesis, circuit, components(circuit, synthesis.catalog, choice))
+        return cls(synthesis, circuit, components(circuit, synthesis.catalog, choice), other)
 
     @property
     def design(self) -> Design:
@@ -102,7 +105,7 @@ class RuleSubject:
         if not runs:
             raise NotRun(f"no orbit of the exact circuit: {left_out}")
         largest = max(runs, key=lambda run: abs(run.drive.amplitude))
-        return _complete(stuck(self.circuit, largest), "with")
+        return _complete(stuck(self.circuit, largest, self.other), "with")
 
     @cached_property
     def forces(self) -> tuple[Shifts, ...]:

@@ -13,9 +13,6 @@ from .design_files import (
     design_provenance as design_provenance,
     load as load,
 )
-from .design_findings import (
-    findings as findings,
-)
 from .design_source import (
     bills_are_of_old as bills_are_of_old,
     design_answer as design_answer,

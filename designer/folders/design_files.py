@@ -13,6 +13,7 @@ from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
+from designer.base.progress import doing
 from designer.base.second_process import Ask
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
@@ -60,9 +61,8 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     }
 
 
-def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str | bytes]) -> None:
-    """Write what is known without a look at how the circuit moves. files : ``texts``, and the
-    drawing."""
+def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:
+    """Write what is known without a look at how the circuit moves. files : ``texts``."""
     for name, content in files.items():
         folder.write(name, content)
     if synthesis.modelfile.measured is not None:
@@ -74,14 +74,17 @@ def write_last(
     synthesis: Synthesis,
     jobs: int,
     other: Ask,
-    found: Callable[[], Mapping[str, Any]],
+    drawing: Callable[[], Mapping[str, str | bytes]],
 ) -> None:
-    """Write the rest of the stage: how to start each response, and ``design.json``. other : as of
-    ``find_recipes``. found : waits for the design's ``findings``."""
+    """Write the rest of the stage: the drawing, how to start each response, and ``design.json``.
+    other : as of ``find_recipes``. drawing : waits for it."""
     design, responses = synthesis.design, synthesis.model_responses
+    document = dumps(answer(synthesis, other))
+    for name, content in drawing().items():
+        folder.write(name, content)
     recipes = start_recipes(synthesis, jobs, other)
     folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
-    folder.write(DESIGN, dumps(_answer(synthesis, found())))
+    folder.write(DESIGN, document)
 
 
 def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
@@ -92,12 +95,10 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
             folder.rewrite(name, text)
 
 
-def answer(synthesis: Synthesis) -> dict[str, Any]:
-    """The JSON object of ``design.json``."""
-    return _answer(synthesis, findings(synthesis))
-
-
-def _answer(synthesis: Synthesis, found: Mapping[str, Any]) -> dict[str, Any]:
+def answer(synthesis: Synthesis, other: Ask | None = None) -> dict[str, Any]:
+    """The JSON object of ``design.json``. other : as of ``findings``."""
+    doing("design rules of the circuit")
+    found = findings(synthesis, other)
     cost = cost_or_none(synthesis)
     document = synthesis_json(
         synthesis.modelfile,

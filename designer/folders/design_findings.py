@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from designer.base.errors import InputError
+from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
@@ -24,8 +25,9 @@ FINDINGS = {"warnings", "failed_rules"}
 """The keys."""
 
 
-def findings(synthesis: Synthesis) -> dict[str, Any]:
-    """``warnings`` and ``failed_rules`` by the keys of docs/contract.md.
+def findings(synthesis: Synthesis, other: Ask | None = None) -> dict[str, Any]:
+    """``warnings`` and ``failed_rules`` by the keys of docs/contract.md. other : as of
+    ``RuleSubject``.
 
     A design without responses, or one that no board can be made of, has no rule that fails for
     want of something to look at; the latter is a warning.
@@ -33,7 +35,7 @@ def findings(synthesis: Synthesis) -> dict[str, Any]:
     warnings = [*_error(synthesis), *_responses(synthesis)]
     failed: list[RuleOutcome] = []
     try:
-        subject = RuleSubject.of(synthesis)
+        subject = RuleSubject.of(synthesis, other)
     except InputError as error:
         warnings.append(f"The design rules were not looked at: {error}")
     else:

@@ -19,13 +19,12 @@ from designer.catalog.catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files, design_files, kicad_files
-from designer.folders.design_findings import findings
 from designer.folders.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, naming
 
-WRITING = "designer.schematic.schematic_drawing", "designer.folders.design_findings"
+WRITING = "designer.schematic.schematic_drawing", "designer.folders.board_files"
 """Modules that are imported while the parts are chosen, and needed once they stand."""
 
 
@@ -111,17 +110,17 @@ def write_design(
 ) -> None:
     """Write a design and its KiCad project, what takes longest at the end: parts can be looked at
     while start recipes are sought. stages : that begin now, the design among them. other : draws
-    and looks at the design rules, since both are work of one core."""
+    beside this process, which holds the interpreter, and takes half of the recipes."""
     progress.stage("files of the design")
     with naming(synthesis.modelfile):
         files = design_files.texts(synthesis)
-        drawing, found = other(board_files.drawing, synthesis), other(findings, synthesis)
+        drawing = other(board_files.drawing, synthesis)
     inputs = stages["design"][0]
     project = kicad_files.beside(folder, synthesis, inputs, options.overwrite, progress)
     folder.begin(stages, design_files.design_provenance(synthesis))
-    design_files.write(folder, synthesis, {**files, **drawing()})
+    design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
     progress.stage("start recipes, design rules of the circuit")
-    design_files.write_last(folder, synthesis, options.workers, other, found)
+    design_files.write_last(folder, synthesis, options.workers, other, drawing)
     folder.finish("design")

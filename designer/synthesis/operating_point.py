@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.second_process import Ask
 from designer.catalog.design_rules import BY_ID
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.feedback_loops import feedback_share
@@ -95,24 +96,38 @@ def _operating(
     return out
 
 
-def stuck(circuit: Circuit, run: Run) -> Operating:
+def stuck(circuit: Circuit, run: Run, other: Ask | None = None) -> Operating:
     """The same, but for slopes, with each section in turn stuck at each rail of the supply, from
     rest.
 
-    run : whose drive is on meanwhile.
+    run : whose drive is on meanwhile. other : a process that takes every other section; nothing
+    depends on it.
     """
+    names = [section.name for section in circuit.sections]
+    away = names[1::2] if other is not None else []
+    theirs = other(_all_stuck, circuit, run, away) if other is not None else dict
+    points = _all_stuck(circuit, run, [name for name in names if name not in away])
+    points |= theirs()
     out = Operating()
-    for section in circuit.sections:
-        for sign, rail in ((1.0, "upper"), (-1.0, "lower")):
-            board = _stuck(circuit, section.name, sign)
-            name = f"{section.name} at the {rail} rail"
-            there = replace(run, name=name, start=np.zeros(len(circuit.states)), periods=REST)
-            point = _operating(Reduction(circuit, board), [there], {}, COARSE, speed=False)
-            for kind in ("high", "low", "across", "power", "source"):
-                _raise_peaks(getattr(out, kind), getattr(point, kind).items())
-            out.runs += point.runs
-            out.left_out |= point.left_out
+    for point in (each for name in names for each in points[name]):
+        for kind in ("high", "low", "across", "power", "source"):
+            _raise_peaks(getattr(out, kind), getattr(point, kind).items())
+        out.runs += point.runs
+        out.left_out |= point.left_out
     return out
+
+
+def _all_stuck(circuit: Circuit, run: Run, names: Sequence[str]) -> dict[str, list[Operating]]:
+    """What is met with each of these sections at its upper and at its lower rail, by name."""
+    points: dict[str, list[Operating]] = {}
+    for name in names:
+        for sign, rail in ((1.0, "upper"), (-1.0, "lower")):
+            at = f"{name} at the {rail} rail"
+            there = replace(run, name=at, start=np.zeros(len(circuit.states)), periods=REST)
+            reduction = Reduction(circuit, _stuck(circuit, name, sign))
+            point = _operating(reduction, [there], {}, COARSE, speed=False)
+            points.setdefault(name, []).append(point)
+    return points
 
 
 def _stuck(circuit: Circuit, name: str, sign: float) -> Board:

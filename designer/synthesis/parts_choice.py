@@ -137,12 +137,14 @@ def synthesise(
     *,
     aims: Aims = NO_AIMS,
     binding: bool = True,
+    jobs: int = 1,
 ) -> Design:
     """Choose the parts.
 
     responses : that are wanted; the finished circuit is held to the voltages and currents that
     they need. Without them it is held to ``peaks``. aims : inside the side conditions. binding :
-    whether it is asked what each side condition costs, which changes no part.
+    whether it is asked what each side condition costs, which changes no part. jobs : threads; no
+    part depends on it.
 
     Raises
     ------
@@ -155,12 +157,12 @@ def synthesise(
     drive = least_drive(model, responses)
     make = partial(Order.of, model, spec, catalog, peaks, largest=largest, drive_force=drive)
     order = make(aims=aims)
-    search = _Search(order, responses)
+    search = _Search(order, responses, jobs)
     best = search.best(spec.active_conditions)
     while isinstance(best, _Missed) and best.apart is not None:
         apart = order.stage.apart | {best.apart}
         order = make(aims=aims, apart=apart)
-        search = _Search(order, responses)
+        search = _Search(order, responses, jobs)
         best = search.best(spec.active_conditions)
     if isinstance(best, _Missed):
         search.refuse(best)
@@ -181,6 +183,7 @@ class _Search:
 
     order: Order
     responses: Sequence[ModelResponse]
+    jobs: int
 
     def best(self, conditions: frozenset[str]) -> _Verified | _Missed:
         """The best design that keeps these side conditions, verified on its circuit.
@@ -354,7 +357,7 @@ class _Search:
         before, broken = None, list[ConditionCheck]()
         found: tuple[ScaleAttempt, Design, ConditionLimits] | None = None
         for number in range(BOX_ROUNDS):
-            choice = ScaleChoice(self.order, within)
+            choice = ScaleChoice(self.order, within, self.jobs)
             made = self._showing(choice.circuits(before))
             if isinstance(made, Shortfall):
                 if found is not None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.progress import best_so_far, doing
+from designer.base.threads import parallel
 from designer.catalog.design_rules import BY_ID
 from designer.circuit.netlist import Circuit
 from designer.circuit.scale_fit import minimax
@@ -100,6 +101,8 @@ class ScaleChoice:
     """What is to be built, and from what."""
     within: ConditionLimits
     """The side conditions."""
+    jobs: int = 1
+    """Threads that descend; no choice depends on it."""
     candidates: list[RoundedChoice] = field(default_factory=list)
     """Choices that keep all limits which are known before the circuit is made."""
     _noisy: bool = False
@@ -257,8 +260,12 @@ class ScaleChoice:
         random = np.random.default_rng((seed, len(starts), 1))
         found: list[tuple[float, Array, Array, Array]] = []
         broken = []
-        for start in starts:
-            z, _ = descend(rounding, start, random.random(DRAWS))
+        draws = [random.random(DRAWS) for _ in starts]
+
+        def choice(own: tuple[Array, Array]) -> Array:
+            return descend(rounding, *own)[0]
+
+        for z in parallel(choice, zip(starts, draws, strict=True), self.jobs):
             over = (rounding.limits @ z + rounding.limit_constants).max()
             sums = [s for s in self.program.sums if s.at(z) > KEPT]
             broken += [s.tangent(z) for s in sums]
@@ -268,9 +275,13 @@ class ScaleChoice:
                 errors = _held(rounding, (rounded - logs)[:, None])[:, 0]
                 found.append((float(np.abs(errors).max()), z, rounded, errors))
         self.box.cuts += broken[: len(self.program.sums)]
-        for error, z, rounded, errors in sorted(found, key=lambda own: own[0])[:LOOKED_AT]:
-            least = error if error <= self.goal else self._fitted(rounding, errors)
-            self.candidates.append(self._candidate(z, rounded, least))
+        best = sorted(found, key=lambda own: own[0])[:LOOKED_AT]
+
+        def least(own: tuple[float, Array, Array, Array]) -> float:
+            return own[0] if own[0] <= self.goal else self._fitted(rounding, own[3])
+
+        for own, error in zip(best, parallel(least, best, self.jobs), strict=True):
+            self.candidates.append(self._candidate(own[1], own[2], error))
 
     def _fitted(self, rounding: Rounding, errors: Array) -> float:
         """The largest error at the scales that make that of the coefficients least; constant forces

@@ -198,7 +198,7 @@ STAGES = {
     "responses of the model, parts": "swing|integrators|dead zone|cost",
     "files of the design": "bill",
     "KiCad project": "",
-    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct",
+    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct|rules",
     "ngspice, equation check": "6 of 6 runs",
     "exact circuit": "",
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",

@@ -10,7 +10,6 @@ import pytest
 from designer.base.progress import Progress
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
-from designer.jobs import stage_runner
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
@@ -25,8 +24,7 @@ def without_starts(patched: pytest.MonkeyPatch) -> None:
 
     patched.setattr(design_files, "start_recipes", none)
     nothing: dict[str, list[str]] = {"warnings": [], "failed_rules": []}
-    for module in (design_files, stage_runner):
-        patched.setattr(module, "findings", lambda _: nothing)
+    patched.setattr(design_files, "findings", lambda *_: nothing)
 
 
 def quick_folder(text: str, out: Path) -> Path:

@@ -208,12 +208,12 @@ def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -
             assert room(made, frozenset(), {conflict.limit: given - near}) > -near
 
 
-def design(text: str, **changes: object) -> Design:
+def design(text: str, jobs: int = 1, **changes: object) -> Design:
     file = parse_model_file(text)
     responses = find(file.model, file.responses)
     spec = replace(CircuitSpec(dead_zone="rectifier"), **changes)  # type: ignore[arg-type]
     held = peaks(file.model, responses)
-    return parts_choice.synthesise(file.model, spec, CATALOG, held, responses)
+    return parts_choice.synthesise(file.model, spec, CATALOG, held, responses, jobs=jobs)
 
 
 def test_unequal_stops_get_parts_and_the_thresholds_their_swing() -> None:
@@ -227,7 +227,7 @@ def test_unequal_stops_get_parts_and_the_thresholds_their_swing() -> None:
     assert allowed is not None
     assert 3.5 < float(allowed[1]) <= float(allowed[2])
     assert made.certificate.lower_bound <= made.errors.max_error
-    assert design(ONE).circuit.values == made.circuit.values
+    assert design(ONE, jobs=2).circuit.values == made.circuit.values
 
 
 @pytest.mark.parametrize(
