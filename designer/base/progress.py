@@ -122,8 +122,9 @@ class WholeWork:
     def enter(self, stage: str) -> None:
         """A stage begins: with it the phase that it is the first of, and the one before ends."""
         names = list(self.usual)
-        place = next((i for i, name in enumerate(names) if stage.startswith(name)), self._at)
-        if place <= self._at:  # a stage of the phase, or one that is gone through again
+        ahead = range(self._at + 1, len(names))
+        place = next((i for i in ahead if stage.startswith(names[i])), None)
+        if place is None:  # a stage of the phase, or one that is gone through again
             return
         now = self._clock()
         if self._at >= 0:

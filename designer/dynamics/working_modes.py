@@ -104,9 +104,9 @@ class GuardTargets:
 
     def copy(self) -> GuardTargets:
         """The same, to which modes may be added apart from these."""
-        out = GuardTargets(())
+        out = GuardTargets(self._working)
         out.numbers, out.keys = dict(self.numbers), list(self.keys)
-        out._working, out._beyond = self._working, list(self._beyond)
+        out._beyond = list(self._beyond)
         return out
 
     def may_enter(self, key: ModeKey) -> bool:

@@ -15,6 +15,7 @@ from designer.base.progress import (
     Progress,
     ProgressLines,
     Terminal,
+    WholeWork,
     best_so_far,
     how_far,
     note,
@@ -164,6 +165,22 @@ def test_a_whole_says_how_far_it_is_beside_each_stage(capsys: pytest.CaptureFixt
             assert later(SILENCE).endswith("whole: 85 %, about 0:02:58 left")
         lines.stage("one more")
         assert later(SILENCE) == "  0:00:10 so far"
+
+
+def test_phases_whose_names_begin_alike_are_entered_in_their_order() -> None:
+    """A search asks ngspice twice: about each candidate, and at the end."""
+    now = [0.0]
+    whole = WholeWork({"ngspice": 10.0, "study": 10.0, "ngspice, last": 40.0}, lambda: now[0])
+    for stage, at, left in (
+        ("ngspice, first", 0.0, 60.0),
+        ("study", 10.0, 50.0),
+        ("ngspice, again", 10.0, 50.0),
+        ("ngspice, last one", 20.0, 40.0),
+        ("report", 40.0, 20.0),
+    ):
+        now[0] = at
+        whole.enter(stage)
+        assert whole.far(0.0) == pytest.approx((at / (at + left), left))
 
 
 def test_the_best_so_far_is_told_after_a_minute_and_each_minute(
