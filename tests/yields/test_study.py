@@ -296,7 +296,11 @@ class Listener(Progress):
 
 @pytest.mark.parametrize(
     ("there", "said"),
-    [(0, ["ngspice, 120 runs"]), (20, ["ngspice, 60 runs, 60 more are there"]), (50, [])],
+    [
+        (0, ["boards in ngspice, 120 runs"]),
+        (20, ["boards in ngspice, 60 runs, 60 more are there"]),
+        (50, []),
+    ],
 )
 def test_only_runs_that_are_not_on_disk_are_announced(
     there: int, said: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
