@@ -18,19 +18,11 @@ from .check.simulation import (
 from .check.synthesis_result import (
     Synthesis as Synthesis,
 )
-from .explorer.server import (
-    explore as explore,
-)
 from .folders.design_source import (
     read_design as read_design,
 )
-from .jobs.bench_job import (
-    BenchAnswer as BenchAnswer,
-    bench as bench,
-)
 from .jobs.bifurcation_job import (
     BifurcationResult as BifurcationResult,
-    bifurcation as bifurcation,
 )
 from .jobs.cure_job import (
     CureResult as CureResult,
@@ -38,33 +30,9 @@ from .jobs.cure_job import (
 )
 from .jobs.export_job import (
     ExportResult as ExportResult,
-    export as export,
 )
 from .jobs.job_outcome import (
     JobOutcome as JobOutcome,
-)
-from .jobs.rules_job import (
-    RulesResult as RulesResult,
-    rules as rules,
-)
-from .jobs.search_job import (
-    search as search,
-)
-from .jobs.simulate_job import (
-    SimulationResult as SimulationResult,
-    simulate as simulate,
-)
-from .jobs.study_job import (
-    run as run,
-    tolerance as tolerance,
-)
-from .jobs.synthesise_job import (
-    synthesise as synthesise,
-    synthesize as synthesize,
-)
-from .jobs.trade_job import (
-    TradeResult as TradeResult,
-    trade as trade,
 )
 from .model.model import (
     Dimensionless as Dimensionless,
@@ -78,11 +46,49 @@ from .model.model_file import (
 from .model.response_table import (
     Response as Response,
 )
-from .model.template import (
+from .verbs.bench import (
+    BenchAnswer as BenchAnswer,
+    bench as bench,
+)
+from .verbs.bifurcation import (
+    bifurcation as bifurcation,
+)
+from .verbs.explore import (
+    explore as explore,
+)
+from .verbs.export import (
+    export as export,
+)
+from .verbs.new import (
     new as new,
 )
-from .paper.paper_reports import (
+from .verbs.reproduce import (
     reproduce as reproduce,
+)
+from .verbs.rules import (
+    RulesResult as RulesResult,
+    rules as rules,
+)
+from .verbs.run import (
+    run as run,
+)
+from .verbs.search import (
+    search as search,
+)
+from .verbs.simulate import (
+    SimulationResult as SimulationResult,
+    simulate as simulate,
+)
+from .verbs.synthesise import (
+    synthesise as synthesise,
+    synthesize as synthesize,
+)
+from .verbs.tolerance import (
+    tolerance as tolerance,
+)
+from .verbs.trade import (
+    TradeResult as TradeResult,
+    trade as trade,
 )
 from .yields.study import (
     RunResult as RunResult,

@@ -1,7 +1,7 @@
 """Text for terminals and logs: what comes from files and names moves no cursor there.
 
 Whatever the tool prints for people passes ``printable``: lines by ``tell``, tables by
-``cli.console``, progress by ``base.progress``, the log by its formatter, messages of errors as
+``verbs.console``, progress by ``base.progress``, the log by its formatter, messages of errors as
 they are made.
 """
 

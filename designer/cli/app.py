@@ -1,4 +1,4 @@
-"""The application, the options that its verbs share, and the way in which every verb runs."""
+"""The application: each verb's declaration made a command, and the way in which every verb runs."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import inspect
 import itertools
 import logging
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
-from functools import wraps
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import typer
 import typer.core
@@ -20,13 +19,12 @@ from designer.base.errors import DesignerError, InputError, ResponseNotFound
 from designer.base.printed import printable
 from designer.base.progress import Progress, progress_for
 from designer.base.version import __version__
+from designer.verbs.declared import GROUPS, Show, Verb, Word
 
 VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules bench "
     "explore reproduce catalog new".split()
 )
-GROUPS = ("Design", "Study", "Explore", "Make")
-"""The headings of the verbs in the help, in their order."""
 
 
 class GroupedVerbs(typer.core.TyperGroup):
@@ -57,132 +55,111 @@ app = typer.Typer(
 )
 
 
-def option(names: str, metavar: str | None = None, text: str = "") -> Any:
-    """An option by its spellings, such as "-q --quiet", with its help."""
-    return typer.Option(*names.split(), metavar=metavar, help=text)
-
-
-SOURCE = "model"
-"""Name of the argument that is a ``Source``."""
-Source = Annotated[
-    Path, typer.Argument(metavar="MODEL|DIR", help="A model file (TOML) or a design folder.")
-]
-Out = Annotated[Path | None, option("--out", "DIR", "The design folder to write.")]
-Samples = Annotated[
-    int | None,
-    option("--samples", "N", "Boards in the study [200, all of a list, or the folder's own]."),
-]
-Seed = Annotated[int, option("--seed", "N", "Seed of the random numbers.")]
-OwnSeed = Annotated[
-    int | None, option("--seed", "N", "Seed of the random numbers [1, or the folder's own].")
-]
-_SHARED: dict[str, tuple[Any, Any]] = {
-    "jobs": (int | None, option("--jobs", "N", "Workers at a time [default: all cores].")),
-    "overwrite": (
-        bool,
-        option("--overwrite", None, "Replace files that the folder's manifest.json lists."),
-    ),
-    "resume": (bool, option("--resume", None, "Go on with work that was interrupted.")),
-    "json": (bool, option("--json", None, "Print one JSON object on standard output.")),
-    "verbose": (
-        bool,
-        option("-v --verbose", None, "Show where in the code a defect of the tool is."),
-    ),
-    "quiet": (bool, option("-q --quiet", None, "Print nothing but errors.")),
-    "log": (Path | None, option("--log", "FILE", "Append a log of the work to this file.")),
-}
-"""Type and declaration of the options that verbs share; off, or None, where nothing is said."""
-
-
-Show = Callable[[Mapping[str, Any]], None]
-"""Prints an answer as tables."""
-
-
-@dataclass(frozen=True)
-class Output:
-    """The answer of a verb, in the ways in which it can be printed."""
-
-    json: Mapping[str, Any]
-    """The object for ``--json``."""
-    show: Callable[[], None] = lambda: None
-    """Prints the tables for people."""
-    satisfied: bool = True
-    """Whether the answer is yes."""
-
-
-@dataclass(frozen=True)
-class Session:
-    """One call of the command line."""
-
-    progress: Progress
-    """Told how far the work is."""
-    tables: bool
-    """Whether tables for people are wanted."""
-
-    def early(self, first: Show, later: Show) -> Show:
-        """What shows an answer while the work goes on: in one way, and then in another."""
-        ways = itertools.chain([first], itertools.repeat(later))
-
-        def show(answer: Mapping[str, Any]) -> None:
-            if self.tables:
-                with self.progress.aside():
-                    next(ways)(answer)
-
-        return show
-
-
-def verb(
-    group: str, example: str, *shared: str, json: bool = True, computes: bool = True
-) -> Callable[[Callable[..., Output]], Callable[..., int]]:
-    """Register a function as a verb.
-
-    The function takes a ``Session``, its own options, and the values of ``shared`` as keywords.
-    Its verb has, after its own options, the shared ones and those of every verb.
-
-    group : one of ``GROUPS``. example : a command line, which the help shows. json : whether the
-    verb has a JSON object. computes : whether it may need the exact engine, whose
-    compilation is then announced.
-    """
-    every = ("json", "verbose", "quiet", "log") if json else ("verbose", "quiet", "log")
-
-    def register(function: Callable[..., Output]) -> Callable[..., int]:
-        @wraps(function)
-        def command(
-            *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
-        ) -> int:
-            try:
-                with _logged(log), progress_for(quiet) as progress:
-                    _refuse_at_once(words.get(SOURCE))
-                    with _announced(progress) if computes else nullcontext():
-                        output = function(Session(progress, not (json or quiet)), **words)
-            except ResponseNotFound as error:
-                if json:
-                    print_json(error.answer)
-                raise
-            if json:
-                print_json(output.json)
-            elif not quiet:
-                output.show()
-            return 0 if output.satisfied else 1
-
-        _, *specific, _ = inspect.signature(function, eval_str=True).parameters.values()
-        parameters = [*specific, *(_parameter(name) for name in (*shared, *every))]
-        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        command.__annotations__ = {p.name: p.annotation for p in parameters}
-        app.command(rich_help_panel=group, epilog=f"\b\nExample:\n  {example}")(command)
-        return command
-
-    return register
-
-
-def _parameter(name: str) -> inspect.Parameter:
-    kind, declaration = _SHARED[name]
-    return inspect.Parameter(
+_EVERY: tuple[inspect.Parameter, ...] = tuple(
+    inspect.Parameter(
         name,
         inspect.Parameter.KEYWORD_ONLY,
         default=False if kind is bool else None,
-        annotation=Annotated[kind, declaration],
+        annotation=Annotated[kind, typer.Option(*names, metavar=metavar, help=text)],
     )
+    for name, kind, names, metavar, text in (
+        ("json", bool, ("--json",), None, "Print one JSON object on standard output."),
+        (
+            "verbose",
+            bool,
+            ("-v", "--verbose"),
+            None,
+            "Show where in the code a defect of the tool is.",
+        ),
+        ("quiet", bool, ("-q", "--quiet"), None, "Print nothing but errors."),
+        ("log", Path | None, ("--log",), "FILE", "Append a log of the work to this file."),
+    )
+)
+"""The options of every verb, after its own."""
+SOURCE = "model"
+"""Name of a parameter that is a model file or a design folder."""
+
+
+def register(name: str, verb: Verb, *, hidden: bool = False) -> None:
+    """Give the application a verb by its declaration."""
+
+    def command(
+        *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
+    ) -> int:
+        # A parameter without a value has the function's own default.
+        given = {key: _plain(value) for key, value in words.items() if value not in (None, [])}
+        try:
+            with _logged(log), progress_for(quiet) as progress:
+                _refuse_at_once(given.get(SOURCE))
+                tellers = {
+                    "progress": progress,
+                    "shown": _early(verb, progress, tables=not (json or quiet)),
+                }
+                taken = inspect.signature(verb.function).parameters
+                given |= {key: value for key, value in tellers.items() if key in taken}
+                with _announced(progress) if verb.computes else nullcontext():
+                    result = verb.function(**given)
+        except ResponseNotFound as error:
+            if json:
+                print_json(error.answer)
+            raise
+        if json and verb.json is not None:
+            print_json(verb.json(result))
+        elif not quiet:
+            verb.show(result)
+        return 0 if verb.satisfied(result) else 1
+
+    parameters = [_parameter(*each) for each in verb.words()]
+    parameters += [p for p in _EVERY if p.name != "json" or verb.json is not None]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    command.__doc__ = (inspect.getdoc(verb.function) or "").split("\n\n")[0]
+    app.command(
+        name,
+        hidden=hidden,
+        rich_help_panel=verb.group,
+        epilog=f"\b\nExample:\n  {verb.example}",
+    )(command)
+
+
+def _parameter(own: inspect.Parameter, word: Word, reads: Any) -> inspect.Parameter:
+    """A parameter as the parser reads it. One with several values has none where none is given."""
+    several = get_origin(reads) is list
+    if several and get_origin(get_args(reads)[0]) is Literal:  # the parser has no list of literals
+        names = get_args(get_args(reads)[0])
+        reads = list[StrEnum(own.name, {str(name): name for name in names})]  # type: ignore[misc]
+    declared: Any = (
+        typer.Option(*word.names, metavar=word.metavar, help=word.help)
+        if word.names
+        else typer.Argument(metavar=word.metavar, help=word.help)
+    )
+    return inspect.Parameter(
+        own.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None if several and own.default == () else own.default,
+        annotation=Annotated[reads | None if several else reads, declared],
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Members of an enumeration as the texts that they are."""
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return value.value if isinstance(value, StrEnum) else value
+
+
+def _early(verb: Verb, progress: Progress, *, tables: bool) -> Show:
+    """What shows an answer while the work goes on: in one way, and then in another."""
+    first, later = verb.early or (None, None)
+    ways = itertools.chain([first], itertools.repeat(later))
+
+    def show(answer: Mapping[str, Any]) -> None:
+        way = next(ways)
+        if tables and way is not None:
+            with progress.aside():
+                way(answer)
+
+    return show
 
 
 class _LogLine(logging.Formatter):

@@ -2,24 +2,60 @@
 
 from __future__ import annotations
 
+import platform
+from collections.abc import Iterator
 from functools import cache
-from typing import cast
+from importlib import import_module
+from typing import Annotated, cast
 
 import typer
 import typer.core
 import typer.main
 
-from designer.base.errors import InputError
-from designer.cli import bifurcation, explore, make_verbs, tools, verbs
-from designer.cli.app import VERBS, app
+from designer.base.defaults import cores
+from designer.base.errors import EnvironmentMissing, InputError
+from designer.base.version import __version__
+from designer.cli.app import VERBS, app, register
 
-REGISTERED = (verbs, make_verbs, bifurcation, explore, tools)
-"""The modules of the verbs: importing one registers what it has."""
+OTHER_SPELLINGS = {"synthesize": "synthesise"}
+"""Verbs that the help does not list, and those that they are."""
+
+
+@app.callback(invoke_without_command=True)
+def _designer(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version, and what it works with here.")
+    ] = False,
+) -> None:
+    if version:
+        print(f"designer {__version__}")
+        for name, version_text in _surroundings():
+            print(f"{name:8} {version_text}")
+        raise typer.Exit
+
+
+def _surroundings() -> Iterator[tuple[str, str]]:
+    """The programs that verbs call and the cores that they use, as they are on this machine."""
+    from designer.design_rules.kicad_program import kicad_version
+    from designer.linear_network.solver_check import solver_words
+    from designer.spice.batch_backend import program_version
+
+    yield "Python", platform.python_version()
+    try:
+        yield "ngspice", program_version()
+    except EnvironmentMissing as missing:
+        yield "ngspice", str(missing)
+    yield "KiCad", kicad_version() or "none (kicad-cli 9 checks boards in designer rules)"
+    yield "solver", solver_words()
+    yield "cores", str(cores())
 
 
 @cache  # typer reads the signatures of all verbs
 def application() -> typer.core.TyperGroup:
     """The parser with every verb."""
+    for name in VERBS:
+        module = import_module(f"designer.verbs.{OTHER_SPELLINGS.get(name, name)}")
+        register(name, module.VERB, hidden=name in OTHER_SPELLINGS)
     return cast(typer.core.TyperGroup, typer.main.get_command(app))
 
 

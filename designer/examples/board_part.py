@@ -21,15 +21,15 @@ from designer.check import checked_design
 from designer.check.checked_design import traces
 from designer.check.synthesis_result import Synthesis
 from designer.examples.evidence import Evidence, figure_block
-from designer.jobs.export_job import export
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.rules_job import rules
-from designer.jobs.study_job import run
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.relative_motion import relative_motions
 from designer.plots import orbit_plots
 from designer.report import comparison
 from designer.spice.pool import SpicePool
+from designer.verbs.export import export
+from designer.verbs.rules import rules
+from designer.verbs.run import run
 
 FOLDER = "design"
 """Of the report: the whole design folder, which no repository needs."""

@@ -1,6 +1,6 @@
 from . import (
     server as server,
 )
-from .server import (
-    explore as explore,
+from .saved_page import (
+    save_page as save_page,
 )

@@ -1,4 +1,4 @@
-"""The server of the page, and the verb ``explore``."""
+"""The server of the page."""
 
 from __future__ import annotations
 
@@ -20,24 +20,19 @@ from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from designer.base import jit
-from designer.base.defaults import SAMPLES, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.page import ASSETS, asset, page
 from designer.explorer.questions import boards, planes, read_question, save_model, viewed
-from designer.explorer.saved_page import save_page
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue
-from designer.folders.model_source import source
-from designer.jobs.options import Options
-from designer.model.model_file import ModelFile, read_model_file
+from designer.model.model_file import ModelFile
 
 PORT = 8610
 """Port where none is asked for; another one where it is taken."""
 MOST_PORT = 65_535
-LOOPBACK = "127.0.0.1"
 LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
 """Addresses that no other machine reaches; written as in an address (``_written``), the names by
 which a browser may call them."""
@@ -115,42 +110,26 @@ class Explorer:
         return self.host in LOCAL
 
 
-def explore(
-    model: Path | str | ModelFile,
+def serve(
+    modelfile: ModelFile,
     *,
-    port: int | None = None,
-    host: str = LOOPBACK,
-    token: str | None = None,
-    browser: bool = True,
-    progress: Progress | None = None,
-    ready: Callable[[str], None] = lambda _: None,
-    save: Path | str | None = None,
-    overwrite: bool = False,
-    samples: int = SAMPLES,
-    seed: int = SEED,
-    jobs: int | None = None,
+    port: int | None,
+    host: str,
+    token: str | None,
+    browser: bool,
+    ready: Callable[[str], None],
+    progress: Progress,
 ) -> None:
-    """The verb ``explore``: serve a page on which sliders move the model's parameters, until
-    Ctrl-C; or write the page along ω as one file.
+    """Serve the page until Ctrl-C. What a page asks to be written goes below the folder that this
+    was started in.
 
-    model : a model file or a design folder. port : ``PORT``, or any free one where that is taken.
-    host : the address to listen at. token : what a page from another machine has to know; without
-    one it is drawn. browser : open the page. ready : is given the page's address. What a page asks
-    to be written goes below the folder that this was started in. save : the file to write;
-    nothing is served then, and the rest is of it: overwrite : whether it may replace another,
-    samples and seed : of the boards, jobs : workers at a time.
+    port : ``PORT``, or any free one where that is taken. token : without one it is drawn. ready :
+    is given the page's address.
 
     Raises
     ------
-    InputError : a model that cannot be read, a port that is taken, an address that is none here,
-    a file that cannot be written.
+    InputError : a port that is taken, an address that is none here.
     """
-    progress = Progress() if progress is None else progress
-    modelfile = _model(model)
-    if save is not None:
-        options = Options(seed, jobs, samples, overwrite)
-        save_page(modelfile, Path(save), options, progress)
-        return
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
     listening = _listening(host, port)
@@ -189,13 +168,6 @@ def application(explorer: Explorer) -> Application:
         websocket_ping_interval=20,
         log_function=lambda _: None,
     )
-
-
-def _model(model: Path | str | ModelFile) -> ModelFile:
-    if isinstance(model, ModelFile):
-        return model
-    path = Path(model)
-    return source(path, path)[0] if path.is_dir() else read_model_file(path)
 
 
 def _listening(host: str, port: int | None) -> socket.socket:

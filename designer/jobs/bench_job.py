@@ -1,43 +1,35 @@
-"""The verb ``bench``: what records of an oscilloscope show of a board."""
+"""What records of an oscilloscope show of a board."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.atomic_write import appearing
-from designer.base.defaults import cores
-from designer.base.design_folder import Folder, is_design_folder
+from designer.base.design_folder import is_design_folder
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
-from designer.base.frames import frame, table_html
-from designer.base.plain_json import dumps, plain
+from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
 from designer.circuit.design import GeneratorSetting
-from designer.folders.design_source import read_design
-from designer.folders.origin import provenance
-from designer.folders.report_sections import BENCHED as NAME, design_hash, renew_report
+from designer.folders.report_sections import BENCHED as NAME
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.workbench.advice import Advice
-from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import FittedBoard, board_behind
 from designer.workbench.free_decay import FreeDecay, recorded_decay
-from designer.workbench.naming import NamedMotion, named
-from designer.workbench.overlay import Overlay, overlaid
+from designer.workbench.naming import NamedMotion
+from designer.workbench.overlay import Overlay
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import RecordedMotion
 from designer.workbench.record_formats import read_record
-from designer.workbench.spread_estimate import estimated_spread, measured_list
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 PAGE, LIST = "bench.html", "boards.csv"
 LISTED = 20
@@ -83,151 +75,7 @@ class BenchedRecord:
         return self.setting.expect in (str(counts), str(counts.mirrored))
 
 
-@dataclass(frozen=True)
-class BenchAnswer:
-    """What the verb ``bench`` answers. It is a sequence of the records too."""
-
-    answer: dict[str, Any]
-    """The JSON object (docs/contract.md)."""
-    records: tuple[BenchedRecord, ...]
-    """Each record with what it shows."""
-    fitted: tuple[FittedBoard, ...] = ()
-    """The boards behind them; none where they were not asked for."""
-
-    @property
-    def satisfied(self) -> bool:
-        """Whether every record surely shows a response, and the one that is wanted where one is."""
-        return all(r.named.sure and r.as_wanted is not False for r in self.records)
-
-    def table(self) -> pd.DataFrame:
-        """A row for each record."""
-        return frame(_row(record) for record in self.answer["records"])
-
-    def __iter__(self) -> Iterator[BenchedRecord]:
-        return iter(self.records)
-
-    def __len__(self) -> int:
-        return len(self.records)
-
-    def __getitem__(self, index: int) -> BenchedRecord:
-        return self.records[index]
-
-    def _repr_html_(self) -> str:
-        return table_html(self.answer["title"], [_row(r) for r in self.answer["records"]], "")
-
-
-def bench(
-    folder: Path | str,
-    record: Sequence[Path | str],
-    *,
-    omega: float | None = None,
-    channels: Mapping[str, str] | None = None,
-    fit: bool = False,
-    boards: bool = False,
-    decay: Sequence[Path | str] = (),
-    ngspice: bool = True,
-    out: Path | str | None = None,
-    overwrite: bool = False,
-    jobs: int | None = None,
-    progress: Progress | None = None,
-) -> BenchAnswer:
-    """The verb ``bench``: read records of boards of a design and say what they show.
-
-    omega : the drive frequency of all of them in the model's units; found where None. channels :
-    channel by net, for all of them; found where None. fit : also look for the board behind the
-    records, and for what to turn on it. boards : the records are of several boards, each with a
-    folder of its own that has its name; fits them, and says how far they differ. decay : records of
-    the same boards that go on when the generator is switched off, with the same channels; for the
-    fit. ngspice : also lay ngspice's motion of the board over each record, once the rest is
-    written; needs ``out``, and does without where ngspice is missing. jobs : the most ngspice runs
-    at a time. out : a directory for ``bench.json``, ``bench.html``, a picture of each record and,
-    of several boards, ``boards.csv``; ``overwrite`` replaces files of these names. Where it lies in
-    the design folder the folder's report shows these records too.
-
-    Raises
-    ------
-    InputError : no design folder, a file that is no record, channels that cannot be told apart,
-        several boards in one folder, or files in the way; nothing is written then.
-    """
-    began, path = time.perf_counter(), Path(folder)
-    progress = Progress() if progress is None else progress
-    files, decays = [Path(name) for name in record], [Path(name) for name in decay]
-    place = None if out is None else Path(out)
-    names = _names(files)
-    lists = [LIST] if boards else []
-    _check(path, files, place, (*names, *lists), overwrite)
-    if omega is not None and not 0.0 < omega < math.inf:
-        raise InputError(None, "--omega", omega, "a frequency above 0")
-    if boards and len(files) > 1 and len({_board(file, True) for file in files}) == 1:
-        found, expected = "all records in one folder", "a folder for each board, with its name"
-        raise InputError(None, "--boards", found, f"{expected}; --fit takes them as of one board")
-    catalog = load_catalog()
-    synthesis = read_design(path, catalog, progress)
-    prediction = BoardPrediction(synthesis)
-    scales = synthesis.design.errors.scales
-    frequency = None if omega is None else scales.frequency(omega)
-    _check_decays(files, decays, boards)
-    read = [read_record(file) for file in files]
-    motions = [
-        recorded_motion(each, prediction, frequency=frequency, told=channels) for each in read
-    ]
-    free = _free_decays(decays, files, motions, prediction, boards)
-    benched = []
-    for file, motion in zip(files, motions, strict=True):
-        progress.stage(f"record {file.name}")
-        name = named(motion, prediction)
-        setting = _setting(name.motion.frequency, prediction)
-        benched.append(BenchedRecord(file, name, overlaid(name, prediction), setting))
-    fitted: dict[str, FittedBoard] = {}
-    if fit or boards or decays:
-        fitted = _fitted(benched, free, prediction, several=boards, progress=progress)
-        benched = [replace(b, board=fitted[_board(b.path, boards)]) for b in benched]
-    fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
-    settings = {
-        "omega": omega,
-        "channels": dict(channels or {}),
-        "fit": bool(fit or boards or decays),
-        "boards": boards,
-    }
-    common = {
-        "format": 1,
-        "title": synthesis.modelfile.title,
-        "boards": [board.as_dict(synthesis.modelfile.si) for board in fitted.values()],
-        "spread": [k.as_dict() for k in estimated_spread([*fits.values()])]
-        if boards and fits
-        else [],
-        "files": [] if place is None else [NAME, PAGE, *names, *lists],
-        "design_sha256": design_hash(path),
-        "provenance": provenance(synthesis.modelfile, catalog.hash, settings=settings),
-    }
-
-    def result(records: Sequence[BenchedRecord]) -> BenchAnswer:
-        answer = {
-            **common,
-            "records": [
-                _record_json(each, scales.seconds, synthesis.modelfile.si) for each in records
-            ],
-            "cost": {"seconds": time.perf_counter() - began},
-        }
-        return BenchAnswer(plain(answer), tuple(records), tuple(fitted.values()))
-
-    answered = result(benched)
-    if place is None:
-        return answered
-    progress.stage("pictures")
-    _write(place, names, answered)
-    if lists:
-        _put(place / LIST, measured_list(fits, LISTED).encode("utf-8"))
-    if place.resolve().is_relative_to(path.resolve()):
-        renew_report(Folder(path), progress.note)
-    if ngspice and any(each.overlay is not None for each in benched):
-        progress.stage("ngspice")
-        answered = result(_with_ngspice(benched, prediction, jobs or cores(), progress))
-        _write(place, names, answered)
-    return answered
-
-
-def _with_ngspice(
+def with_ngspice(
     benched: Sequence[BenchedRecord], prediction: BoardPrediction, jobs: int, progress: Progress
 ) -> list[BenchedRecord]:
     """The records with ngspice's motion of the fitted board, or of the nominal one, over each."""
@@ -259,16 +107,16 @@ def _fits(record: BenchedRecord) -> bool:
     return record.named.counts is not None
 
 
-def _check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:
+def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:
     """InputError for a record with the generator off of a board that has no other."""
-    known = {_board(file, several) for file in files}
+    known = {board_name(file, several) for file in files}
     for path in decays:
-        name = _board(path, several)
+        name = board_name(path, several)
         if name not in known:
             raise InputError(path, "--decay", f"board {name} alone", "another --record of it")
 
 
-def _free_decays(
+def free_decays(
     decays: Sequence[Path],
     files: Sequence[Path],
     motions: Sequence[RecordedMotion],
@@ -279,14 +127,16 @@ def _free_decays(
     its board's first record."""
     free: dict[str, list[tuple[str, FreeDecay]]] = {}
     for path in decays:
-        name = _board(path, several)
-        same = next(m for f, m in zip(files, motions, strict=True) if _board(f, several) == name)
+        name = board_name(path, several)
+        same = next(
+            m for f, m in zip(files, motions, strict=True) if board_name(f, several) == name
+        )
         decay = recorded_decay(read_record(path), same.channels, prediction)
         free.setdefault(name, []).append((path.name, decay))
     return free
 
 
-def _fitted(
+def fitted_boards(
     benched: Sequence[BenchedRecord],
     free: Mapping[str, Sequence[tuple[str, FreeDecay]]],
     prediction: BoardPrediction,
@@ -300,7 +150,7 @@ def _fitted(
     """
     own: dict[str, list[tuple[str, NamedMotion]]] = {}
     for each in benched:
-        name = _board(each.path, several)
+        name = board_name(each.path, several)
         own.setdefault(name, []).append((each.path.name, each.named))
     out = {}
     for name, records in own.items():
@@ -310,28 +160,12 @@ def _fitted(
     return out
 
 
-def _board(record: Path, several: bool) -> str:
+def board_name(record: Path, several: bool) -> str:
     """The name of a record's board: among several that of its folder, "" where there is one."""
     return record.resolve().parent.name if several else ""
 
 
-def channels_of(text: str) -> dict[str, str]:
-    """Channel by net of a text such as "v1=CH1,fv=CH2".
-
-    Raises
-    ------
-    InputError : it is no list of such pairs, or a net or channel comes twice.
-    """
-    pairs = [pair.split("=", 1) for pair in text.split(",")]
-    if any(len(pair) != 2 or not all(word.strip() for word in pair) for pair in pairs):
-        raise InputError(None, "--channels", text, "NET=CHANNEL pairs such as v1=CH1,fv=CH2")
-    named_channels = {net.strip(): channel.strip() for net, channel in pairs}
-    if len(named_channels) < len(pairs) or len(set(named_channels.values())) < len(pairs):
-        raise InputError(None, "--channels", text, "each net and each channel once")
-    return named_channels
-
-
-def _check(
+def check_places(
     folder: Path, files: Sequence[Path], place: Path | None, names: Sequence[str], overwrite: bool
 ) -> None:
     """InputError where there is no design or no record, or files are in the way."""
@@ -351,7 +185,7 @@ def _check(
             raise InputError(place / name, "--out", "a file", "a name that is free, or --overwrite")
 
 
-def _names(files: Sequence[Path]) -> list[str]:
+def picture_names(files: Sequence[Path]) -> list[str]:
     """Of the picture of each record."""
     stems = [file.stem for file in files]
     return [
@@ -360,14 +194,14 @@ def _names(files: Sequence[Path]) -> list[str]:
     ]
 
 
-def _setting(frequency: float, prediction: BoardPrediction) -> GeneratorSetting | None:
+def near_setting(frequency: float, prediction: BoardPrediction) -> GeneratorSetting | None:
     """The setting of ``setup.csv`` whose frequency is nearest, if it is near."""
     gaps = [(abs(frequency / s.frequency_hz - 1.0), s) for s in prediction.settings]
     gap, setting = min(gaps, key=lambda pair: pair[0], default=(math.inf, None))
     return setting if gap < NEAR else None
 
 
-def _record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> dict[str, Any]:
+def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> dict[str, Any]:
     """seconds : of the circuit for a unit of the model's time."""
     name, motion = benched.named, benched.named.motion
     record, overlay, setting = motion.record, benched.overlay, benched.setting
@@ -438,12 +272,12 @@ def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> 
     return {"net": net, "channel": channel, "low": low, "high": high, "words": words}
 
 
-def _row(record: Mapping[str, Any]) -> dict[str, Any]:
-    keys = ("file", "omega", "response", "sure", "others", "wanted", "as_wanted")
-    return {key: record[key] for key in keys}
-
-
-def _write(place: Path, names: Sequence[str], result: BenchAnswer) -> None:
+def write_answer(
+    place: Path,
+    names: Sequence[str],
+    answer: Mapping[str, Any],
+    records: Sequence[BenchedRecord],
+) -> None:
     """The answer, its page and the picture of each record."""
     from designer.base.figure_style import to_png  # matplotlib is not needed but for them
     from designer.plots.record_plots import record_figure
@@ -453,14 +287,14 @@ def _write(place: Path, names: Sequence[str], result: BenchAnswer) -> None:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(place, "--out", error.strerror or str(error), PLACE) from None
-    figures = [record_figure(each.named, each.overlay) for each in result.records]
-    contents: dict[str, bytes] = {NAME: dumps(result.answer).encode("utf-8")}
+    figures = [record_figure(each.named, each.overlay) for each in records]
+    contents: dict[str, bytes] = {NAME: dumps(answer).encode("utf-8")}
     contents |= {n: to_png(f) for n, f in zip(names, figures, strict=True)}
-    contents[PAGE] = record_page_html(result.answer, figures).encode("utf-8")
+    contents[PAGE] = record_page_html(answer, figures).encode("utf-8")
     for name, content in contents.items():
-        _put(place / name, content)
+        put(place / name, content)
 
 
-def _put(path: Path, content: bytes) -> None:
+def put(path: Path, content: bytes) -> None:
     with appearing(path, "--out", PLACE) as partial:
         partial.write_bytes(content)

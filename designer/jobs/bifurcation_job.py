@@ -1,15 +1,14 @@
-"""The verb ``bifurcation``: what is made of a request, what is written and in which order."""
+"""What is made of a request for a diagram, a map or basins, what is written and in which order."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
-from designer.base.defaults import SEED
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
@@ -45,6 +44,10 @@ class BifurcationResult:
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""
+    folder: Path | None
+    """The folder that it is in, if any."""
+    ends: tuple[str, str]
+    """Of the sweep, as they were asked for: they say the unit that comes first."""
 
     def windows(self) -> pd.DataFrame:
         """The windows of a sweep, a row each; empty of a map and of basins."""
@@ -76,89 +79,21 @@ class BifurcationResult:
         return f"{self.answer['x']['name']} and {self.answer['y']['name']}"
 
 
-def bifurcation(
-    model: Path | str | ModelFile,
-    *,
-    over: str | None = None,
-    from_: float | str | None = None,
-    to: float | str | None = None,
-    steps: int | None = None,
-    omega: float | None = None,
-    frequency: str | None = None,
-    down: bool = False,
-    up: bool = False,
-    starts: int | None = None,
-    periods: int | None = None,
-    keep: int | None = None,
-    map_: tuple[str, float | str, float | str, int] | None = None,
-    and_: tuple[str, float | str, float | str] | None = None,
-    depth: int | None = None,
-    region: float | str | None = None,
-    basins: bool = False,
-    circuit: bool = False,
-    points: bool = True,
-    shares: int | None = None,
-    box: Iterable[tuple[str, float | str, float | str]] = (),
-    seed: int = SEED,
-    out: Path | str | None = None,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> BifurcationResult:
-    """The verb ``bifurcation``: a diagram, a map of two parameters, or basins of attraction.
-
-    model : a model file or a design folder. ``from_``, to : the ends of the sweep, as numbers or as
-    texts with a unit. ``map_`` : (name, from, to, steps) of the other axis. ``and_`` : (name,
-    from, to) of a second parameter, over which the sweep's points are continued as curves. depth :
-    how many times in a row the other curves at points of codimension two are begun too. region :
-    a value of the swept parameter: the region in both parameters of the response there. shares :
-    random starts at each value, of which it is counted on which attractor they end; box : (state,
-    least, greatest) of where they are drawn from; seed : of the draw. out : a folder to write into;
-    without one nothing is written. The other words are those of the command line
-    (docs/bifurcations.md).
-
-    Raises
-    ------
-    InputError : the words do not fit together, or a value lies outside its domain.
-    """
-    request = Request(
-        over=over,
-        low=from_,
-        high=to,
-        steps=steps,
-        omega=omega,
-        frequency=frequency,
-        down=down,
-        up=up,
-        starts=starts,
-        periods=periods,
-        keep=keep,
-        second=map_,
-        and_=and_,
-        depth=depth,
-        region=region,
-        basins=basins,
-        circuit=circuit,
-        points=points,
-        shares=shares,
-        box=tuple(box),
-        seed=seed,
-    )
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume)
-    options.check()
-    progress = Progress() if progress is None else progress
-    return _answer(model, request, None if out is None else Path(out), options, progress)
-
-
-def _answer(
+def requested(
     model: Path | str | ModelFile,
     request: Request,
     out: Path | None,
     options: Options,
     progress: Progress,
 ) -> BifurcationResult:
-    """Nothing is written where the request is refused, or ``out`` is None."""
+    """What is asked for of a model file or a design folder. Nothing is written where the request is
+    refused, or ``out`` is None.
+
+    Raises
+    ------
+    InputError : the words do not fit together, or a value lies outside its domain.
+    """
+    options.check()
     began = time.perf_counter()
     modelfile, subject = _subject(model, request, progress)
     plan = plan_of(request, subject, modelfile)
@@ -166,7 +101,7 @@ def _answer(
     if out is None:
         answer, _ = _make(work, None)
         answer["cost"]["seconds"] = time.perf_counter() - began
-        return BifurcationResult(answer, False)
+        return BifurcationResult(answer, False, None, request.ends)
     folder = Folder(out)
     inputs = {
         "model": modelfile.sha256,
@@ -189,7 +124,7 @@ def _answer(
                 folder.write(name, content)
             answer["cost"]["seconds"] = time.perf_counter() - began
             folder.write(f"{kind}.json", dumps(answer))
-    return BifurcationResult(folder.json(f"{kind}.json"), not todo)
+    return BifurcationResult(folder.json(f"{kind}.json"), not todo, out, request.ends)
 
 
 # ---------------------------------------------------------------------------------------------

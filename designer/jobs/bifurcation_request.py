@@ -90,6 +90,13 @@ class Request:
     """Seed of these starts."""
 
     @property
+    def ends(self) -> tuple[str, str]:
+        """Least and largest value of the swept parameter as they are asked for; "" for the
+        usual."""
+        low, high = self.low, self.high
+        return "" if low is None else str(low), "" if high is None else str(high)
+
+    @property
     def kind(self) -> StageName:
         """Which of the three pictures is asked for."""
         return "basins" if self.basins else "map" if self.second is not None else "sweep"

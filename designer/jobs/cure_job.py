@@ -62,6 +62,11 @@ class CureResult:
     reused: bool
     """Whether the folder held the answer already."""
 
+    @property
+    def satisfied(self) -> bool:
+        """Whether the answer is yes: the yield is reached."""
+        return self.reached
+
     def front(self) -> pd.DataFrame:
         """The front of yield against price, a row for each choice of upgrades."""
         return flat_frame(self.answer["front"])

@@ -1,4 +1,4 @@
-"""The verb ``export``: the KiCad project of a design, decks, or what a fab is sent.
+"""The KiCad project of a design, decks, or what a fab is sent.
 
 All are stages of the design folder: a stage for each deck, so that one may come later, and one for
 the orders to all fabs, which grows.
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import DESIGN, Folder
-from designer.base.errors import EnvironmentMissing, InputError
+from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
@@ -37,13 +37,12 @@ from designer.fabrication.order_refusal import (
 )
 from designer.folders import board_files, kicad_files
 from designer.folders.design_files import design_provenance
-from designer.folders.model_source import design_inputs_of, source
+from designer.folders.model_source import design_inputs_of
 from designer.jobs.board_routing import route_in_folder, write_design
 from designer.jobs.options import Options
 from designer.jobs.rules_job import checked
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
-from designer.routing.board_layers import INNER
 from designer.spice import simulator_decks
 from designer.spice.simulator_decks import Dialect, file_name
 
@@ -93,74 +92,6 @@ class ExportResult:
 
     def _repr_html_(self) -> str:
         return table_html(str(self.folder), [{"file": name} for name in self.answer["files"]])
-
-
-def export(
-    model: Path | str | ModelFile,
-    out: Path | str | None = None,
-    *,
-    routed: bool = False,
-    keep: bool = False,
-    session: Path | str | None = None,
-    layers: int | None = None,
-    dsn: Path | str | None = None,
-    deck: Sequence[Dialect] = (),
-    fab: Sequence[str] = (),
-    board: Path | str | None = None,
-    parts: Path | str | None = None,
-    accept: Sequence[str] = (),
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> ExportResult:
-    """The verb ``export``: the KiCad project of a design, decks for other simulators, or orders.
-
-    model : a design folder, or a model file with ``out``. routed : with tracks and ground pours on
-    the board of the KiCad project. keep : with ``routed``, on the board as somebody has changed it:
-    its tracks stay, and what is open is routed. session : with ``routed``, what another router made
-    of the board (.ses), whose tracks come first. layers : with ``routed``, 2 copper layers, or 4
-    with planes of ground between the sides; None for as many as the board has, 2 at first. dsn : a
-    file to write the board into for such a router (.dsn). deck : "ltspice", "portable" or both.
-    fab : names of makers of boards, such as "jlcpcb" or "generic" (docs/fabrication.md). The KiCad
-    project if both are empty. board : with ``fab``, the .kicad_pcb; the folder's own if None.
-    parts : with ``fab``, a list of order numbers and prices, before the catalogue's. accept : with
-    ``fab``, ids of rules that may fail.
-
-    Raises
-    ------
-    InputError : a footprint that is not known here, files that somebody has changed, decks of
-        another design or version, an unknown fab, a wrong list, or a board of another design.
-    EnvironmentMissing : with ``fab``, no KiCad 9.
-    """
-    options = Options(overwrite=overwrite, resume=resume)
-    progress = Progress() if progress is None else progress
-    if deck and fab:
-        raise InputError(None, "--fab", ", ".join(fab), "no --deck beside it: one after the other")
-    only = (("--board", board), ("--parts", parts), ("--accept", ", ".join(accept) or None))
-    for option, value in only:
-        if value is not None and not fab:
-            raise InputError(None, option, str(value), "a fab that it is for: --fab NAME")
-    if routed and (deck or fab):
-        other = "--fab" if fab else "--deck"
-        raise InputError(None, other, "with --routed", "one after the other: --routed first")
-    for option, given in (("--keep", keep), ("--session", session), ("--layers", layers)):
-        if given and not routed:
-            raise InputError(None, option, "given alone", "--routed beside it")
-    if layers not in (None, *INNER):
-        raise InputError(None, "--layers", str(layers), "2 or 4")
-    if dsn is not None and (routed or deck or fab):
-        raise InputError(None, "--dsn", "with another", "one after the other")
-    modelfile, folder = source(model, out)
-    if routed:
-        return export_routed(modelfile, folder, keep, options, progress, _path(session), layers)
-    if dsn is not None:
-        return export_design(modelfile, folder, Path(dsn), options, progress)
-    if fab:
-        asked = OrderRequest(tuple(fab), _path(board), _path(parts), tuple(accept))
-        return export_orders(modelfile, folder, asked, options, progress)
-    if deck:
-        return export_decks(modelfile, folder, deck, options, progress)
-    return export_into(modelfile, folder, options, progress)
 
 
 def export_into(
@@ -307,10 +238,6 @@ def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardF
     if file is None and not own.is_file():
         export_into(runner.modelfile, runner.folder.path, runner.options, progress)
     return read_board(own if file is None else file)
-
-
-def _path(named: Path | str | None) -> Path | None:
-    return None if named is None else Path(named)
 
 
 def _fabs_with_earlier(

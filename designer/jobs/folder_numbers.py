@@ -103,8 +103,8 @@ def _with(options: Options, numbers: dict[str, Any], words: Mapping[str, Any]) -
     """The options with these numbers of the folder, where ``words`` states none."""
     layers = numbers.pop("layers", None)
     if layers is not None:
-        numbers |= {"blamed": blamed(layers), "blame_budget": blame_budget(layers)}
+        numbers |= {"blame": blamed(layers), "blame_budget": blame_budget(layers)}
         if "ngspice" not in layers and RUNG not in numbers:
             numbers["rung"] = "exact"
     options = replace(options, **{k: v for k, v in numbers.items() if words.get(k, k) is None})
-    return options if options.blamed else replace(options, blame_budget=None)
+    return options if options.blame else replace(options, blame_budget=None)

@@ -1,9 +1,10 @@
-"""What a verb that writes is asked for, from the command line or from Python."""
+"""What a verb that writes is asked for, from the command line or from Python.
+
+A field has the name of the verbs' parameter.
+"""
 
 from __future__ import annotations
 
-import os
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,11 +40,11 @@ class Options:
     """Whether boards are powered up too."""
     trimmed: bool = False
     """Whether the model file has a trimmer fitted, whose layer every study has."""
-    maps: tuple[Over, ...] = ()
+    map_: tuple[Over, ...] = ()
     """Yield maps that are asked for."""
     cluster: str | None = None
     """Address of a Dask scheduler, or None."""
-    blamed: bool = True
+    blame: bool = True
     """Whether the blame is worked out."""
     blame_budget: int | None = None
     """Steps of the blame; None for ``blame_extent.BUDGET``."""
@@ -67,45 +68,13 @@ class Options:
         at_least("--seed", self.seed, 0)
         if self.blame_budget is not None:
             at_least("--blame-budget", self.blame_budget, 1)
-            if not self.blamed:
+            if not self.blame:
                 expected = "no such option with --no-blame"
                 raise InputError(None, "--blame-budget", self.blame_budget, expected)
         if self.jobs is not None:
             at_least("--jobs", self.jobs, 1)
 
-    def command(self, verb: str, model: Path, out: Path | None) -> str:
-        """The command line that makes the same results again.
-
-        Files by their last names, so that no path of this machine stands in it; without options
-        that change no result.
-        """
-        study, blame = verb == "tolerance", verb in ("tolerance", "run")
-        words = ["designer", verb, _base(model)]
-        for option, value, applies in (
-            ("--out", None if out is None else _base(out), True),
-            ("--samples", self.samples, self.measured is None),
-            ("--measured", None if self.measured is None else _base(self.measured), True),
-            ("--seed", self.seed, True),
-            ("--rung", self.rung, self.rung != "auto" and verb in ("tolerance", "search")),
-            ("--until", None if self.until is None else f"{self.until:g}", study),
-            ("--tuned", "", study and self.tuned),
-            ("--reached", "", study and self.reached),
-            *(("--map", over, study) for over in self.maps),
-            ("--no-blame", "", blame and not self.blamed),
-            ("--blame-budget", self.blame_budget, blame),
-        ):
-            if applies and value is not None:
-                words += [option, *([] if value == "" else [str(value)])]
-        return shlex.join(words)
-
 
 def stated_options(words: Mapping[str, Any]) -> dict[str, Any]:
     """The options that have a value."""
     return {name: value for name, value in words.items() if value is not None}
-
-
-def _base(path: Path) -> str:
-    """The last name of a path, never an option; ``.`` and ``..`` by the names they stand for."""
-    name = os.path.basename(os.path.abspath(path)) or "."
-    name = name.encode("utf-8", "replace").decode("utf-8")  # a name that is no text
-    return f"./{name}" if name.startswith("-") else name

@@ -26,9 +26,9 @@ from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
 
 TRADE = "trade.json"
-"""What ``jobs.trade_job`` writes."""
+"""What the verb ``trade`` writes."""
 SEARCH = "search.json"
-"""What ``jobs.search_job`` writes."""
+"""What the verb ``search`` writes."""
 EARLIER = " (of the design that stood here before the search)"
 LEAST = 40
 """Boards of each response that ngspice is asked about, whatever a trade says."""

@@ -1,4 +1,4 @@
-"""The verb ``search`` for a model file: design, study of fresh boards, confirmation in ngspice."""
+"""A search: design, study of fresh boards, confirmation in ngspice."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
+from designer.base.defaults import StudyEngine
 from designer.base.design_folder import Folder
-from designer.base.errors import MISSING, InputError
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -23,12 +21,12 @@ from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
 from designer.folders.design_source import grade_inputs
-from designer.folders.model_source import design_inputs_of, source
+from designer.folders.model_source import design_inputs_of
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
-from designer.jobs import folder_numbers, rung_choice, usual_times
+from designer.jobs import rung_choice
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.options import Options, stated_options
+from designer.jobs.options import Options
 from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.search_stage import RULES as RULES, searched_into
 from designer.jobs.study_job import run_into
@@ -46,47 +44,6 @@ from designer.yields.tolerance_study import check
 CONFIRMATION = "confirmation.json"
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
-
-
-def search(
-    model: Path | str | ModelFile,
-    out: Path | str | None = None,
-    *,
-    samples: int | None = None,
-    rung: StudyEngine = "auto",
-    seed: int | None = None,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> JobOutcome:
-    """The verb ``search`` for a model file: the design of the highest yield, written into ``out``.
-
-    samples : fresh boards at the end. rung : of the final study. samples, seed : None for the usual
-    ones, or with ``resume`` for the folder's own.
-
-    Raises
-    ------
-    InputError : no model file, no ``out``, or a folder that holds something else. A design folder
-        is not searched but cured (``cure_job.cure``).
-    EnvironmentMissing : no ngspice; said before any work.
-    """
-    words = {"samples": samples, "seed": seed}
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, rung=rung)
-    options = replace(options, **{"samples": SEARCH_SAMPLES} | stated_options(words))
-    options.check()
-    path = model if isinstance(model, ModelFile) else Path(model)
-    if isinstance(path, Path) and not path.is_file():
-        there = "a folder" if path.is_dir() else MISSING
-        raise InputError(path, "MODEL", there, "a model file; a design folder can be cured")
-    place = None if out is None else Path(out)
-    modelfile, folder = source(path, place)
-    options = folder_numbers.of_search(folder, options, words)
-    name = path if isinstance(path, Path) else path.source or folder / "model.toml"
-    command = partial(Options.command, verb="search", model=name, out=place)
-    progress = Progress() if progress is None else progress
-    with progress.whole(usual_times.SEARCH):
-        return search_into(modelfile, folder, options, progress, command)
 
 
 def search_into(
@@ -163,7 +120,7 @@ def _confirm(
     decides: StudyEngine = "bandwidth" if options.rung == "bandwidth" else "exact"
     study = study_of(
         synthesis,
-        replace(options, rung=decides, blamed=False, blame_budget=None),
+        replace(options, rung=decides, blame=False, blame_budget=None),
         StudyHelp(jobs, None, LocalRunner(jobs)),
         check(synthesis, None, progress),
         stores,

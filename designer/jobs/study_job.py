@@ -1,15 +1,13 @@
-"""The verbs ``run`` and ``tolerance``: how many boards keep the response."""
+"""How many boards keep the response."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import Over, StudyEngine
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
@@ -25,7 +23,7 @@ from designer.folders.model_source import source
 from designer.jobs import folder_numbers, rung_choice, search_stage, usual_times
 from designer.jobs.board_routing import route_own_board
 from designer.jobs.job_outcome import JobOutcome
-from designer.jobs.options import Options, stated_options
+from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
 from designer.jobs.study_layers import merged
 from designer.jobs.study_stage import (
@@ -49,118 +47,27 @@ THE_BOARD = "board"
 """Name of the only board of a list that names none."""
 
 
-def run(
-    model: Path | str | ModelFile,
-    out: Path | str | None = None,
-    *,
-    samples: int | None = None,
-    blame: bool | None = None,
-    blame_budget: int | None = None,
-    catalog: Catalog | None = None,
-    seed: int | None = None,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-    shown: Shown = lambda _: None,
-) -> JobOutcome:
-    """The verb ``run``: synthesis, check in ngspice, tolerance study, report.
-
-    model : a model file that was read, the path of one, or a design folder. out : the folder to
-    write; a ``ModelFile`` without one is worked on in memory. samples, blame, blame_budget, seed :
-    None for the usual ones, or for the folder's own. catalog : in memory, instead of the one that
-    is found. shown : is given the answer while the work goes on (``study_stage.Shown``).
-
-    Raises
-    ------
-    InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
-        something else.
-    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
-    EnvironmentMissing : there is work to do and no ngspice.
-    """
-    words = {"samples": samples, "seed": seed, "until": None, "blamed": blame}
-    words |= {"blame_budget": blame_budget}
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **stated_options(words))
-    return _study("run", model, out, options, words, progress, shown, catalog)
-
-
-def tolerance(
-    model: Path | str | ModelFile | Synthesis | JobOutcome,
-    out: Path | str | None = None,
-    *,
-    samples: int | None = None,
-    until: float | None = None,
-    rung: StudyEngine | None = None,
-    tuned: bool = False,
-    reached: bool = False,
-    map_: Sequence[Over] = (),
-    measured: Path | str | None = None,
-    cluster: str | None = None,
-    blame: bool | None = None,
-    blame_budget: int | None = None,
-    seed: int | None = None,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-    shown: Shown = lambda _: None,
-) -> JobOutcome:
-    """The verb ``tolerance``: how many boards show each response, under the model file's spread.
-
-    model : as of ``run``, or a design, which is studied in its folder or, without one, in memory.
-    samples : at least. until : width of the 95 % intervals at which the study stops growing. rung :
-    "exact" asks no ngspice, "auto" about some boards, "ngspice" about every board, "bandwidth" is
-    "auto" with op-amps that lag by their gain-bandwidth. tuned, reached :
-    also with the generator free within its bands, and from power-up. ``map_`` : settings over which
-    the yield is wanted too. measured : a list of built boards, which are studied instead, in a
-    design folder. cluster : address of a Dask scheduler. The others are as of ``run``.
-
-    Raises
-    ------
-    InputError, Unreachable, EnvironmentMissing : as ``run``.
-    """
-    words = {"samples": samples, "seed": seed, "until": until, "rung": rung, "blamed": blame}
-    words |= {"blame_budget": blame_budget}
-    options = Options(
-        jobs=jobs,
-        overwrite=overwrite,
-        resume=resume,
-        tuned=tuned,
-        reached=reached,
-        maps=tuple(dict.fromkeys(map_)),
-        cluster=cluster,
-        **stated_options(words),
-    )
-    if measured is None:
-        return _study("tolerance", model, out, options, words, progress, shown)
-    options.check()
-    for name, value in (
-        ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_))
-    ):  # fmt: skip
-        if value not in (None, ""):
-            expected = "no such option with --measured, whose boards are the samples"
-            raise InputError(None, name, str(value), expected)
-    folder = model.folder if isinstance(model, JobOutcome) else model
-    if not isinstance(folder, Path | str):
-        raise InputError(None, "DIR", "no folder", "a design folder, whose boards were measured")
-    path = Path(folder)
-    options = folder_numbers.of_measured(path, options, words)
-    command = partial(Options.command, verb="tolerance", model=path, out=None)
-    progress = Progress() if progress is None else progress
-    return measured_into(path, Path(measured), options, progress, command, shown)
-
-
-def _study(
-    verb: str,
+def design_and_study(
     model: Path | str | ModelFile | Synthesis | JobOutcome,
     out: Path | str | None,
     options: Options,
     words: Mapping[str, Any],
+    command: Callable[[Options, Path, Path | None], str],
     progress: Progress | None,
     shown: Shown,
     catalog: Catalog | None = None,
+    *,
+    whole_job: bool = False,
 ) -> JobOutcome:
-    """words : what is given, by the names of ``Options``."""
+    """Design, check, study and report, in a folder or in memory.
+
+    words : what is given, by the names of ``Options``. command : the command line that makes the
+    same results of a model or folder, and of ``out``, again. whole_job : with tracks on the board.
+
+    Raises
+    ------
+    InputError, Unreachable, ResponseNotFound, EnvironmentMissing : as the verb ``run``.
+    """
     options.check()
     progress = Progress() if progress is None else progress
     if isinstance(model, JobOutcome):
@@ -172,12 +79,19 @@ def _study(
     modelfile, folder = source(argument, out)
     options = folder_numbers.of_study(argument, folder, modelfile, options, words)
     place = None if out is None else Path(out)
-    usual = usual_times.RUN if verb == "run" else usual_times.STUDIED
+    usual = usual_times.RUN if whole_job else usual_times.STUDIED
     with progress.whole({**usual_times.of_design(modelfile), **usual}):
         modelfile = search_stage.design_file(modelfile, folder, options, progress)
         path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
-        command = partial(Options.command, verb=verb, model=path, out=place)
-        return run_into(modelfile, folder, options, progress, command, shown, routed=verb == "run")
+        return run_into(
+            modelfile,
+            folder,
+            options,
+            progress,
+            lambda made_with: command(made_with, path, place),
+            shown,
+            routed=whole_job,
+        )
 
 
 def _in_memory(
@@ -216,7 +130,7 @@ def run_into(
 ) -> JobOutcome:
     """Design, check, study and report in the folder ``out``.
 
-    command : the command line as the report states it (``Options.command``). routed : with tracks
+    command : the command line as the report states it (``Verb.command``). routed : with tracks
     on the board, where there are none.
 
     Raises

@@ -20,7 +20,7 @@ WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
 
 def layers_of(options: Options) -> list[str]:
     """Names of the layers that are asked for, sorted."""
-    budget = options.blame_budget if options.blamed else None
+    budget = options.blame_budget if options.blame else None
     names = {
         "samples": True,
         "ngspice": options.rung != "exact",
@@ -28,9 +28,9 @@ def layers_of(options: Options) -> list[str]:
         "tuned": options.tuned,
         "trimmed": options.trimmed,
         "reached": options.reached,
-        WITHOUT_BLAME: not options.blamed,
+        WITHOUT_BLAME: not options.blame,
         f"{BLAME_BUDGET}{budget}": budget is not None,
-        **{f"{MAP}{over}": True for over in options.maps},
+        **{f"{MAP}{over}": True for over in options.map_},
     }
     return sorted(name for name, wanted in names.items() if wanted)
 
@@ -60,14 +60,14 @@ def merged(
     if "ngspice" in names and rung != "bandwidth":
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
     has_blame = stage is not None and stage.complete and blamed(stored["layers"])
-    with_blame = options.blamed or has_blame
+    with_blame = options.blame or has_blame
     return replace(
         options,
         rung=rung,
         tuned="tuned" in names,
         reached="reached" in names,
-        maps=tuple(over for over in OVERS if f"{MAP}{over}" in names),
-        blamed=with_blame,
+        map_=tuple(over for over in OVERS if f"{MAP}{over}" in names),
+        blame=with_blame,
         blame_budget=blame_budget(names) if with_blame else None,
     )
 
@@ -78,7 +78,7 @@ def study_files(options: Options, responses: int, census: bool) -> list[str]:
     names = layers_of(options)
     blocks = [f"{folder}/" for name, folder in BLOCK_FOLDERS.items() if name in names]
     boards = [BOARDS] if census else []
-    pieces = [PIECES] if options.blamed or options.maps else []
-    maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
+    pieces = [PIECES] if options.blame or options.map_ else []
+    maps = [f"map-{over}-{i + 1}.png" for over in options.map_ for i in range(responses)]
     maps += [MAPS] if maps else []
     return [TOLERANCE, *REPORTS, CACHE, *boards, *pieces, *maps, *blocks]

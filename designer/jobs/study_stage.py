@@ -251,9 +251,9 @@ def study_of(
         rung=options.rung,
         tuned=options.tuned,
         reached=options.reached,
-        blamed=options.blamed,
+        blamed=options.blame,
         blame_budget=BUDGET if options.blame_budget is None else options.blame_budget,
-        maps=options.maps,
+        maps=options.map_,
         seed=options.seed,
         jobs=help_.jobs,
         pool=help_.pool,
@@ -282,7 +282,7 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
     samples = folder.json(place.prefix + TOLERANCE)["samples"]
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
     rung = stage.inputs.get("rung", "exact")
-    options = Options(stage.inputs["seed"], samples=samples, rung=rung, blamed=False)
+    options = Options(stage.inputs["seed"], samples=samples, rung=rung, blame=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
     return study_of(synthesis, options, help_, check(synthesis, None), stores)
 

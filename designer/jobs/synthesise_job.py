@@ -1,4 +1,4 @@
-"""The verb ``synthesise``: the parts of a model, in memory or in a design folder.
+"""The parts of a model, in memory or in a design folder.
 
 Nothing in this package prints; the command line does.
 """
@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SEED
 from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
@@ -21,59 +20,16 @@ from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
 from designer.folders.design_source import design_answer
 from designer.folders.json_answers import cost_of
-from designer.folders.model_source import source
-from designer.jobs import search_stage, usual_times
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
-from designer.model.model_file import ModelFile, read_model_file
+from designer.model.model_file import ModelFile
 from designer.report.comparison import (
     compare as compare_designs,
     comparison_json,
     file_json,
     in_answer,
 )
-
-
-def synthesise(
-    model: Path | str | ModelFile,
-    out: Path | str | None = None,
-    *,
-    compare: bool = False,
-    catalog: Catalog | None = None,
-    seed: int = SEED,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> JobOutcome:
-    """The verb ``synthesise``: choose the parts, and write the design folder.
-
-    model : a model file that was read, the path of one, or a design folder. out : the folder to
-    write; a ``ModelFile`` without one is worked on in memory, and so is a path with ``compare``.
-    compare : beside the paper's values. catalog : in memory, instead of the one that is found.
-
-    Raises
-    ------
-    InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
-        something else.
-    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
-    """
-    options = Options(seed, jobs, overwrite=overwrite, resume=resume)
-    options.check()
-    progress = Progress() if progress is None else progress
-    in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
-    if out is None and in_memory:
-        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
-        return _in_memory(modelfile, catalog, compare, options.workers, progress)
-    modelfile, folder = source(model, out)
-    with progress.whole(usual_times.of_design(modelfile)):
-        modelfile = search_stage.design_file(modelfile, folder, options, progress)
-        return synthesise_into(modelfile, folder, options, progress, compare=compare)
-
-
-synthesize = synthesise
-"""The same in American spelling."""
 
 
 def synthesise_into(
@@ -96,7 +52,7 @@ def synthesise_into(
     return JobOutcome(answer, _all_shown(answer), out, synthesis is None, synthesis)
 
 
-def _in_memory(
+def synthesise_in_memory(
     modelfile: ModelFile, catalog: Catalog | None, compare: bool, jobs: int, progress: Progress
 ) -> JobOutcome:
     progress.stage("responses of the model, parts")

@@ -1,19 +1,16 @@
-"""The verb ``trade``: a design's rungs measured, and the stage ``trade`` of its folder."""
+"""A design's rungs measured, and the stage ``trade`` of its folder."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.defaults import SEED, TRADE_BOARDS, at_least
+from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
-from designer.base.errors import InputError
-from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
@@ -21,24 +18,22 @@ from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
 from designer.fidelity.rung_errors import compare
-from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, VENDOR, Truths
+from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, Truths
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.folders.design_source import grade_inputs
-from designer.folders.model_source import source
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
-from designer.jobs import folder_numbers
-from designer.jobs.options import Options, stated_options
+from designer.jobs.options import Options
 from designer.jobs.rung_choice import TRADE
 from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, need_responses, read_model_file
+from designer.model.model_file import ModelFile, need_responses
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts.verdict import StudyPlan
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
@@ -61,92 +56,6 @@ class TradeExtent:
     """Rounds of timing."""
     truth: Truths = TOP
     """What stands for the board: our full op-amps, or the vendor's macromodel."""
-
-
-@dataclass(frozen=True)
-class TradeResult:
-    """What the verb ``trade`` answers."""
-
-    answer: dict[str, Any]
-    """The JSON object (docs/contract.md)."""
-    reused: bool
-    """Whether the folder held the answer already."""
-
-    def rungs(self) -> pd.DataFrame:
-        """Time and error of every rung on every response."""
-        return frame(self.answer["rungs"])
-
-    def boards(self) -> pd.DataFrame:
-        """What both engines say of the same boards, a row for each response."""
-        return frame(self.answer["boards"])
-
-    def cheapest(self) -> pd.DataFrame:
-        """The cheapest rung for each question."""
-        return frame(self.answer["cheapest"])
-
-    def _repr_html_(self) -> str:
-        names = ("question", "of", "expected", "rung", "level", "bound", "measured")
-        rows = [{name: row.get(name) for name in names} for row in self.answer["cheapest"]]
-        return table_html("The cheapest rung for each question", rows)
-
-
-def trade(
-    model: Path | str | ModelFile,
-    out: Path | str | None = None,
-    *,
-    boards: int | None = None,
-    seed: int | None = None,
-    truth: Truths | None = None,
-    jobs: int | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> TradeResult:
-    """The verb ``trade``: time and error of every rung on a design.
-
-    model : a model file or a design folder. out : a folder to write into; a model file without one
-    writes nothing. boards : of each response, for the yield; 0 for none. truth : what stands for
-    the board, "full" op-amps or the "vendor" macromodel that the catalogue names. boards, seed,
-    truth : None for the usual ones, or for the folder's own.
-
-    Raises
-    ------
-    InputError : a number that cannot be, or a folder that holds something else.
-    EnvironmentMissing : ngspice is missing.
-    """
-    argument = model if isinstance(model, ModelFile) else Path(model)
-    words = {"boards": boards, "seed": seed, "truth": truth}
-    usual = {"boards": TRADE_BOARDS, "seed": SEED, "truth": TOP}
-    numbers: dict[str, Any] = usual | stated_options(words)
-    if numbers["truth"] not in (TOP, VENDOR):
-        raise InputError(None, "--truth", numbers["truth"], f"{TOP} or {VENDOR}")
-    at_least("--boards", numbers["boards"], 0)
-    options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
-    options.check()
-    folder: Path | None = None
-    if out is not None or (isinstance(argument, Path) and argument.is_dir()):
-        modelfile, folder = source(argument, out)
-    else:
-        modelfile = argument if isinstance(argument, ModelFile) else read_model_file(argument)
-    if folder is not None and folder_numbers.goes_on(argument, folder, resume):
-        numbers |= folder_numbers.stage_numbers(
-            Folder(folder), "trade", tuple(words)
-        ) | stated_options(words)
-        options = replace(options, seed=numbers["seed"])
-    extent = TradeExtent(boards=numbers["boards"], truth=numbers["truth"])
-    if extent.truth == VENDOR:
-        _need_vendor_model(modelfile)
-    progress = Progress() if progress is None else progress
-    return TradeResult(*answer(modelfile, folder, options, extent, progress))
-
-
-def _need_vendor_model(modelfile: ModelFile) -> None:
-    """InputError unless the catalogue names a vendor's model of the wanted op-amp."""
-    spec = modelfile.circuit
-    opamp = load_catalog().opamp(spec.opamp, spec.supply)
-    if opamp.spice is None:
-        expected = f"{TOP}: the catalogue has no vendor's model of {opamp.name}"
-        raise InputError(None, "--truth", VENDOR, expected)
 
 
 def measure(

@@ -127,7 +127,9 @@ from .system_equations import (
 )
 from .template import (
     SCHEMA as SCHEMA,
-    new as new,
+    SECOND as SECOND,
+    TEXT as TEXT,
+    write_model_file as write_model_file,
 )
 from .tuning_bands import (
     Bands as Bands,

@@ -194,16 +194,11 @@ expect = "1-1-1"
 """A file of format 2."""
 
 
-def new(
-    path: Path | str = "model.toml",
-    from_: Path | str | None = None,
-    *,
-    format: Literal[1, 2] | None = None,
+def write_model_file(
+    place: Path, from_: Path | str | None = None, *, format: Literal[1, 2] | None = None
 ) -> Path:
-    """The verb ``new``: write a commented model file to start from; its path.
-
-    Beside a commented file stands ``SCHEMA``: with it an editor that knows JSON Schema completes
-    the keys and marks mistakes. A file of that name that is something else is left alone.
+    """Write a model file to start from, and beside a commented one ``SCHEMA``, for editors; its
+    path.
 
     ``from_`` : a model file to begin with: one of format 1 is rewritten in format 2
     (``second_format``), one of format 2 copied. format : of the commented file, 1 unless given.
@@ -214,7 +209,6 @@ def new(
         both ``from_`` and ``format``; a file that cannot be read or rewritten.
     """
     text = _text(from_, format)
-    place = Path(path)
     try:
         with place.open("x", encoding="utf-8") as stream:
             stream.write(text)

@@ -1,5 +1,7 @@
 from . import (
-    paper_reports as paper_reports,
+    reproduce_circuit as reproduce_circuit,
+    reproduce_dynamics as reproduce_dynamics,
+    reproduce_tolerance as reproduce_tolerance,
 )
 from .report_files import (
     make_report as make_report,

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from designer.base.defaults import cores
@@ -98,7 +99,14 @@ def report(
     def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
         place = out / name
         outcome = search_into(
-            asked, place, options, progress, lambda o: o.command("search", model, place)
+            asked,
+            place,
+            options,
+            progress,
+            lambda o: (
+                f"designer search {quote(model.name)} --out {quote(name)} "
+                f"--samples {o.samples} --seed {o.seed}"
+            ),
         )
         row = _searched(_load(place, catalog), place, options, short, progress, tuned=tuned)
         return {**row, "confirmation": outcome.answer["confirmation"]}

@@ -13,7 +13,7 @@ from designer.base.errors import InputError, InputErrors
 from designer.base.printed import one_line, printable, tell
 from designer.base.progress import ProgressLines
 from designer.cli import entry
-from designer.cli.console import grid, say
+from designer.verbs.console import grid, say
 from tests.shared.house import trees
 
 HOSTILE = "\x1b]0;owned\x07\x1b[2J\r\x9b31m\u202edesrever\x08\x7f"
@@ -99,7 +99,7 @@ def test_nothing_else_prints() -> None:
         )
         for module, tree in trees().items()
     }
-    own = {"cli.verbs": 2, "base.printed": 1}
+    own = {"cli.command_line": 2, "base.printed": 1}
     found = {m: n for m, n in printers.items() if n and m in own}
     assert found == own
     others = {m for m, n in printers.items() if n and m not in own}

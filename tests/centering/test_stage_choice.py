@@ -15,8 +15,8 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.dynamics.counts import Counts
-from designer.jobs.simulate_job import simulate
 from designer.model.model_file import parse_model_file
+from designer.verbs.simulate import simulate
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import Verdict
 from designer.yields.study import plan_study

@@ -21,7 +21,7 @@ from designer.base.reason import Reason
 from designer.check import checked_design, trust
 from designer.check.trust import Trust
 from designer.circuit.netlist import Excitation
-from designer.cli import entry, tables
+from designer.cli import entry
 from designer.dynamics import attractors
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import Counts
@@ -37,6 +37,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
+from designer.verbs import tables
 from designer.yields.study import trust_of_yield
 from designer.yields.yield_count import Yield
 from tests.shared.model_text import SMALL

@@ -19,8 +19,8 @@ from designer.circuit.swept_board import BoardSubject
 from designer.cli import entry
 from designer.dynamics import attractors
 from designer.folders.design_files import load
-from designer.jobs.bifurcation_job import bifurcation
 from designer.model.model_file import read_model_file
+from designer.verbs.bifurcation import bifurcation
 from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.quick_folders import quick_folder

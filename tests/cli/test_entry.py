@@ -23,10 +23,11 @@ import pytest
 
 from designer.base.version import __version__
 from designer.cli import entry
-from designer.cli.app import GROUPS, VERBS
+from designer.cli.app import VERBS
 from designer.cli.command_line import application
 from designer.folders.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
+from designer.verbs.declared import GROUPS
 from designer.verdicts.cross_check import OWN_SAMPLES
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 

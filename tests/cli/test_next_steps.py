@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from designer.cli import command_line, next_steps
-from designer.cli.next_steps import Step
+from designer.cli import command_line
+from designer.verbs import next_steps
+from designer.verbs.next_steps import Step
 
 
 def response(found: bool = True, rate: float = 1.0) -> dict[str, Any]:

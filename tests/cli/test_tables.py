@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from designer.cli import bifurcation_tables, simulate_tables, tables
+from designer.jobs.bifurcation_job import BifurcationResult
+from designer.verbs import bifurcation, rules, simulate, tables
 
 
 def answer(**more: Any) -> dict[str, Any]:
@@ -57,14 +58,14 @@ def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
         "count": 16,
         "asked": 16,
     }
-    text = simulate_tables.coexisting(starts)
+    text = simulate.coexisting(starts)
     ends = "% (0 to 100)"
     first, second = f"1-1-0 (x1 -1.2 to 0.9) 50 {ends}", f"1-1-0 (x1 -0.31 to 0.52) 25 {ends}"
     assert f"{first}; {second}; 2-2-1 12.5 {ends}" in text
     assert text.count("aperiodic 6.25 %") == 2
     assert "in the box x1 ± 2:" in text
     starts["box"] = {"x1": 0.0045, "x1'": 0.26}
-    in_si = simulate_tables.coexisting(starts, ["hammer"], in_si=True)
+    in_si = simulate.coexisting(starts, ["hammer"], in_si=True)
     assert "in the box x1 (hammer) ± 4.5 mm, x1' ± 260 mm/s:" in in_si
     assert "1-1-0 (x1 -310 mm to 520 mm) 25 %" in in_si
 
@@ -106,7 +107,7 @@ def test_the_unit_that_was_asked_for_comes_first(
             }
         ],
     }
-    bifurcation_tables.show(sweep, None, False, ends)
+    bifurcation.show(BifurcationResult(sweep, False, None, ends))
     text = " ".join(capsys.readouterr().err.split())
     assert f"track {heads} response" in text
     assert "λ [1/s]" in text
@@ -122,7 +123,7 @@ def test_the_figure_of_a_design_rule_is_said(capsys: pytest.CaptureFixture[str])
         "limit": "at least 0 V",
         "reason": None,
     }
-    tables.rules({"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}})
+    rules.tables({"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}})
     assert "Room to the range's end 11 V at U1B" in " ".join(capsys.readouterr().err.split())
 
 
@@ -139,7 +140,7 @@ def test_what_is_not_good_enough_is_the_first_line(capsys: pytest.CaptureFixture
     assert capsys.readouterr().err.startswith("\nParts")
     rule = {"id": "swing", "found": "11.3 V", "limit": "at most 11 V", "do": "scale down"}
     found = {"warnings": ["The error is 19 %."], "failed_rules": [rule]}
-    tables.run(answer(**design, **found))
+    tables.whole_job(answer(**design, **found))
     first, _, title, heads, row, *_ = capsys.readouterr().err.splitlines()
     assert first == "Not good enough: The error is 19 %."
     assert title == "Design rules that fail"

@@ -33,8 +33,8 @@ from designer.design_rules import rule_reports, run_rules
 from designer.folders.design_source import design_inputs
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
-from designer.jobs import rules_job
 from designer.model.model_file import parse_model_file
+from designer.verbs.rules import rules
 from tests.cli.test_entry import _tree
 from tests.design_rules import test_rules_board
 from tests.shared import rule_cases
@@ -291,7 +291,7 @@ def test_a_folder_that_cannot_be_written_is_judged_all_the_same(
 ) -> None:
     """A read-only file system refuses to remove even what is not there."""
     if before:
-        rules_job.rules(design)
+        rules(design)
     tree = _tree(design)
 
     def refuse(*_: object, **__: object) -> None:
@@ -315,14 +315,14 @@ def test_a_folder_that_cannot_be_written_is_judged_all_the_same(
     assert "Read-only file system" in err
     assert "Traceback" not in err
     assert _tree(design) == tree
-    rules_job.rules(design)
+    rules(design)
     stored = json.loads((design / "rules.json").read_text())
     assert "not_stored" not in stored
     assert stored["rules"] == answer["rules"]
 
 
 def test_a_design_made_anew_forgets_its_rules(design: Path) -> None:
-    rules_job.rules(design)
+    rules(design)
     folder = Folder(design)
     folder.begin({"design": ({"model": "another"}, ["model.toml", "design.json"])}, {})
     assert folder.manifest is not None

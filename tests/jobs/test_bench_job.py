@@ -12,8 +12,10 @@ import pytest
 
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.cli import entry as cli
+from designer.folders import design_source
 from designer.jobs import bench_job
-from designer.jobs.bench_job import bench, channels_of
+from designer.verbs.bench import bench, channels_of
+from designer.workbench import naming
 from tests.shared.paper_cases import synthesised
 from tests.workbench.stored_records import stored
 
@@ -22,7 +24,7 @@ from tests.workbench.stored_records import stored
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """What stands for the design folder of ``examples/paper.toml``."""
     place = tmp_path / "design"
-    monkeypatch.setattr(bench_job, "read_design", lambda *_: synthesised())
+    monkeypatch.setattr(design_source, "read_design", lambda *_: synthesised())
     monkeypatch.setattr(bench_job, "is_design_folder", lambda path: Path(path) == place)
     return place
 
@@ -204,7 +206,7 @@ def test_a_wrong_decay_is_refused_before_anything_is_named(
     def late(*_: object) -> None:
         raise AssertionError("a record was named")
 
-    monkeypatch.setattr(bench_job, "named", late)
+    monkeypatch.setattr(naming, "named", late)
     off = csv_of(3, tmp_path / "off.csv")  # the generator is on to its end
     if what == "no record":
         off.write_text("nothing\n" * 200)

@@ -17,12 +17,13 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, kind_named
 from designer.centering.cure_upgrade import Upgrades, upgraded_file
-from designer.cli import entry, verbs
+from designer.cli import entry
 from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
+from designer.verbs.search import KINDS as UPGRADES
 from tests.shared import paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
@@ -73,8 +74,8 @@ def test_a_kind_needs_no_quotes(said: str, meant: str | None) -> None:
 
 
 def test_help_lists_every_kind() -> None:
-    assert tuple(kind_named(name) for name in verbs.KINDS) == KINDS
-    assert not any(" " in name for name in verbs.KINDS)
+    assert tuple(kind_named(name) for name in UPGRADES) == KINDS
+    assert not any(" " in name for name in UPGRADES)
 
 
 def test_an_unknown_kind_is_answered_with_the_known_ones(
@@ -176,7 +177,7 @@ def test_a_part_that_was_picked_out_lies_anywhere_within_its_grade() -> None:
 def test_help_says_the_kinds(capsys: pytest.CaptureFixture[str]) -> None:
     assert entry.status(["search", "--help"]) == 0
     plain = re.sub(r"[\s│]+", " ", capsys.readouterr().out).replace("- ", "-")
-    for name in verbs.KINDS:
+    for name in UPGRADES:
         assert name in plain
 
 

@@ -22,7 +22,6 @@ from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
 from designer.folders.design_source import read_design
-from designer.jobs.options import Options
 from designer.model.model_file import read_model_file
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts
@@ -286,26 +285,3 @@ def test_json_is_strict() -> None:
     assert text.isascii()
     with pytest.raises(TypeError):
         dumps({"a": object()})
-
-
-def test_the_command_line_holds_names_and_no_paths(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    here = tmp_path / "bench"
-    here.mkdir()
-    monkeypatch.chdir(here)
-    options = Options(seed=7, jobs=3, samples=40, overwrite=True, resume=True)
-    rest = "--samples 40 --seed 7"
-    model = tmp_path / "my model.toml"
-    for out, said in (
-        (tmp_path / "out", "out"),
-        (Path("out/"), "out"),
-        (Path("."), "bench"),
-        (Path("../-x"), "./-x"),
-        (Path("/"), "."),
-        (Path("\udcff"), "'?'"),
-    ):
-        assert options.command("run", model, out) == (
-            f"designer run 'my model.toml' --out {said} {rest}"
-        )
-    assert options.command("tolerance", here, None) == f"designer tolerance bench {rest}"

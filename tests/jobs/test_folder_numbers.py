@@ -11,6 +11,7 @@ import pytest
 from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
 from designer.cli import command_line, entry
+from designer.folders import model_source
 from designer.jobs import folder_numbers, search_job, study_job, trade_job
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
@@ -51,7 +52,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     def source(path: Path, out: Path | None) -> Any:
         return parse_model_file(SMALL), path if out is None else out
 
-    for module in (study_job, search_job, trade_job):
+    for module in (study_job, model_source):
         monkeypatch.setattr(module, "source", source)
     monkeypatch.setattr(study_job, "run_into", study)
     monkeypatch.setattr(search_job, "search_into", study)
@@ -119,7 +120,7 @@ def test_the_blame_is_as_the_folder_has_it(
 ) -> None:
     out = folder(tmp_path / "out", study={**STUDY, "layers": layers})
     options = options_of("tolerance", out, *words, "-q")
-    assert (options.blamed, options.blame_budget) == (blamed, budget)
+    assert (options.blame, options.blame_budget) == (blamed, budget)
 
 
 @pytest.mark.usefixtures("asked")

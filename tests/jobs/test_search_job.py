@@ -100,12 +100,7 @@ def test_the_final_study_takes_its_rung_by_a_trade_and_says_so(
     assert len(heard.notes) == 1
 
 
-def test_a_rung_that_is_asked_for_stands_in_the_command(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    said = Options(rung="ngspice").command("search", Path("m.toml"), Path("out"))
-    assert "--rung ngspice" in said
-    assert "--rung" not in Options().command("search", Path("m.toml"), Path("out"))
+def test_a_cure_has_no_rung(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("search", tmp_path, "--yield", 0.9, "--rung", "exact", "-q") == 2
     assert "--rung" in capsys.readouterr().err  # a cure is decided on the exact circuit
 

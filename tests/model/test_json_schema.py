@@ -12,7 +12,8 @@ from jsonschema import Draft202012Validator
 
 from designer.base.errors import InputError
 from designer.model.model_file import json_schema, parse_model_file
-from designer.model.template import SCHEMA, SECOND, TEXT, new
+from designer.model.template import SCHEMA, SECOND, TEXT
+from designer.verbs.new import new
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FILES = {path.name: path.read_text("utf-8") for path in sorted(EXAMPLES.glob("*.toml"))}

@@ -14,7 +14,8 @@ from designer.model.driven import model_flow
 from designer.model.model import Mechanical
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.model.second_format import second_format
-from designer.model.template import SECOND, TEXT, new
+from designer.model.template import SECOND, TEXT
+from designer.verbs.new import new
 from tests.shared.model_text import PAPER_TABLE, dimensionless
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -15,7 +15,7 @@ from designer.base.errors import InputError
 from designer.base.si_unit import prefixed, value_text
 from designer.base.units import distinct_texts
 from designer.bifurcations.parameter_map import MapPlan
-from designer.cli import entry, tables
+from designer.cli import entry
 from designer.folders.bench_tables import COLUMNS, MECHANISM
 from designer.jobs import bifurcation_request
 from designer.jobs.bifurcation_request import Request
@@ -31,6 +31,7 @@ from designer.model.si_units import (
 )
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, simulate_plots
+from designer.verbs import tables
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 

@@ -239,7 +239,7 @@ def test_search_and_cure_and_trade_ask_for_the_same_as_the_command_line(
 
 
 def test_what_search_cure_and_trade_refuse(model: Path, folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(designer.InputError, match="cured"):
+    with pytest.raises(designer.InputError, match="--yield"):
         designer.search(folder)
     with pytest.raises(designer.InputError, match="--out"):
         designer.search(model)

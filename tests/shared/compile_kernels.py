@@ -36,9 +36,9 @@ def use_models() -> None:
     from designer.dynamics.attractors import settle
     from designer.dynamics.flow import Flow
     from designer.dynamics.piecewise_linear import Drive
-    from designer.jobs.bifurcation_job import bifurcation
     from designer.linear_network.linear_search import best
     from designer.model.model_file import parse_model_file
+    from designer.verbs.bifurcation import bifurcation
     from tests.linear_network.test_linear_block import OPEN, targets_of
     from tests.shared.model_text import PAPER_TABLE, dimensionless
 

@@ -39,6 +39,7 @@ ORDER = (
     "jobs",
     "explorer",
     "paper",
+    "verbs",
     "examples",
     "cli",
 )
@@ -119,10 +120,7 @@ def _directly() -> dict[str, set[str]]:
     out: dict[str, set[str]] = {module: set() for module in trees()}
     for each in imports():
         if not (each.lazy or each.for_types):
-            home = each.module
-            if home not in out:  # a package's own list, which says where the name is
-                home = f"{home}.{public(home).get(each.name) or each.name}"
-            out[each.importer].add(home)
+            out[each.importer].add(_home(each))
     return out
 
 
@@ -134,6 +132,30 @@ def reached(start: str) -> set[str]:
         found |= more
         todo += more
     return found & trees().keys()
+
+
+def reached_by(verb: str) -> set[str]:
+    """The modules that a verb imports whenever it is called: those at the top of its module and of
+    its function, with all that they import."""
+    module = f"verbs.{verb}"
+    (function,) = (
+        node
+        for node in trees()[module].body
+        if isinstance(node, ast.FunctionDef) and node.name == verb
+    )
+    lines = {node.lineno for node in function.body if isinstance(node, ast.ImportFrom)}
+    found = reached(module)
+    for each in imports():
+        if each.importer == module and each.line in lines:
+            found |= reached(_home(each))
+    return found
+
+
+def _home(each: Import) -> str:
+    """The module that an import takes its name from; a package's own list says where that is."""
+    if each.module in trees():
+        return each.module
+    return f"{each.module}.{public(each.module).get(each.name) or each.name}"
 
 
 @cache

@@ -12,7 +12,6 @@ from designer.check import simulation
 from designer.folders import design_files
 from designer.folders.design_source import read_design
 from designer.jobs import (
-    bench_job,
     bifurcation_job,
     cure_job,
     rules_job,
@@ -20,6 +19,7 @@ from designer.jobs import (
     synthesise_job,
     trade_job,
 )
+from designer.workbench import record_formats
 
 
 @contextmanager
@@ -41,6 +41,6 @@ def work_stopped(folder: Path) -> Iterator[None]:
         patched.setattr(cure_job, "find_cure", stop)
         patched.setattr(trade_job, "_document", stop)
         patched.setattr(synthesise_job, "_comparison", stop)
-        patched.setattr(bench_job, "read_record", stop)
+        patched.setattr(record_formats, "read_record", stop)
         patched.setattr("designer.jobs.export_job.kicad_files.texts", stop)
         yield

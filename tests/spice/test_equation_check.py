@@ -17,7 +17,6 @@ from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
-from designer.cli import tables
 from designer.jobs.study_stage import satisfied
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem, Sides
 from designer.model.model import Dimensionless
@@ -31,6 +30,7 @@ from designer.spice.equation_check import (
     transfer,
 )
 from designer.spice.pool import SpicePool
+from designer.verbs import tables
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.paper_cases import synthesised

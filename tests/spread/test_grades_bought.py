@@ -22,7 +22,7 @@ from designer.centering.cure_upgrade import Upgrades, upgraded_file
 from designer.centering.design_search import look
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Circuit
-from designer.cli import entry, tables
+from designer.cli import entry
 from designer.folders import board_files, design_files
 from designer.folders.design_source import bills_are_of_old, design_inputs
 from designer.jobs import study_job, study_stage
@@ -34,6 +34,7 @@ from designer.report.write import render_markdown
 from designer.spread.part_grades import better_grades, better_grades_text, bought, once_otherwise
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
+from designer.verbs import tables
 from designer.yields.study import RunResult, Study, plan_study
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.folders.test_stage_files import design_of

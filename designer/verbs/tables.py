@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from designer.base.printed import tell
 from designer.base.si_unit import drive_text, is_angular, value_text
 from designer.base.units import format_quantity
-from designer.cli.console import grid, say, table
+from designer.verbs import next_steps
+from designer.verbs.console import grid, say, table
+
+if TYPE_CHECKING:
+    from designer.jobs.job_outcome import JobOutcome
 
 YES_NO = {True: "yes", False: "no", None: "-"}
 
 
-def run(answer: Mapping[str, Any]) -> None:
+def design_written(
+    outcome: JobOutcome,
+    answer: Mapping[str, Any],
+    tables: Callable[[Mapping[str, Any]], None],
+    after: Callable[[Path, Mapping[str, Any]], Iterable[next_steps.Step]],
+) -> None:
+    """What a verb that writes a design folder has to say. answer : of the outcome, as it is
+    printed. tables : shows it. after : what may be done next."""
+    if outcome.shown:
+        blame_status(answer)
+    else:
+        tables(answer)
+    if outcome.folder is not None:
+        files(outcome.folder, outcome.reused)
+        next_steps.show(after(outcome.folder, answer))
+
+
+def whole_job(answer: Mapping[str, Any]) -> None:
     """Parts and errors, then the responses."""
     synthesised(answer)
     tolerance(answer)
@@ -189,105 +209,6 @@ def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:
     return dict(zip(("both engines %", "95 %", "differ"), cells, strict=True))
 
 
-def compared(answer: Mapping[str, Any]) -> None:
-    """The design beside the paper's."""
-    from designer.report import compare_table
-
-    heads, *rows = compare_table.rows(answer)
-    grid("Side by side", heads, rows)
-    for note in compare_table.notes(answer):
-        say(note)
-
-
-def searched(answer: Mapping[str, Any]) -> None:
-    """A run; then the responses at their places, what limits them, what each lever is worth."""
-    run(answer)
-    search = answer["search"]
-    pairs = zip(search["final"]["responses"], answer["confirmation"]["responses"], strict=True)
-    places = [(place["expected"] or "any", place, confirmed) for place, confirmed in pairs]
-    table(
-        "Places",
-        (
-            {
-                "response": name,
-                **drive_cells(place, search["final"]["responses"]),
-                "b": f"{place['b']:.4g}",
-                "distance": _sigmas(place["distance"]),
-                "predicted": f"{place['predicted_yield']:.4f}",
-                "confirmed": f"{confirmed['agreed']}/{confirmed['asked']}",
-            }
-            for name, place, confirmed in places
-        ),
-        gap=1,
-    )
-    for name, _, confirmed in places:
-        if confirmed["limited_by"]:
-            say(f"{name} is limited by {confirmed['limited_by']['line']}")
-    if search["contributions"]:
-        table(
-            "Levers: smallest distance",
-            (
-                {
-                    **{key: lever[key] for key in ("lever", "from", "to")},
-                    **{k: _sigmas(lever[k]["smallest_distance"]) for k in ("alone", "without")},
-                }
-                for lever in search["contributions"]
-            ),
-            gap=1,
-        )
-
-
-def cured(answer: Mapping[str, Any]) -> None:
-    """The upgrades of a cure."""
-    from designer.centering import cure_table
-
-    tell(cure_table.text(answer))
-
-
-def traded(answer: Mapping[str, Any]) -> None:
-    """Time and error of every rung."""
-    from designer.fidelity.trade_files import sheet
-
-    tell(sheet(answer))
-
-
-def rules(answer: Mapping[str, Any]) -> None:
-    """Every rule with its figure and what was found; then what to do about those that fail."""
-    from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
-
-    rows = answer["rules"]
-    table(
-        "Design rules",
-        (
-            {
-                "rule": r["id"],
-                "status": r["status"],
-                "figure": r["title"],
-                "found": r["found"],
-                "limit": r["limit"] + (" (model file)" if r["reason"] else ""),
-            }
-            for r in rows
-            if r["status"] != NOT_RUN
-        ),
-    )
-    for r in rows:
-        if r["reason"]:
-            say(f"{r['id']}: the model file's limit, because: {r['reason']}")
-    for r in rows:
-        if r["status"] == FAIL:
-            say(f"{r['id']} fails: {r['do']}")
-    count = answer["counts"]
-    say(f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")
-    idle: dict[str, list[str]] = defaultdict(list)
-    for r in rows:
-        if r["status"] == NOT_RUN:
-            idle[r["found"]].append(r["id"])
-    if idle:
-        say("Not run is no pass. Rules that were not looked at:")
-    for why, ids in idle.items():
-        say(f"  {why}: {', '.join(ids)}")
-
-
 def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     written = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
@@ -298,23 +219,6 @@ def files(folder: Path, reused: bool) -> None:
     """Where the results are."""
     how = "was there already, from the same inputs" if reused else "written"
     say(f"{folder}: {how}")
-
-
-def exported(folder: Path, reused: bool, refused: Sequence[str], answer: Mapping[str, Any]) -> None:
-    """Where the files are and how a board was routed, or why an order is refused."""
-    if refused:
-        say("\n".join(["No order is written, since the board is not finished:", *refused]))
-    elif "routing" not in answer:
-        files(folder, reused)
-    if "dsn" in answer:
-        say(f"{answer['dsn']}: the board for another router")
-    if (routing := answer.get("routing")) is not None:
-        say(
-            f"{folder / routing['board']}: {routing['length_mm']:.0f} mm of track and "
-            f"{routing['vias']} vias laid"
-        )
-        for net, count in routing["open"].items():
-            say(f"no way was found on {net}: {count} connections stay open")
 
 
 def untrusted(trust: Mapping[str, Any]) -> list[str]:
@@ -385,10 +289,6 @@ def _decided(counted: Mapping[str, Any]) -> str:
     """A yield, and how many boards had no answer, if any."""
     failed = counted.get("failed")
     return _percent(counted.get("rate")) + (f" ({failed} failed)" if failed else "")
-
-
-def _sigmas(distance: float | None) -> str:
-    return "-" if distance is None else f"{distance:.2f} σ"
 
 
 def _error(value: float) -> str:

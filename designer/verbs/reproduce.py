@@ -1,15 +1,14 @@
-"""The verb ``reproduce``: a part of the paper measured again, as a report in a folder."""
+"""The verb ``reproduce``."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from designer.base.defaults import at_least, cores
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.schema import one_of
-from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
+from designer.verbs.declared import Jobs, Resume, Verb, argument, option
 
 PaperPart = Literal["dynamics", "circuit", "tolerance"]
 PLACES: dict[PaperPart, Path] = {
@@ -21,19 +20,30 @@ PLACES: dict[PaperPart, Path] = {
 
 
 def reproduce(
-    what: PaperPart,
-    out: Path | str | None = None,
+    what: Annotated[
+        PaperPart,
+        argument("dynamics|circuit|tolerance", "Which part of the paper."),
+    ],
+    out: Annotated[
+        Path | str | None,
+        option(
+            "--out",
+            "DIR",
+            "The folder to write [reports/paper-dynamics, reports/paper-circuit or "
+            "reports/tolerance].",
+            Path,
+        ),
+    ] = None,
     *,
-    samples: int | None = None,
-    seed: int | None = None,
-    jobs: int | None = None,
-    resume: bool = False,
+    samples: Annotated[int | None, option("--samples", "N", "Boards a case (tolerance).")] = None,
+    seed: Annotated[int | None, option("--seed", "N", "Seed of the boards (tolerance).")] = None,
+    jobs: Jobs = None,
+    resume: Resume = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Make the report on one part of the paper; the folder that it stands in.
+    """Measure the paper's figures and statements again.
 
-    samples, seed : of the boards, which only "tolerance" has. resume : go on with the pieces that
-    are there; "dynamics" is made anew each time.
+    The folder of the report is returned. resume : "dynamics" is made anew each time.
 
     Raises
     ------
@@ -41,6 +51,9 @@ def reproduce(
         something else.
     EnvironmentMissing : ngspice is missing.
     """
+    from designer.base.schema import one_of
+    from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
+
     if what not in get_args(PaperPart):
         raise InputError(None, "the part", what, one_of(what, get_args(PaperPart)))
     if jobs is not None:
@@ -66,3 +79,6 @@ def reproduce(
             resume=resume,
         )
     return place
+
+
+VERB = Verb(reproduce, "Study", "designer reproduce dynamics --out out/paper-dynamics", json=None)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.si_unit import is_angular, value_text
-from designer.cli.console import say
+from designer.verbs.console import say
 
 Step = tuple[str, str]
 """A command line, and what it is for."""

@@ -1,38 +1,210 @@
-"""Windows, points, maps and basins as tables for people, on standard error."""
+"""The verb ``bifurcation``."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from designer.base.defaults import CURVE_DEPTH, SEED
+from designer.base.errors import InputError
+from designer.base.progress import Progress
 from designer.base.si_unit import quantity_text, suffix, value_text
-from designer.bifurcations import window_ends
-from designer.bifurcations.continuation import End
-from designer.bifurcations.windows import NOT_LOCATED
-from designer.cli.console import say, table
-from designer.cli.tables import YES_NO, files
+from designer.verbs.console import say, table
+from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
+from designer.verbs.tables import YES_NO, files
+
+if TYPE_CHECKING:
+    from designer.jobs.bifurcation_job import BifurcationResult
 
 LONGEST = 40
 """Lines of a table; the JSON object has them all."""
 
 
-def show(
-    answer: Mapping[str, Any],
-    out: Path | None,
-    reused: bool,
-    ends: tuple[str, str] = ("", ""),
-) -> None:
-    """What the verb found, and where it was written. ends : of the sweep, as they were asked for,
-    which say the unit that comes first."""
+def bifurcation(
+    model: Source,
+    *,
+    over: Annotated[
+        str | None,
+        option(
+            "--over",
+            "NAME",
+            "omega (default), b, k0, zeta, m, k, c or f20; of format 2 a number of an element, "
+            "such as A.upper; with --circuit frequency in Hz (default), omega, amplitude or "
+            "offset in V; with --basins a state.",
+        ),
+    ] = None,
+    from_: Annotated[
+        float | str | None,
+        option(
+            "--from",
+            "A",
+            'One end of the sweep; of a file with SI values also "10 Hz" or "0.5 mm".',
+            reads=str | None,
+        ),
+    ] = None,
+    to: Annotated[
+        float | str | None, option("--to", "B", "The other end.", reads=str | None)
+    ] = None,
+    steps: Annotated[int | None, option("--steps", "N", "Values, both ends included.")] = None,
+    omega: Annotated[
+        float | None, option("--omega", "W", "The drive's frequency where it is not swept.")
+    ] = None,
+    frequency: Annotated[
+        str | None,
+        option(
+            "--frequency",
+            "F",
+            'The same in units, such as "10 Hz"; with --circuit the generator\'s.',
+        ),
+    ] = None,
+    down: Annotated[
+        bool, option("--down", None, "Follow the attractor downwards (the default).")
+    ] = False,
+    up: Annotated[bool, option("--up", None, "Follow it upwards; with --down both.")] = False,
+    starts: Annotated[
+        int | None, option("--starts", "K", "From K starts at every value, rest first.")
+    ] = None,
+    periods: Annotated[
+        int | None, option("--periods", "N", "Drive periods left out [500; maps 134].")
+    ] = None,
+    keep: Annotated[int | None, option("--keep", "N", "Drive periods shown [30; maps 16].")] = None,
+    map_: Annotated[
+        tuple[str, float | str, float | str, int] | None,
+        option(
+            "--map",
+            "NAME A B N",
+            "A map over this parameter too.",
+            reads=tuple[str, str, str, int] | None,
+        ),
+    ] = None,
+    and_: Annotated[
+        tuple[str, float | str, float | str] | None,
+        option(
+            "--and",
+            "NAME A B",
+            "Continue the points as curves over this parameter too.",
+            reads=tuple[str, str, str] | None,
+        ),
+    ] = None,
+    depth: Annotated[
+        int | None,
+        option(
+            "--depth",
+            "K",
+            "With --and: K times in a row, begin the other curves where curves meet "
+            f"[{CURVE_DEPTH}].",
+        ),
+    ] = None,
+    region: Annotated[
+        float | str | None,
+        option(
+            "--region",
+            "V",
+            "With --and: where the response at this value of --over lives.",
+            reads=str | None,
+        ),
+    ] = None,
+    basins: Annotated[
+        bool, option("--basins", None, "Where starts on a plane of states end.")
+    ] = False,
+    circuit: Annotated[
+        bool, option("--circuit", None, "The design folder's circuit, in Hz and volts.")
+    ] = False,
+    points: Annotated[
+        bool, option("--points/--no-points", None, "Locate the bifurcation points.")
+    ] = True,
+    shares: Annotated[
+        int | None,
+        option("--shares", "K", "Count on which attractor K random starts end at every value."),
+    ] = None,
+    box: Annotated[
+        Iterable[str | tuple[str, float | str, float | str]],
+        option(
+            "--box",
+            "STATE=A:B",
+            "Draw a state of these starts from A to B; may be repeated.",
+            reads=list[str],
+        ),
+    ] = (),
+    seed: Seed = SEED,
+    out: Out = None,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    progress: Progress | None = None,
+) -> BifurcationResult:
+    """Draw bifurcation diagrams, maps of n-p-q over two parameters, or basins of attraction.
+
+    Values are numbers, or texts with a unit. ``map_`` : (name, from, to, steps) of the other axis.
+    ``and_`` : (name, from, to) of the second parameter. box : (state, least, greatest), or a text
+    such as "x1=-0.5:0.5". Without ``out`` nothing is written (docs/bifurcations.md).
+
+    Raises
+    ------
+    InputError : the words do not fit together, or a value lies outside its domain.
+    """
+    from designer.jobs.bifurcation_job import requested
+    from designer.jobs.bifurcation_request import Request
+    from designer.jobs.options import Options
+
+    request = Request(
+        over=over,
+        low=from_,
+        high=to,
+        steps=steps,
+        omega=omega,
+        frequency=frequency,
+        down=down,
+        up=up,
+        starts=starts,
+        periods=periods,
+        keep=keep,
+        second=map_,
+        and_=and_,
+        depth=depth,
+        region=region,
+        basins=basins,
+        circuit=circuit,
+        points=points,
+        shares=shares,
+        box=tuple(_limits(each) for each in box),
+        seed=seed,
+    )
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume)
+    place = None if out is None else Path(out)
+    return requested(model, request, place, options, Progress() if progress is None else progress)
+
+
+def _limits(
+    box: str | tuple[str, float | str, float | str],
+) -> tuple[str, float | str, float | str]:
+    """State, least and greatest value of an option such as "x1=-0.5:0.5", or as they are.
+
+    Raises
+    ------
+    InputError : it has no "=" or no ":".
+    """
+    if not isinstance(box, str):
+        return box
+    state, equals, limits = box.partition("=")
+    low, colon, high = limits.partition(":")
+    if not equals or not colon:
+        raise InputError(None, "--box", box, "STATE=A:B, such as x1=-0.5:0.5")
+    return state.strip(), low.strip(), high.strip()
+
+
+def show(result: BifurcationResult) -> None:
+    """What the verb found, and where it was written."""
+    answer = result.answer
     if answer["kind"] == "sweep":
-        _sweep(answer, ends)
+        _sweep(answer, result.ends)
     else:
         {"map": _map, "basins": _basins}[answer["kind"]](answer)
-    if out is not None:
-        files(out, reused)
+    if result.folder is not None:
+        files(result.folder, result.reused)
 
 
 def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
@@ -227,19 +399,25 @@ def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) 
 def _not_sought(window: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The ends of a window that were not looked for."""
     ends = [window[key] for key in ("from_end", "to_end") if key in window]
-    return [end for end in ends if end["kind"] == window_ends.NOT_SOUGHT]
+    from designer.bifurcations.window_ends import NOT_SOUGHT
+
+    return [end for end in ends if end["kind"] == NOT_SOUGHT]
 
 
 def _located(
     window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool
 ) -> dict[str, str]:
     """What ends a window on the branch that its response lies on, and where."""
+    from designer.bifurcations.continuation import End
+    from designer.bifurcations.window_ends import NOT_SOUGHT
+    from designer.bifurcations.windows import NOT_LOCATED
+
     out = {}
     for column, key in (("lower end", "from_end"), ("upper end", "to_end")):
         end = window.get(key)
         kind = "" if end is None else str(end["kind"])
-        text = "-" if kind == window_ends.NOT_SOUGHT else kind.replace("-", " ")
-        if end is not None and kind not in (End.LIMIT, window_ends.NOT_SOUGHT):
+        text = "-" if kind == NOT_SOUGHT else kind.replace("-", " ")
+        if end is not None and kind not in (End.LIMIT, NOT_SOUGHT):
             own = quantity_text(end["value"], unit, 6) if unit else f"{end['value']:.6g}"
             place = _si(end, "value", si) if si and in_si else own
             text += f", known to {place}" if kind == NOT_LOCATED else f" {place}"
@@ -300,3 +478,11 @@ def _basins(answer: Mapping[str, Any]) -> None:
             for a in answer["attractors"][:LONGEST]
         ),
     )
+
+
+VERB = Verb(
+    bifurcation,
+    "Explore",
+    "designer bifurcation model.toml --over omega --from 0.2 --to 1 --steps 200 --out out/sweep",
+    show=show,
+)

@@ -1,0 +1,79 @@
+"""The verb ``run``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from designer.base.progress import Progress
+from designer.verbs import next_steps
+from designer.verbs.declared import (
+    Blame,
+    BlameBudget,
+    Jobs,
+    Out,
+    Overwrite,
+    OwnSeed,
+    Resume,
+    Samples,
+    Show,
+    Source,
+    Verb,
+)
+from designer.verbs.tables import design_written, tolerance, whole_job
+
+if TYPE_CHECKING:
+    from designer.catalog.catalog import Catalog
+    from designer.jobs.job_outcome import JobOutcome
+
+
+def run(
+    model: Source,
+    out: Out = None,
+    *,
+    samples: Samples = None,
+    blame: Blame = None,
+    blame_budget: BlameBudget = None,
+    seed: OwnSeed = None,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    catalog: Catalog | None = None,
+    progress: Progress | None = None,
+    shown: Show = lambda _: None,
+) -> JobOutcome:
+    """Do the whole job: parts, circuit, check in ngspice, yield, report.
+
+    A ``ModelFile`` without ``out`` is worked on in memory. catalog : in memory, instead of the one
+    that is found. shown : is given the answer while the work goes on (``study_stage.Shown``).
+
+    Raises
+    ------
+    InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
+        something else.
+    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
+    EnvironmentMissing : there is work to do and no ngspice.
+    """
+    from designer.jobs.options import Options, stated_options
+    from designer.jobs.study_job import design_and_study
+
+    words = {"samples": samples, "seed": seed, "until": None, "blame": blame}
+    words |= {"blame_budget": blame_budget}
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **stated_options(words))
+    return design_and_study(
+        model, out, options, words, VERB.command, progress, shown, catalog, whole_job=True
+    )
+
+
+def show(result: JobOutcome) -> None:
+    """The tables, where the files are, and what may be done next."""
+    design_written(result, result.answer, whole_job, next_steps.after_study)
+
+
+VERB = Verb(
+    run,
+    "Design",
+    "designer run model.toml --out out/model --samples 200",
+    show=show,
+    satisfied=lambda result: result.satisfied,
+    early=(whole_job, tolerance),
+)

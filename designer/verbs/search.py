@@ -1,0 +1,181 @@
+"""The verb ``search``: the design of the highest yield, or the cheapest cure of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
+from designer.base.errors import MISSING, InputError
+from designer.base.printed import tell
+from designer.base.progress import Progress
+from designer.verbs import next_steps
+from designer.verbs.console import say, table
+from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Source, Verb, option
+from designer.verbs.tables import design_written, drive_cells, whole_job
+
+if TYPE_CHECKING:
+    from designer.jobs.cure_job import CureResult
+    from designer.jobs.job_outcome import JobOutcome
+
+KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
+"""Of upgrades; as ``cure_branch.KINDS``."""
+
+
+def search(
+    model: Source,
+    out: Out = None,
+    *,
+    samples: Annotated[
+        int | None, option("--samples", "N", f"Fresh boards at the end [{SEARCH_SAMPLES}].")
+    ] = None,
+    yield_: Annotated[
+        float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
+    ] = None,
+    budget: Annotated[
+        float | None, option("--budget", "PRICE", "The most that a cure may cost.")
+    ] = None,
+    without: Annotated[
+        Sequence[str],
+        option(
+            "--without",
+            "KIND",
+            f"A cure without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
+            reads=list[str],
+        ),
+    ] = (),
+    rung: Annotated[
+        StudyEngine | None,
+        option(
+            "--rung", None, "Of the final study; auto: by a trade that is in the folder. [auto]"
+        ),
+    ] = None,
+    seed: OwnSeed = None,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    progress: Progress | None = None,
+) -> JobOutcome | CureResult:
+    """Find the design of the highest yield; with --yield, the cheapest cure of a design folder.
+
+    A model file is searched, and written into ``out``. A design folder is cured, as ``cure`` does
+    it.
+
+    Raises
+    ------
+    InputError : a word that the other of both has, no ``out`` of a search, or a folder that holds
+        something else.
+    EnvironmentMissing : a search, and no ngspice; said before any work.
+    """
+    from designer.model.model_file import ModelFile
+
+    path = model if isinstance(model, ModelFile) else Path(model)
+    if isinstance(path, Path) and not path.exists():
+        raise InputError(path, "MODEL|DIR", MISSING, "a model file or a design folder")
+    if isinstance(path, Path) and path.is_dir():
+        _refuse({"--samples": samples, "--rung": rung}, "no such option with a design folder")
+        from designer.jobs import cure_job
+
+        return cure_job.cure(
+            path,
+            yield_=yield_,
+            budget=budget,
+            without=without,
+            out=out,
+            seed=seed,
+            jobs=jobs,
+            overwrite=overwrite,
+            resume=resume,
+            progress=progress,
+        )
+    from designer.folders.model_source import source
+    from designer.jobs import folder_numbers, search_job, usual_times
+    from designer.jobs.options import Options, stated_options
+
+    expected = "a design folder to cure; a model file gets its highest yield"
+    _refuse({"--yield": yield_, "--budget": budget, "--without": without}, expected)
+    words = {"samples": samples, "seed": seed}
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, rung=rung or "auto")
+    options = replace(options, **{"samples": SEARCH_SAMPLES} | stated_options(words))
+    options.check()
+    place = None if out is None else Path(out)
+    modelfile, folder = source(path, place)
+    options = folder_numbers.of_search(folder, options, words)
+    name = path if isinstance(path, Path) else path.source or folder / "model.toml"
+    command = partial(VERB.command, model=name, out=place)
+    progress = Progress() if progress is None else progress
+    with progress.whole(usual_times.SEARCH):
+        return search_job.search_into(modelfile, folder, options, progress, command)
+
+
+def _refuse(options: Mapping[str, object], expected: str) -> None:
+    """InputError for the first of these options that has a value."""
+    for name, value in options.items():
+        if value not in (None, [], ()):
+            raise InputError(None, name, value, expected)
+
+
+def show(result: JobOutcome | CureResult) -> None:
+    """The tables, where the files are, and what may be done next."""
+    from designer.jobs.cure_job import CureResult
+
+    if isinstance(result, CureResult):
+        from designer.centering import cure_table
+
+        tell(cure_table.text(result.answer))
+    else:
+        design_written(result, result.answer, tables, next_steps.after_study)
+
+
+def tables(answer: Mapping[str, Any]) -> None:
+    """A run; then the responses at their places, what limits them, what each lever is worth."""
+    whole_job(answer)
+    search = answer["search"]
+    pairs = zip(search["final"]["responses"], answer["confirmation"]["responses"], strict=True)
+    places = [(place["expected"] or "any", place, confirmed) for place, confirmed in pairs]
+    table(
+        "Places",
+        (
+            {
+                "response": name,
+                **drive_cells(place, search["final"]["responses"]),
+                "b": f"{place['b']:.4g}",
+                "distance": _sigmas(place["distance"]),
+                "predicted": f"{place['predicted_yield']:.4f}",
+                "confirmed": f"{confirmed['agreed']}/{confirmed['asked']}",
+            }
+            for name, place, confirmed in places
+        ),
+        gap=1,
+    )
+    for name, _, confirmed in places:
+        if confirmed["limited_by"]:
+            say(f"{name} is limited by {confirmed['limited_by']['line']}")
+    if search["contributions"]:
+        table(
+            "Levers: smallest distance",
+            (
+                {
+                    **{key: lever[key] for key in ("lever", "from", "to")},
+                    **{k: _sigmas(lever[k]["smallest_distance"]) for k in ("alone", "without")},
+                }
+                for lever in search["contributions"]
+            ),
+            gap=1,
+        )
+
+
+def _sigmas(distance: float | None) -> str:
+    return "-" if distance is None else f"{distance:.2f} σ"
+
+
+VERB = Verb(
+    search,
+    "Design",
+    "designer search model.toml --out out/robust",
+    show=show,
+    satisfied=lambda result: result.satisfied,
+)

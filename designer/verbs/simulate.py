@@ -1,0 +1,359 @@
+"""The verb ``simulate``."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from designer.base.defaults import DRAWN_STARTS, SEED
+from designer.base.errors import InputError
+from designer.base.frames import frame
+from designer.base.plain_json import plain
+from designer.base.progress import Progress
+from designer.base.si_unit import DIGITS, value_text
+from designer.verbs import next_steps
+from designer.verbs.console import say, table
+from designer.verbs.declared import Jobs, Seed, Source, Verb, option
+from designer.verbs.tables import YES_NO, pictures, response_cells, untrusted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from designer.check.simulation import Simulated
+    from designer.check.synthesis_result import Synthesis
+    from designer.model.model_file import ModelFile
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """What the verb ``simulate`` answers. It is a sequence of the responses too."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md)."""
+    simulated: tuple[Simulated, ...]
+    """Each response with its orbits."""
+    model: Path | None
+    """The model file or design folder that was asked about, where it is one."""
+    plots: Path | None
+    """The directory of the pictures, if there are some."""
+
+    @property
+    def satisfied(self) -> bool:
+        """Whether every wanted response was found and can be trusted."""
+        return all(s.found and s.trust.trusted is True for s in self.simulated)
+
+    def table(self) -> pd.DataFrame:
+        """A row for each orbit: each response, its twin and the others that coexist with it, in
+        model units."""
+        return frame(row for s in self.simulated for row in s.rows())
+
+    def __iter__(self) -> Iterator[Simulated]:
+        return iter(self.simulated)
+
+    def __len__(self) -> int:
+        return len(self.simulated)
+
+    def __getitem__(self, index: int) -> Simulated:
+        return self.simulated[index]
+
+    def _repr_html_(self) -> str:
+        return "".join(s._repr_html_() for s in self.simulated)
+
+
+def simulate(
+    model: Source,
+    omega: Annotated[
+        float | str | Iterable[float | str],
+        option(
+            "--omega",
+            "W",
+            "Frequency in the model's own units; may be repeated.",
+            reads=list[float],
+        ),
+    ] = (),
+    *,
+    frequency: Annotated[
+        float | str | Iterable[float | str],
+        option(
+            "--frequency",
+            "F",
+            'Of a model file with SI values, such as "10 Hz" or "62.8 rad/s"; may be repeated.',
+            reads=list[str],
+        ),
+    ] = (),
+    engine: Annotated[
+        Literal["model", "circuit", "ngspice"], option("--engine", None, "What simulates.")
+    ] = "model",
+    rung: Annotated[
+        Literal["ideal", "dynamic", "full"],
+        option("--rung", None, "The op-amps' model, with --engine ngspice."),
+    ] = "ideal",
+    starts: Annotated[
+        int, option("--starts", "N", "Initial states that are drawn: the attractors' shares.")
+    ] = DRAWN_STARTS,
+    seed: Seed = SEED,
+    plots: Annotated[
+        Path | str | None, option("--plots", "DIR", "Draw each response: PNG and SVG.", Path)
+    ] = None,
+    overwrite: Annotated[
+        bool, option("--overwrite", None, "Replace pictures of the same names.")
+    ] = False,
+    jobs: Jobs = None,
+    progress: Progress | None = None,
+) -> SimulationResult:
+    """Name the responses: those that the model file wants, or those reached from rest at
+    --omega and --frequency.
+
+    omega, frequency : one value or several. An omega is a number in the model's units, a frequency
+    a text such as "10 Hz" or a number in Hz.
+
+    Raises
+    ------
+    InputError : as ``simulation.simulate``, or pictures that are in the way.
+    """
+    from designer.catalog.catalog import load_catalog
+    from designer.check import simulation
+    from designer.folders.json_answers import simulate_json
+    from designer.folders.model_source import model_file, source
+    from designer.folders.origin import provenance
+    from designer.jobs.options import Options
+    from designer.model.model_file import ModelFile
+    from designer.model.si_units import Reader, units_of
+
+    Options(seed, jobs).check()
+    progress = Progress() if progress is None else progress
+    began, catalog = time.perf_counter(), load_catalog()
+    synthesis: Synthesis | None = None
+    path: Path | None = None
+    if isinstance(model, ModelFile):
+        modelfile = model
+    elif (path := Path(model)).is_dir():
+        modelfile, folder = source(path, path)
+        if engine != "model":
+            from designer.folders.design_source import read_design
+
+            synthesis = read_design(folder, catalog, progress)
+    else:
+        modelfile = model_file(path)
+    read = Reader(modelfile.model, modelfile.si)
+    omegas = tuple(read.value("--omega", "omega", w) for w in _several("omega", omega, "0.85"))
+    frequencies = _several("frequency", frequency, "'10 Hz'")
+    omegas += tuple(read.frequency("--frequency", f) for f in frequencies)
+    wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
+    place = None if plots is None else Path(plots)
+    names: tuple[str, ...] = ()
+    if place is not None:
+        from designer.plots import simulate_plots
+
+        digits = simulate_plots.DIGITS if modelfile.si is None else DIGITS
+        names = simulate_plots.names([w for w in wanted if w is not None], digits)
+        simulate_plots.check(place, names, overwrite)
+    simulated = simulation.simulate(
+        modelfile,
+        omegas,
+        engine=engine,
+        synthesis=synthesis,
+        jobs=jobs,
+        progress=progress,
+        traces=place is not None,
+        rung=rung,
+        starts=starts,
+        seed=seed,
+        choose=_chosen,
+    )
+    settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
+    origin = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
+    seconds = time.perf_counter() - began
+    answer = simulate_json(simulated, engine, origin, seconds, modelfile.si)
+    if place is not None:
+        progress.stage("pictures")
+        units = units_of(modelfile.si, modelfile.model)
+        answer["files"] = simulate_plots.write(place, names, simulated, overwrite, units)
+    return SimulationResult(plain(answer), simulated, path, place)
+
+
+def _chosen(modelfile: ModelFile) -> Synthesis:
+    """Parts as ``synthesise`` chooses them, whatever the model shows."""
+    from designer.centering import stage_choice
+
+    return stage_choice.synthesise(modelfile, all_found=False)
+
+
+def _several(name: str, given: object, example: str) -> list[float | str]:
+    """The values of an argument that is one number or text, or several of them.
+
+    Raises
+    ------
+    InputError : it is something else. example : a value, as it is written.
+    """
+    each = given if isinstance(given, Iterable) and not isinstance(given, str | bytes) else [given]
+    values = []
+    for value in each:
+        if isinstance(value, bool) or not isinstance(value, Real | str):
+            expected = f"one value or a list of them: {name}={example} or {name}=[{example}, …]"
+            raise InputError(None, name, repr(value), expected)
+        values.append(value if isinstance(value, str) else float(value))
+    return values
+
+
+def tables(answer: Mapping[str, Any]) -> None:
+    """The responses on one engine."""
+    head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
+    rows = answer["responses"]
+    masses = answer.get("masses", ())
+    table(
+        head,
+        (
+            {
+                **(_response_cells_in_si if masses else response_cells)(r, rows),
+                "response": r["response"]
+                + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
+                "symmetric": YES_NO[r["symmetric"]],
+                **_reach(r, rows, masses),
+                "twin": "-" if r["twin"] is None else r["twin"]["response"],
+                "others": ", ".join(o["response"] for o in r["others"]) or "-",
+            }
+            for r in rows
+        ),
+        gap=1,
+    )
+    in_si = bool(masses) and all("frequency_hz" in r for r in rows)
+    if any("base_amplitude" in r for r in rows):
+        from_base = [_from_base(r, masses, in_si=in_si) for r in rows]
+        table("Displacements from the base", from_base, gap=1)
+    for r in rows:
+        place = _place(r, in_si=in_si)
+        if r["starts"] is not None:
+            say(f"{place}: {coexisting(r['starts'], masses, in_si=in_si)}")
+        if r["reason"]:
+            say(f"{place}: {r['response']}: {r['reason']}")
+        if r["frequencies"] is not None:
+            say(f"{place}: {frequencies(r)}")
+        for other in r["others"]:
+            if other["frequencies"] is not None:
+                say(f"{place}: of the others, {frequencies(other)}")
+        if r["lyapunov_error"] is not None:
+            growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}{' 1/s' if in_si else ''}"
+            say(f"{place}: largest exponent {growth} (standard error)")
+        for line in untrusted({"this response": r.get("trust")}):
+            say(f"{place}: {line}")
+
+
+def _place(row: Mapping[str, Any], *, in_si: bool) -> str:
+    """The drive frequency that a response belongs to."""
+    return value_text(row["frequency_hz"], "Hz", 6) if in_si else f"ω = {row['omega']:g}"
+
+
+def _from_base(row: Mapping[str, Any], masses: Sequence[str], *, in_si: bool) -> dict[str, str]:
+    """How far the masses go from a base that moves, and how far that goes."""
+    lows, highs = row["from_base_min"], row["from_base_max"]
+    cells = {"at": _place(row, in_si=in_si), "response": row["response"]}
+    for i, name in enumerate(masses):
+        ends = () if lows is None else (lows[i], highs[i])
+        cells[f"x{i + 1} − y ({name})"] = _between(ends, in_si=in_si)
+    y = row["base_amplitude"]
+    return {**cells, "y (base)": f"± {value_text(y, 'm') if in_si else format(y, '.6g')}"}
+
+
+def _between(ends: Sequence[float], *, in_si: bool) -> str:
+    return " to ".join(value_text(x, "m") if in_si else f"{x:.6g}" for x in ends) or "-"
+
+
+def frequencies(row: Mapping[str, Any]) -> str:
+    """The two frequencies of a quasi-periodic motion, and their ratio."""
+    drive, second = row["frequencies"]
+    in_hertz = row.get("frequencies_hz")
+    if in_hertz is None:
+        pair = f"ω {drive:.6g} of the drive and {second:.7g}"
+    else:
+        first, other = value_text(in_hertz[0], "Hz"), value_text(in_hertz[1], "Hz", 7)
+        pair = f"{first} of the drive and {other}"
+    return f"quasi-periodic with the frequencies {pair}, {second / drive:.7g} times the drive's"
+
+
+def _reach(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], masses: Sequence[str]
+) -> dict[str, str]:
+    """How far the masses go: the first one, or each of those that have names."""
+    in_si = "frequency_hz" in rows[0]
+    cells = {}
+    for i, name in enumerate(masses):
+        ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
+        cells[f"x{i + 1} ({name})"] = _between(ends, in_si=in_si)
+    if masses:
+        return cells
+    si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
+    for head, key in {"x1 max": "x1_max", "x1 min": "x1_min"}.items():
+        cells[head] = "-" if row[key] is None else f"{row[key]:.6g}"
+    for head, key in si.items():
+        cells[head] = "-" if row[key] is None else value_text(row[key], "m")
+    return cells
+
+
+def coexisting(
+    starts: Mapping[str, Any], masses: Sequence[str] = (), *, in_si: bool = False
+) -> str:
+    """Where the starts that were drawn from a box end, the largest share first.
+
+    masses : their names, if they have some. in_si : whether numbers are SI values.
+    """
+
+    def text(value: float, unit: str, digits: int = 4) -> str:
+        return value_text(value, unit, digits) if in_si else f"{value:.{digits}g}"
+
+    parts = []
+    names = Counter(a["response"] for a in starts["attractors"])
+    for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
+        name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
+        if names[a["response"]] > 1 and a["x1_min"] is not None:
+            name += f" (x1 {text(a['x1_min'], 'm')} to {text(a['x1_max'], 'm')})"
+        parts.append(f"{name} {_share(a)}")
+    if starts["not_settled"]["count"]:
+        parts.append(f"not settled {_share(starts['not_settled'])}")
+    named = {f"x{i + 1}": f" ({mass})" for i, mass in enumerate(masses)}
+    box = starts["box"].items()
+    units = {x: "m/s" if x.endswith("'") else "m" for x, _ in box}
+    halves = ", ".join(f"{x}{named.get(x, '')} ± {text(half, units[x], 3)}" for x, half in box)
+    count = str(starts["count"])
+    if starts["count"] < starts["asked"]:
+        count += f" (of {starts['asked']}: the others would take too many steps)"
+    return f"of {count} starts at drive phase 0 in the box {halves}: {'; '.join(parts)}"
+
+
+def _response_cells_in_si(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+) -> dict[str, str]:
+    """The same cells for a model whose plain numbers are SI values, where it has any."""
+    cells = response_cells(row, rows)
+    if "mechanism" not in cells:
+        return cells
+    return {"frequency": cells["mechanism"], "expected": cells["expected"]}
+
+
+def _share(counted: Mapping[str, Any]) -> str:
+    """With its 95 % interval."""
+    low, high = 100 * counted["low"], 100 * counted["high"]
+    return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
+
+
+def show(result: SimulationResult) -> None:
+    """The tables, where the pictures are, and what may be done next."""
+    tables(result.answer)
+    if result.plots is not None:
+        pictures(result.plots, result.answer["files"])
+    if result.model is not None:
+        next_steps.show(next_steps.after_response(result.model, result.answer["responses"]))
+
+
+VERB = Verb(
+    simulate,
+    "Explore",
+    "designer simulate model.toml --omega 0.85 --plots pictures",
+    show=show,
+    satisfied=lambda result: result.satisfied,
+)

@@ -1,0 +1,98 @@
+"""The verb ``synthesise``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from designer.base.defaults import SEED
+from designer.base.progress import Progress
+from designer.verbs import next_steps
+from designer.verbs.console import grid, say
+from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
+from designer.verbs.tables import design_written, synthesised
+
+if TYPE_CHECKING:
+    from designer.catalog.catalog import Catalog
+    from designer.jobs.job_outcome import JobOutcome
+
+
+def synthesise(
+    model: Source,
+    out: Out = None,
+    *,
+    compare: Annotated[
+        bool, option("--compare", None, "Set the design beside the paper's values; needs no --out.")
+    ] = False,
+    seed: Seed = SEED,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    catalog: Catalog | None = None,
+    progress: Progress | None = None,
+) -> JobOutcome:
+    """Choose the parts and write the design folder.
+
+    A ``ModelFile`` without ``out`` is worked on in memory, and so is a path with ``compare``.
+    catalog : in memory, instead of the one that is found.
+
+    Raises
+    ------
+    InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
+        something else.
+    ResponseNotFound : the model does not show a wanted response; no parts are chosen.
+    """
+    from designer.folders.model_source import source
+    from designer.jobs import search_stage, synthesise_job, usual_times
+    from designer.jobs.options import Options
+    from designer.model.model_file import ModelFile, read_model_file
+
+    options = Options(seed, jobs, overwrite=overwrite, resume=resume)
+    options.check()
+    progress = Progress() if progress is None else progress
+    in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
+    if out is None and in_memory:
+        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+        return synthesise_job.synthesise_in_memory(
+            modelfile, catalog, compare, options.workers, progress
+        )
+    modelfile, folder = source(model, out)
+    with progress.whole(usual_times.of_design(modelfile)):
+        modelfile = search_stage.design_file(modelfile, folder, options, progress)
+        return synthesise_job.synthesise_into(modelfile, folder, options, progress, compare=compare)
+
+
+synthesize = synthesise
+"""The same in American spelling."""
+
+
+def show(result: JobOutcome) -> None:
+    """The tables, where the files are, and what may be done next."""
+    design_written(result, result.answer, tables, next_steps.after_design)
+
+
+def tables(answer: Mapping[str, Any]) -> None:
+    """The design, and beside the paper's where that was asked for."""
+    synthesised(answer)
+    if "comparison" in answer:
+        _compared(answer["comparison"])
+
+
+def _compared(answer: Mapping[str, Any]) -> None:
+    """The design beside the paper's."""
+    from designer.report import compare_table
+
+    heads, *rows = compare_table.rows(answer)
+    grid("Side by side", heads, rows)
+    for note in compare_table.notes(answer):
+        say(note)
+
+
+VERB = Verb(
+    synthesise,
+    "Design",
+    "designer synthesise model.toml --out out/model",
+    show=show,
+    satisfied=lambda result: result.satisfied,
+)

@@ -1,0 +1,172 @@
+"""The verb ``tolerance``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from designer.base.defaults import Over, StudyEngine
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.verbs import next_steps, tables
+from designer.verbs.declared import (
+    Blame,
+    BlameBudget,
+    Jobs,
+    Out,
+    Overwrite,
+    OwnSeed,
+    Resume,
+    Samples,
+    Show,
+    Verb,
+    argument,
+    option,
+)
+
+if TYPE_CHECKING:
+    from designer.check.synthesis_result import Synthesis
+    from designer.jobs.job_outcome import JobOutcome
+    from designer.model.model_file import ModelFile
+
+STUDY_KEYS = (
+    "format",
+    "samples",
+    "until",
+    "narrow",
+    "all_on_one_board",
+    "blame",
+    "boards",
+    "equation_check",
+    "responses",
+    "maps",
+    "provenance",
+)
+"""Of what a study's JSON object has, in the order in which they are printed."""
+
+
+def tolerance(
+    model: Annotated[
+        Path | str | ModelFile | Synthesis | JobOutcome,
+        argument("MODEL|DIR", "A model file (TOML) or a design folder.", reads=Path),
+    ],
+    out: Out = None,
+    *,
+    samples: Samples = None,
+    until: Annotated[
+        float | None, option("--until", "WIDTH", "Add boards until intervals are narrower.")
+    ] = None,
+    rung: Annotated[
+        StudyEngine | None,
+        option(
+            "--rung",
+            None,
+            "exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board in ngspice "
+            "too [auto, or as the folder has].",
+        ),
+    ] = None,
+    tuned: Annotated[
+        bool, option("--tuned", None, "Also with the generator free within its bands.")
+    ] = False,
+    reached: Annotated[
+        bool, option("--reached", None, "Also from power-up, by the start recipe.")
+    ] = False,
+    map_: Annotated[
+        Sequence[Over],
+        option(
+            "--map",
+            None,
+            "Also the yield over this setting; may be repeated.",
+            reads=list[Over],
+        ),
+    ] = (),
+    measured: Annotated[
+        Path | str | None,
+        option("--measured", "FILE", "Study the boards in this list instead (CSV).", Path),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        option("--cluster", "tcp://…", "A Dask scheduler that shares the work.", decides=False),
+    ] = None,
+    blame: Blame = None,
+    blame_budget: BlameBudget = None,
+    seed: OwnSeed = None,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    progress: Progress | None = None,
+    shown: Show = lambda _: None,
+) -> JobOutcome:
+    """Count the boards that will work, into the design folder; a model file needs --out.
+
+    model : a design is studied in its folder or, without one, in memory; so is a ``ModelFile``
+    without ``out``. samples : at least. until : width of the 95 % intervals at which the study
+    stops growing. rung : "auto" asks ngspice about some boards, and "bandwidth" is "auto" with
+    op-amps that lag by their gain-bandwidth. measured : of boards of a design folder.
+
+    Raises
+    ------
+    InputError, Unreachable, EnvironmentMissing : as ``run``.
+    """
+    from designer.jobs import folder_numbers
+    from designer.jobs.job_outcome import JobOutcome
+    from designer.jobs.options import Options, stated_options
+    from designer.jobs.study_job import design_and_study, measured_into
+
+    words = {"samples": samples, "seed": seed, "until": until, "rung": rung, "blame": blame}
+    words |= {"blame_budget": blame_budget}
+    options = Options(
+        jobs=jobs,
+        overwrite=overwrite,
+        resume=resume,
+        tuned=tuned,
+        reached=reached,
+        map_=tuple(dict.fromkeys(map_)),
+        cluster=cluster,
+        **stated_options(words),
+    )
+    if measured is None:
+        return design_and_study(model, out, options, words, VERB.command, progress, shown)
+    options.check()
+    for name, value in (
+        ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_))
+    ):  # fmt: skip
+        if value not in (None, ""):
+            expected = "no such option with --measured, whose boards are the samples"
+            raise InputError(None, name, str(value), expected)
+    folder = model.folder if isinstance(model, JobOutcome) else model
+    if not isinstance(folder, Path | str):
+        raise InputError(None, "DIR", "no folder", "a design folder, whose boards were measured")
+    path = Path(folder)
+    options = folder_numbers.of_measured(path, options, words)
+    # The boards of the list are the samples.
+    command = partial(VERB.command, model=path, out=None, without=("samples",))
+    progress = Progress() if progress is None else progress
+    return measured_into(path, Path(measured), options, progress, command, shown)
+
+
+def printed(result: JobOutcome) -> dict[str, Any]:
+    """Of the answer, what is of the study."""
+    answer: Mapping[str, Any] = result.answer
+    return {
+        **{key: answer[key] for key in STUDY_KEYS if key in answer},
+        "cost": answer["cost"]["study"],
+    }
+
+
+def show(result: JobOutcome) -> None:
+    """The tables, where the files are, and what may be done next."""
+    tables.design_written(result, printed(result), tables.tolerance, next_steps.after_study)
+
+
+VERB = Verb(
+    tolerance,
+    "Study",
+    "designer tolerance out/model --samples 2000 --rung exact",
+    show=show,
+    json=printed,
+    satisfied=lambda result: result.satisfied,
+    early=(tables.tolerance, tables.tolerance),
+)
