@@ -92,7 +92,6 @@ class Picture:
     label: str = ""
     """What it shows, in words; an ``svg`` says so itself."""
     caption: str = ""
-    """The caption."""
     file: str = ""
     """Name of the file; "" for a picture that Markdown leaves out."""
     svg: str = ""
@@ -124,7 +123,6 @@ class Gallery:
     key: Picture
     """Their common legend; without ``svg`` where they need none."""
     pictures: tuple[Picture, ...]
-    """The pictures."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +140,6 @@ class Verbatim:
     """Verbatim that stay as they are, such as a command or equations."""
 
     lines: tuple[str, ...]
-    """The lines."""
     equations: bool = False
     """Whether HTML sets them as formulas."""
 
@@ -174,7 +171,6 @@ class Columns:
     """Sections side by side, where there is room."""
 
     sections: tuple[PageSection, ...]
-    """The sections."""
 
 
 Block = (
@@ -188,11 +184,9 @@ class Page:
     """A page."""
 
     title: str
-    """Its title."""
     head: Sequence[Block]
     """What stands before the first section."""
     sections: Sequence[PageSection]
-    """The sections."""
 
 
 def bullets(texts: Iterable[str]) -> Items:

@@ -51,9 +51,7 @@ class SourceText:
     """The text that expressions were read from, for messages."""
 
     text: str
-    """All of it."""
     file: Path | None
-    """Its file."""
 
     def error(self, offset: int, found: str, expected: str) -> InputError:
         """Something wrong at this offset into the text."""

@@ -91,7 +91,6 @@ class WatchedPoint:
     """A point of a curve, with what tells whether something happens on the way to the next."""
 
     point: CurvePoint
-    """The point."""
     events: dict[Event, float]
     """The test functions there."""
     partner: Array

@@ -66,7 +66,6 @@ class BranchPoint:
     value: float
     """Value of the parameter."""
     orbit: Orbit
-    """The orbit there."""
     solved: Solved
     """Where on its curve it lies."""
 

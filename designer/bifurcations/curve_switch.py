@@ -45,7 +45,6 @@ class OtherCurve:
     """The orbit of a point of codimension two, on the other curve that passes there. Plain data."""
 
     kind: PointKind
-    """Kind of the other curve."""
     n: int
     """Period of the orbit, in drive periods."""
     symmetric: bool

@@ -49,7 +49,6 @@ class SweptEnd:
     """An end of a sweep's window, by the branch that its response lies on."""
 
     window: Window
-    """The window."""
     side: int
     """1 for its upper end, -1 for the lower."""
     kind: str

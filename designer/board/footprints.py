@@ -22,7 +22,6 @@ class PadShape:
     """A pad of a footprint."""
 
     number: str
-    """Number of the pad."""
     x: float
     """Place of its middle to the right [mm]."""
     y: float
@@ -44,9 +43,7 @@ class FootprintShape:
     """A footprint, with the part that stands on it."""
 
     name: str
-    """Name of the footprint."""
     pads: tuple[PadShape, ...]
-    """Pads of the footprint."""
     body: tuple[float, float]
     """Width and height of the part seen from above [mm]."""
     mark: bool = False

@@ -45,7 +45,6 @@ class PlacedPad:
     """A pad as it stands on a board."""
 
     number: str
-    """Number of the pad."""
     net: str
     """The circuit's name of its net, "" where none is connected."""
     at: Point
@@ -64,13 +63,11 @@ class PlacedFootprint:
     value: str
     """Its value as written."""
     pads: tuple[PlacedPad, ...]
-    """Pads of the footprint."""
     courtyard: bool
     """Whether the footprint has a courtyard."""
     library: str
     """Library of the footprint; "" where none is written."""
     name: str
-    """Name of the footprint."""
     part_number: str | None
     """The field ``MPN``, None where there is none."""
     fitted: bool
@@ -91,9 +88,7 @@ class BoardFile:
     path: Path
     """The file that it was read from."""
     text: str
-    """The file's text."""
     footprints: tuple[PlacedFootprint, ...]
-    """The footprints."""
     tracks: tuple[str, ...]
     """Net of each piece of track."""
     vias: tuple[str, ...]

@@ -27,9 +27,7 @@ class ShapePin:
     """A pin of a symbol."""
 
     number: str
-    """Number of the pin."""
     name: str
-    """Name of the pin."""
     electrical: str
     """Its electrical type, in KiCad's words."""
     x: int
@@ -47,7 +45,6 @@ class SymbolUnit:
     """One of the drawings that a symbol consists of."""
 
     pins: tuple[ShapePin, ...]
-    """Pins of the unit."""
     lines: tuple[tuple[tuple[float, float], ...], ...]
     """Polylines of points (x, y)."""
     filled: bool = True
@@ -59,7 +56,6 @@ class SymbolShape:
     """A symbol."""
 
     name: str
-    """Name of the symbol."""
     prefix: str
     """What its designators begin with."""
     units: tuple[SymbolUnit, ...]

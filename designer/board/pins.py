@@ -42,7 +42,6 @@ class Pin:
     number: str
     """Number of its pad."""
     name: str
-    """Name of the pin."""
     net: str
     """The net on it; "" where nothing may be connected."""
     electrical: Electrical = "passive"

@@ -24,7 +24,6 @@ class PlacedComponent:
     """A component on the board."""
 
     component: Component
-    """The component."""
     footprint: FootprintShape
     """The footprint, with its pads."""
     x: float = 0.0

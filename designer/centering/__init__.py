@@ -2,7 +2,3 @@
 
 It calls match, circuit and prediction again and again; nothing below imports it.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

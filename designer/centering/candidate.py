@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import Agreement
@@ -49,7 +49,7 @@ class Candidate:
     def rank(self) -> tuple[float, float]:
         """The smallest distance; the logarithm of the product of the predicted yields, in which a
         response that the nominal board does not show counts as one ``MISSING`` away."""
-        logs = [float(norm.logcdf(max(d, MISSING))) for d in self.distances]
+        logs = [float(log_ndtr(max(d, MISSING))) for d in self.distances]
         return min(self.distances), sum(logs)
 
 

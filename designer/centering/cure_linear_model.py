@@ -52,7 +52,6 @@ class LinearModel:
     branch: CureBranch
     """The branch that is modelled."""
     parts: tuple[PartSlot, ...]
-    """Its slots, part by part."""
     ways: tuple[tuple[ResponseWay, ...], ...]
     """The ways of showing each response."""
     ratios: tuple[Mapping[str, float], ...]

@@ -11,12 +11,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.linear_network.milp import SOLVER, chosen_row
+
+if TYPE_CHECKING:
+    pass
 
 SLACK = 1e-7
 """Of a demand's room: what the solver's tolerance may exceed it by."""
@@ -29,7 +32,6 @@ class Option:
     """One way of filling a slot."""
 
     name: str
-    """Name of the option."""
     price: float
     """Price over that of the slot as it is."""
     trouble: float = 0.0
@@ -41,7 +43,6 @@ class Slot:
     """One thing that is decided."""
 
     name: str
-    """Name of the slot."""
     options: tuple[Option, ...]
     """Its options; the first is the design as it is."""
 
@@ -51,7 +52,6 @@ class Demand:
     """A demand on a linear form: its variance stays below a limit."""
 
     name: str
-    """Name of the demand."""
     room: float
     """Largest variance of the linear form."""
     variances: tuple[Array, ...]
@@ -108,6 +108,8 @@ def cheapest(program: CureProgram) -> tuple[int, ...] | None:
     ------
     ArithmeticError : what the solver calls optimal does not keep the demands.
     """
+    import cvxpy as cp  # takes a second
+
     takes = [cp.Variable(len(s.options), boolean=True) for s in program.slots]
     constraints: list[object] = [cp.sum(x) == 1 for x in takes]
     for d in program.demands:

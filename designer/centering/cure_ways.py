@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from designer.centering.cure_branch import PLACE, TRIM, CureBranch
 from designer.centering.cure_measure import Book, measure, plan_of, questions_of
@@ -113,7 +113,6 @@ class Looker:
     """Computes the ways in which a branch may show each response."""
 
     branch: CureBranch
-    """The branch."""
     target: float
     """Yield that is wanted of every response."""
     seed: int
@@ -196,7 +195,7 @@ class Looker:
         return lost, total
 
     def _too_many(self, lost: int, total: int) -> bool:
-        return bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
+        return bool(bdtrc(lost - 1, total, 1.0 - self.target) < RARE)
 
     def enough(self, first: ResponseWay) -> bool:
         """Whether a response needs no way but ``first``, the one as it is."""

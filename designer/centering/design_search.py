@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress, doing, part, seeking
@@ -461,7 +461,7 @@ class _Hunt:
         reason = str(self.short) if candidate is None else ""
         self.steps.append(Step(lever, setting, rank, adopted, reason))
         if candidate is not None:
-            worst = float(norm.cdf(candidate.rank[0]))
+            worst = float(ndtr(candidate.rank[0]))
             text = f"smallest distance {candidate.rank[0]:.2f} σ (predicted yield {worst:.4f})"
             self.progress.note(f"  {lever}: {setting}: {text}{', kept' if adopted else ''}")
             if adopted:

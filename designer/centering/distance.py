@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import norm
+from scipy.special import log_ndtr, ndtr
 
 from designer.base.plain_json import plain
 from designer.centering.answer_cache import AnswerCache
@@ -64,7 +64,7 @@ class StretchCounts:
 
         def against(d: float) -> float:
             z = d * scale
-            return -float(np.sum(ok * norm.logcdf(z) + lost * norm.logcdf(-z)))
+            return -float(np.sum(ok * log_ndtr(z) + lost * log_ndtr(-z)))
 
         fit = minimize_scalar(against, bounds=(-FARTHEST, FARTHEST), method="bounded")
         return round(float(fit.x), 4)
@@ -72,7 +72,7 @@ class StretchCounts:
     @property
     def predicted(self) -> float:
         """Yield at the spread as it is."""
-        return float(norm.cdf(self.distance))
+        return float(ndtr(self.distance))
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,6 @@ class Limiting:
     shares: dict[str, float]
     """Shares of the border's variance, by what moves it; see ``shares``."""
     line: str
-    """All of this in one line."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import Candidate, Contribution, SearchResult
@@ -153,7 +153,7 @@ def _rank(rank: Rank) -> dict[str, Any]:
         return {"smallest_distance": None, "smallest_yield": None, "product": None}
     return {
         "smallest_distance": rank[0],
-        "smallest_yield": float(norm.cdf(rank[0])),
+        "smallest_yield": float(ndtr(rank[0])),
         "product": math.exp(rank[1]),
     }
 

@@ -49,7 +49,6 @@ class Stretch:
     """Neighbouring places at one clearance that show one response, by ascending ω."""
 
     places: tuple[OperatingPoint, ...]
-    """The places."""
 
     @property
     def b(self) -> float:

@@ -28,7 +28,6 @@ class Synthesis:
     """A model file, what its model shows, and the parts chosen for it."""
 
     modelfile: ModelFile
-    """The model file."""
     catalog: Catalog
     """The catalogue that parts were chosen from."""
     model_responses: tuple[ModelResponse, ...]

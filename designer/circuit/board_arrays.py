@@ -24,7 +24,6 @@ class Boards:
     ``board_values.Board``."""
 
     circuit: Circuit
-    """The circuit."""
     values: Mapping[str, Array]
     """Ohm or farad by part."""
     offset: Mapping[str, Array]

@@ -35,7 +35,6 @@ class DeadZonePlace:
     """Where the stage of one clearance stands."""
 
     clearance: Clearance
-    """The clearance."""
     index: int
     """Its place in the order of the clearances."""
     alone: bool

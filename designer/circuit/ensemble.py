@@ -46,7 +46,6 @@ class SettledBoard:
     """The steady response of a board."""
 
     orbit: Orbit
-    """The orbit."""
     trace: Array
     """(n · POINTS,) displacement over the orbit's n drive periods; empty where none was drawn."""
 

@@ -20,7 +20,6 @@ class SectionStage:
     """One section with what is connected to it."""
 
     section: Section
-    """The section."""
     outputs: frozenset[str]
     """Net of its output, and those that a diode joins to it."""
     load: float

@@ -75,7 +75,6 @@ class ComparedCircuit:
     what: str
     """What it is, in one sentence."""
     circuit: Circuit
-    """The circuit."""
     frequency: float
     """Generator's frequency at ω = 1 [Hz]."""
     amplitude: float

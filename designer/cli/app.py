@@ -43,16 +43,18 @@ class GroupedVerbs(typer.core.TyperGroup):
                 formatter.write_dl(rows)
 
 
-app = typer.Typer(
-    name="designer",
-    cls=GroupedVerbs,
-    help="Op-amp circuits for mechanical models with clearances, and how many boards will work.",
-    epilog="designer VERB --help says more, with an example.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+def empty_application() -> typer.Typer:
+    """The command line without its verbs."""
+    return typer.Typer(
+        name="designer",
+        cls=GroupedVerbs,
+        help="Op-amp circuits for mechanical models with clearances, and how many boards will work.",
+        epilog="designer VERB --help says more, with an example.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
 
 
 _EVERY: tuple[inspect.Parameter, ...] = tuple(
@@ -80,8 +82,8 @@ SOURCE = "model"
 """Name of a parameter that is a model file or a design folder."""
 
 
-def register(name: str, verb: Verb, *, hidden: bool = False) -> None:
-    """Give the application a verb by its declaration."""
+def register(app: typer.Typer, name: str, verb: Verb, *, hidden: bool = False) -> None:
+    """Give an application a verb by its declaration."""
 
     def command(
         *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any

@@ -15,13 +15,12 @@ import typer.main
 from designer.base.defaults import cores
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.version import __version__
-from designer.cli.app import VERBS, app, register
+from designer.cli.app import VERBS, empty_application, register
 
 OTHER_SPELLINGS = {"synthesize": "synthesise"}
 """Verbs that the help does not list, and those that they are."""
 
 
-@app.callback(invoke_without_command=True)
 def _designer(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version, and what it works with here.")
@@ -50,20 +49,23 @@ def _surroundings() -> Iterator[tuple[str, str]]:
     yield "cores", str(cores())
 
 
-@cache  # typer reads the signatures of all verbs
-def application() -> typer.core.TyperGroup:
-    """The parser with every verb."""
-    for name in VERBS:
+@cache
+def application(verbs: tuple[str, ...] = VERBS) -> typer.core.TyperGroup:
+    """The parser with these verbs, which are imported now."""
+    app = empty_application()
+    app.callback(invoke_without_command=True)(_designer)
+    for name in verbs:
         module = import_module(f"designer.verbs.{OTHER_SPELLINGS.get(name, name)}")
-        register(name, module.VERB, hidden=name in OTHER_SPELLINGS)
+        register(app, name, module.VERB, hidden=name in OTHER_SPELLINGS)
     return cast(typer.core.TyperGroup, typer.main.get_command(app))
 
 
 def dispatch(arguments: list[str]) -> int:
     """Run a command line; returns the exit status or raises what went wrong."""
-    if arguments and not arguments[0].startswith("-") and arguments[0] not in VERBS:
+    asked = tuple(arguments[:1]) if arguments and not arguments[0].startswith("-") else VERBS
+    if asked != VERBS and asked[0] not in VERBS:
         from designer.base.schema import one_of
 
         raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
-    result = application().main(arguments, prog_name="designer", standalone_mode=False)
+    result = application(asked).main(arguments, prog_name="designer", standalone_mode=False)
     return result if isinstance(result, int) else 0

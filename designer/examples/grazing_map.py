@@ -72,7 +72,6 @@ class GrazingMap:
     """What is measured of one stop, with the closed forms beside it."""
 
     stop: StopKind
-    """The stop."""
     kicks: Array
     """(DEPTHS,) change Δv of the velocity at the contact."""
     traces: Array

@@ -31,7 +31,6 @@ class Job:
     folder: Path
     """The design folder that it makes."""
     process: subprocess.Popen[str]
-    """The process."""
     line: str = ""
     """The last line that it said."""
     status: int | None = None

@@ -88,7 +88,6 @@ class ResponseView:
     """The attractor at a place, with what is drawn of it."""
 
     place: ModelPlace
-    """The place."""
     orbit: Orbit
     """The attractor that its start leads to."""
     motion: ShownMotion

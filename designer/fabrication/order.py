@@ -37,7 +37,6 @@ class BoardOrder:
     title: str
     """Title of the model file, as it is."""
     board: BoardFile
-    """The board."""
     bought: Sequence[Line]
     """Its bill."""
     not_checked: Sequence[str]

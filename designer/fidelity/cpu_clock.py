@@ -26,7 +26,6 @@ class Entrant:
     """One that runs against the clock."""
 
     name: str
-    """Name of the entrant."""
     periods: int
     """Drive periods of one run."""
     work: Callable[[], float]

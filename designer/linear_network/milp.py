@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 SOLVER: dict[str, float | int] = {
     "mip_rel_gap": 0.0,
@@ -40,6 +43,8 @@ def distinct_values(
 
     uses : each choice of a row with the (rows,) values of one part.
     """
+    import cvxpy as cp  # takes a second
+
     every = np.unique(np.concatenate([column for _, column in uses]))
     every = every[~np.isin(every, free)]
     used = cp.Variable(max(len(every), 1), nonneg=True)

@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.metadata import version
-
-import cvxpy as cp
+from typing import TYPE_CHECKING
 
 from designer.linear_network.milp import SOLVER
 
-Program = tuple[str, cp.Problem, float]
+if TYPE_CHECKING:
+    import cvxpy as cp
+
+Program = tuple[str, "cp.Problem", float]
 """In words, and its optimum."""
 
 
 def programs() -> Iterator[Program]:
     """Programs of a few variables, each of a form that a version of HiGHS answered wrongly."""
+    import cvxpy as cp  # takes a second
+
     x, z = cp.Variable(nonneg=True), cp.Variable(integer=True)
     yield (
         "min 2x + 3z, x + z ≥ 4.5, 0 ≤ x ≤ 10, 0 ≤ z ≤ 10 whole",
@@ -47,6 +51,8 @@ def programs() -> Iterator[Program]:
 
 def solver_words() -> str:
     """The solver's version, and that its answers are right or which is not."""
+    import cvxpy as cp  # takes a second
+
     name = f"HiGHS {version('highspy')}"
     asked = list(programs())
     for words, program, optimum in asked:

@@ -24,9 +24,7 @@ class TermConditions:
     """The conditions of ``Bounds`` for these terms."""
 
     targets: Targets
-    """The terms."""
     bounds: Bounds
-    """The conditions."""
 
     def hold(self, offsets: Array) -> bool:
         """Whether they hold for a choice with these (terms,) offsets of the errors."""

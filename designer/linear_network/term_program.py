@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
 from designer.linear_network.linear_terms import Targets, scale_columns
 from designer.linear_network.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.linear_network.term_conditions import TermConditions
+
+if TYPE_CHECKING:
+    pass
 
 MOST = 12
 """Choices whose values are mixed: the last ones, which are the best."""
@@ -35,7 +38,6 @@ class TermProgram:
     prices: Array
     """Price class of each capacitance."""
     targets: Targets
-    """The terms."""
     conditions: TermConditions
     """The side conditions."""
     equal: Index
@@ -44,6 +46,8 @@ class TermProgram:
     def solve(self, limit: float, most: int) -> tuple[str, Index | None]:
         """HiGHS' status, and the choice of fewest values with an error up to ``limit``, if it has
         one. most : distinct values that are known to do."""
+        import cvxpy as cp  # takes a second
+
         known, terms = self.choices[-1], len(self.targets.entries)
         values = [np.unique(column) for column in self.choices[-MOST:].T]
         picks = [cp.Variable(len(own), boolean=True) for own in values]

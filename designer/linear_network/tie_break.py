@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
@@ -21,6 +21,9 @@ from designer.linear_network.kernel_completions import gather
 from designer.linear_network.kernel_linear import Rules, Values
 from designer.linear_network.linear_block import PARTS, residuals_of, slice_from
 from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
+
+if TYPE_CHECKING:
+    pass
 
 ROOM, GROUPS, COMPLETIONS = 1 << 13, 1 << 12, 1 << 14
 """Completions of one mass that are held for one group; groups and completions in all."""
@@ -180,6 +183,8 @@ def _solve(
     values: Values, rules: Rules, pool: _Pool, limit: float, prices: Array
 ) -> tuple[str, Index | None]:
     """The solver's status and the parts it chose, if it chose any."""
+    import cvxpy as cp  # takes a second
+
     unit = max(limit, LEAST_UNIT)
     first, second = pool.sides
     z1 = cp.Variable(len(first.group), boolean=True)

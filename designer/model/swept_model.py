@@ -32,7 +32,6 @@ class ModelSubject:
 
     whose: ClassVar[str] = "model"
     model: MechanicalModel
-    """The model."""
     omega: float | None = None
     """Drive frequency in the model's units; None: it has to be among the changes."""
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)

@@ -1,5 +1,1 @@
 """What is measured about the paper that the project starts from."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

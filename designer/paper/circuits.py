@@ -104,7 +104,6 @@ class SettledResponse:
     expected: str
     """The wanted n-p-q."""
     orbit: Orbit
-    """The orbit that it settles on."""
     kept: bool
     """Whether it settles on the wanted n-p-q."""
     error: float

@@ -49,7 +49,6 @@ class ResponseBorders:
     plan: CurvePlan
     """What was followed, and where."""
     curves: tuple[BorderCurve, ...]
-    """The borders."""
     windows: tuple[tuple[str, float, float], ...]
     """(response, from, to) of each window along ω."""
 

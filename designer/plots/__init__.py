@@ -1,5 +1,1 @@
 """Pictures of orbits, sweeps, maps, studies, records and mechanisms, each readable alone."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

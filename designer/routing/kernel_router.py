@@ -58,7 +58,6 @@ class Tariff(NamedTuple):
     net: int
     """Its number, from 1."""
     kind: int
-    """Its kind."""
     front: int
     """Factor of a step on the front, in units of UNIT."""
     back: int

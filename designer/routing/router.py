@@ -56,7 +56,6 @@ class Terminals:
     starts: NDArray[np.int64]
     """(T + 1,) where each terminal's nodes begin in ``nodes``."""
     nodes: Nodes
-    """The nodes of all terminals."""
     plane: bool = False
     """Whether a plane of the net is to be reached by a via, instead of the other terminals."""
 

@@ -2,7 +2,3 @@
 
 Both are drawn from the same cells, mass by mass, with the signal from left to right.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -73,7 +73,6 @@ class Amplifier:
     """A cell around one section."""
 
     section: Section
-    """The section."""
     title: str
     """Title of the cell."""
     inputs: tuple[Chain, ...]
@@ -91,7 +90,6 @@ class CellRows:
     """A cell of rows."""
 
     title: str
-    """Title of the cell."""
     rows: tuple[Chain | str, ...]
     """The rows: each a chain, or a line of text."""
     at: Mapping[str, Sequence[str]] = field(default_factory=dict)

@@ -31,7 +31,6 @@ class Project:
     title: str
     """Title of the model file."""
     circuit: Circuit
-    """The circuit."""
     components: tuple[Component, ...]
     """The components of the board."""
     run: FirstRun

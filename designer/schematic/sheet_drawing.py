@@ -103,7 +103,6 @@ class Note:
     owner: str
     """What it belongs to; with the kind, it is there once."""
     kind: TextKind = "role"
-    """Kind of the text."""
     left: bool = False
     """Whether a role begins at its point, instead of lying on both sides of it."""
 
@@ -125,7 +124,6 @@ class SheetCell:
     """What stands together; its level is the height of the signal's way in."""
 
     title: str
-    """Title of the cell."""
     symbols: list[Placed] = field(default_factory=list)
     """Units of symbols in the cell."""
     wires: list[Wire] = field(default_factory=list)

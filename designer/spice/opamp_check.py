@@ -204,7 +204,6 @@ class FigureCheck:
     figure: str
     """Name of the figure."""
     unit: str
-    """Its unit."""
     expected: float
     """What the catalogue says."""
     measured: float

@@ -87,7 +87,6 @@ class Read:
     """What was read from a run."""
 
     orbit: Orbit
-    """The orbit."""
     strobes: Array
     """(k, states) strobes."""
     trace: tuple[Array, Array] | None

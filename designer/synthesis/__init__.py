@@ -3,7 +3,3 @@
 The dead zones by tables beside a linear network (``designer.linear_network``), side conditions
 (swing, load, bandwidth) on the finished circuit.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -169,7 +169,6 @@ class Attempt:
     circuit: Circuit
     """The circuit that they make."""
     errors: CoefficientErrors
-    """Errors of its coefficients."""
     linear: LinearBlock
     """What the search of the linear block said."""
     dead_zone: DeadZone | None

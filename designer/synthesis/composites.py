@@ -13,8 +13,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
@@ -25,6 +25,9 @@ from designer.circuit.resistors import Composite
 from designer.linear_network.milp import NODES, SOLVER
 from designer.synthesis.attempt import Attempt, Order
 from designer.synthesis.part_checks import matching_resistors
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 REACH = 3.0
 """Half width, in ln, of the tables of pairs at least, in units of the error to be cured."""
@@ -188,6 +191,8 @@ class _Model:
     """The program in cvxpy; each stage adds its own limits to the same variables."""
 
     def __init__(self, program: PairProgram, used: frozenset[float]) -> None:
+        import cvxpy as cp  # takes a second
+
         self.program = program
         tables = program.tables
         self.z = {n: cp.Variable(len(table), boolean=True) for n, table in tables.items()}
@@ -228,6 +233,8 @@ class _Model:
 
     def fewest_values(self, error: float, known: dict[str, Pair]) -> dict[str, Pair]:
         """The same composites of other pairs that reach this error, with the fewest new values."""
+        import cvxpy as cp  # takes a second
+
         others = [cp.sum(z) == 0 for n, z in self.z.items() if n not in known]
         limits = [self.error <= max(error, EXACT), *others, *self.kinds]
         return self._chosen() if self._solve(cp.sum(self.new), limits) else known
@@ -240,6 +247,8 @@ class _Model:
 
     def _solve(self, aim: cp.Expression, limits: Sequence[cp.Constraint]) -> bool:
         """Whether there is an answer; at the limit of nodes it is the best so far, or none."""
+        import cvxpy as cp  # takes a second
+
         problem = cp.Problem(cp.Minimize(aim), [*self.rules, *limits])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an answer at the limit of nodes

@@ -143,7 +143,6 @@ class RectifierQuestion:
     place: DeadZonePlace
     """The clearance and its names."""
     scales: CircuitScales
-    """The circuit's scales."""
     amplifier: Difference
     """In front of the stage."""
     target: DeadZoneTarget

@@ -35,7 +35,6 @@ class Conflict:
     """One of some limits that cannot be kept together."""
 
     limit: StatedLimit
-    """The limit."""
     needed: float
     """What it would have to be for a choice of scales, the others as they are; infinite, or 0,
     where no number helps."""

@@ -86,7 +86,6 @@ class ScaleAttempt:
     """An attempt with the scales that it was made at."""
 
     made: Attempt
-    """The attempt."""
     z: Array
     """The scales and free parts."""
     words: str

@@ -9,14 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
 from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.synthesis.value_tables import ValueTable, new_values
+
+if TYPE_CHECKING:
+    pass
 
 ERROR_WEIGHT = 1e-4
 """Of the error over its limit: it decides where values and price are the same."""
@@ -186,6 +188,8 @@ def _solve(
     tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking, limit: float | None
 ) -> tuple[tuple[int, ...], str] | None:
     """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
+    import cvxpy as cp  # takes a second
+
     picks = [cp.Variable(len(t), boolean=True) for t in tables]
     error = cp.Variable(nonneg=True)
     constraints: list[object] = [cp.sum(z) == 1 for z in picks]

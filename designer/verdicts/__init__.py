@@ -3,7 +3,3 @@
 ``exact_rung`` asks the exact circuit, ``ngspice_runs`` asks ngspice; ``cross_check`` says which
 boards ngspice is asked about. ``judge`` compares an orbit with what is wanted.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

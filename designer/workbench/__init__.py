@@ -7,7 +7,3 @@ a record is of, and ``fitted_quantities`` says which figures of it the record te
 what to turn or to change for a wanted response on it, and ``spread_estimate`` what many such boards
 say of the spread.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

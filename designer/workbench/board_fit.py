@@ -81,7 +81,6 @@ class BoardFit:
     """What records say of the board that they are of."""
 
     prior: Prior
-    """The boards that it is one of."""
     observations: tuple[Observation, ...]
     """The records."""
     centre: Array

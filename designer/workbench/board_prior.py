@@ -34,7 +34,6 @@ class Prior:
     """The boards of a spread at standard normal numbers."""
 
     circuit: Circuit
-    """The circuit."""
     spread: Spread
     """What varies from board to board."""
     bandwidth: bool = True

@@ -46,7 +46,6 @@ class BoardFigure:
     high: float
     """Upper end of the 95 % interval."""
     nominal: float
-    """On the nominal board."""
     sigma: float
     """Standard deviation over the boards of the spread."""
 

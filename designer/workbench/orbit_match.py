@@ -26,7 +26,6 @@ class OrbitMatch:
     cost: float
     """Squares of what is left of the record, over what is allowed for."""
     orbit: NetOrbit
-    """The orbit."""
     shift: float
     """In time [drive periods]."""
 

@@ -78,7 +78,6 @@ class PredictedResponse:
     spec: Response
     """As the model file asks for it."""
     setting: GeneratorSetting
-    """The generator's setting."""
     orbit: Orbit
     """On the exact circuit."""
     waves: Mapping[str, Array]

@@ -111,7 +111,6 @@ class RecordedMotion:
     """A record with the part that each channel plays, and the drive as it shows."""
 
     record: Record
-    """The record."""
     channels: Mapping[str, str]
     """Channel by the net of the board that it shows: "v1", "v3", "fv", the generator's, …."""
     generator: str

@@ -3,7 +3,3 @@
 As built, tuned, trimmed and reached yields, both engines' estimate, margins, blame and maps.
 ``tolerance`` runs a study; ``yield_count`` is where a yield is counted.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -37,7 +37,6 @@ class Recipe:
     """Switch on at ``first``, go to ``target`` in steps of equal ratio, wait."""
 
     way: RecipeKind
-    """Kind of the recipe."""
     omega: float | None
     """Dimensionless frequency of the target."""
     target: Excitation

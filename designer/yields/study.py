@@ -227,13 +227,11 @@ class RunResult:
     """What the main job answers."""
 
     modelfile: ModelFile
-    """The model file."""
     catalog: Catalog
     """The catalogue."""
     model_responses: tuple[ModelResponse, ...]
     """What the model shows of the wanted responses."""
     design: Design
-    """The design."""
     checked: tuple[CheckedResponse, ...]
     """The wanted responses on all engines."""
     study: Study

@@ -94,7 +94,6 @@ class Stratum:
     """A part of the boards, of which ngspice was asked about some."""
 
     name: str
-    """Name of the stratum."""
     samples: int
     """Boards in the stratum, N_h."""
     asked: int

@@ -15,7 +15,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import sobol_indices, uniform
 
 from designer.base.arrays import Array, Index as Places
 from designer.circuit.board_arrays import Boards
@@ -78,6 +77,8 @@ def sobol(
     Saltelli's estimators with ``base`` base samples on a scrambled Sobol set (scipy.stats). Empty
     where nothing limits.
     """
+    from scipy.stats import sobol_indices, uniform  # takes a second
+
     names = spread.coordinates(circuit)
     limited = [k for k, margin in enumerate(margins) if margin.limits]
     if not limited:

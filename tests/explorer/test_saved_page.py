@@ -19,7 +19,7 @@ from designer.explorer.place import ModelPlace
 from designer.explorer.recorded_yields import yields
 from designer.explorer.response_view import respond
 from designer.explorer.wire import short_column
-from designer.jobs import Options
+from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 

@@ -44,6 +44,8 @@ ORDER = (
     "cli",
 )
 """A package may use those before it. The picture in docs/architecture.md is drawn from this."""
+LISTED = ("dynamics", "bifurcations")
+"""Packages that can be used alone, and list what they are for."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,7 @@ def _directly() -> dict[str, set[str]]:
     out: dict[str, set[str]] = {module: set() for module in trees()}
     for each in imports():
         if not (each.lazy or each.for_types):
-            out[each.importer].add(_home(each))
+            out[each.importer].add(each.module)
     return out
 
 
@@ -147,15 +149,8 @@ def reached_by(verb: str) -> set[str]:
     found = reached(module)
     for each in imports():
         if each.importer == module and each.line in lines:
-            found |= reached(_home(each))
+            found |= reached(each.module)
     return found
-
-
-def _home(each: Import) -> str:
-    """The module that an import takes its name from; a package's own list says where that is."""
-    if each.module in trees():
-        return each.module
-    return f"{each.module}.{public(each.module).get(each.name) or each.name}"
 
 
 @cache

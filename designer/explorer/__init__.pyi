@@ -1,6 +1,0 @@
-from . import (
-    server as server,
-)
-from .saved_page import (
-    save_page as save_page,
-)

@@ -1,7 +1,0 @@
-from . import (
-    schematic_drawing as schematic_drawing,
-)
-from .kicad_project import (
-    Project as Project,
-    files as files,
-)
