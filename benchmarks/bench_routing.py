@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 
 import designer
 from benchmarks.bench_flow import commit, machine, table
-from designer.base.sexpr import read
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import board_rules
+from designer.board.sexpr import read
 from designer.catalog.design_rule import FAIL, NOT_RUN
 from designer.catalog.fab import fab_limits
 from designer.check.synthesis_result import Synthesis

@@ -14,7 +14,7 @@ from typing import Any
 
 from designer.base.defaults import cores
 from designer.base.design_folder import Folder
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.check import checked_design
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders import design_files

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.synthesis_result import with_stage
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.linear_network.linear_terms import Shortfall

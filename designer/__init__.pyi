@@ -8,7 +8,7 @@ from .base.errors import (
 from .base.version import (
     __version__ as __version__,
 )
-from .catalog.catalog import (
+from .catalog.parts_catalog import (
     Catalog as Catalog,
     load_catalog as load_catalog,
 )

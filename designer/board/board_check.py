@@ -14,8 +14,8 @@ from designer.board.board_parts import fitted
 from designer.board.bom_layouts import layouts
 from designer.board.component import Component, components
 from designer.board.footprints import footprint
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, OpAmp, Use
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.netlist import Capacitor, Circuit, Part, Resistor
 from designer.model.board_table import BoardChoice, BoardSpec
 from designer.model.circuit_table import CircuitSpec

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, read
 from designer.board.kicad_reader import TRACKS, BoardFile
 from designer.board.outline import LAYER
+from designer.board.sexpr import Expression, read
 
 SILK = ".SilkS"
 """How the names of the two layers of silk screen end."""

@@ -14,8 +14,8 @@ from typing import Protocol
 from designer.base.errors import Unreachable
 from designer.base.views import View
 from designer.board.reverse_protection import supply_diodes
-from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import THERMAL, diode_model
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.board_parts_only import (
     Connector,
     SupplyCapacitor,

@@ -10,8 +10,8 @@ from designer.base.natural_sort import natural_key
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import DiodeEntry, Kind, PartChoice, Rating, Use
+from designer.catalog.parts_catalog import Catalog
 from designer.catalog.supply_diode import SupplyDiodeEntry
 from designer.circuit.board_parts_only import (
     Connector,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from designer.base.seal import sha256
-from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.kicad_footprint import on_board
 from designer.board.kicad_items import Entry
 from designer.board.kicad_names import (
@@ -19,6 +18,7 @@ from designer.board.kicad_names import (
 )
 from designer.board.kicad_placement import SCREW, Placement
 from designer.board.placed_component import LETTER, STROKE, TEXT
+from designer.board.sexpr import Expression, expression, lists, word
 
 LAYERS = (
     (0, "F.Cu", "signal"),

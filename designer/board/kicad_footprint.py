@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 
-from designer.base.sexpr import Expression, expression, lists, word
 from designer.board.footprints import FootprintShape, PadShape
 from designer.board.kicad_names import BOARD_VERSION, HEAD, LIBRARY, identifier
 from designer.board.pins import Pin
 from designer.board.placed_component import STROKE, TEXT, PlacedComponent
+from designer.board.sexpr import Expression, expression, lists, word
 
 LINE, BAR, SILK, NOTCH = STROKE, 0.3, 0.18, 0.7
 """Silk: width of a line, of the bar at a cathode; from a pad to the middle of a line; radius of the

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from designer.base.sexpr import Expression, expression, lists
 from designer.base.views import View
 from designer.board.component import Component, joined
 from designer.board.kicad_board import open_net
 from designer.board.kicad_items import Entry
 from designer.board.kicad_names import kicad_net, symbol_id
+from designer.board.sexpr import Expression, expression, lists
 
 Pads = Mapping[str, tuple[tuple[str, str], ...]]
 

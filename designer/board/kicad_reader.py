@@ -13,11 +13,11 @@ from pathlib import Path
 from designer.base.errors import InputError
 from designer.base.guarded_reading import read_bytes, reading
 from designer.base.natural_sort import natural_key
-from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import BOARD_VERSION, circuit_net
 from designer.board.outline import Outline, circle, pen_path, read_outline
+from designer.board.sexpr import Expression, read
 
 OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""

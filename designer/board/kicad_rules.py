@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression, number_text, word, write_all
 from designer.board.kicad_names import kicad_net
 from designer.board.net_classes import CLASSES, SUMMING, SUPPLY
+from designer.board.sexpr import Expression, expression, number_text, word, write_all
 from designer.catalog.design_rule import Override
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fab import FabLimits, Measure

@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from designer.base.sexpr import Contents, Expression, expression, lists, word
 from designer.board.kicad_names import HEAD, SYMBOLS_VERSION
+from designer.board.sexpr import Contents, Expression, expression, lists, word
 
 GRID = 1.27
 """Millimetres a unit: KiCad's usual grid is two of it."""

@@ -16,7 +16,7 @@ from itertools import islice, pairwise
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.sexpr import Expression
+from designer.board.sexpr import Expression
 
 LAYER = "Edge.Cuts"
 CHORDS = 72

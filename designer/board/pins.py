@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.board_parts_only import (
     Connector,
     SupplyCapacitor,

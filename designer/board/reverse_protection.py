@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from designer.base.errors import InputError
 from designer.base.units import format_quantity
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.catalog.supply_diode import SupplyDiodeEntry
 from designer.circuit.board_parts_only import SupplyDiode
 from designer.circuit.netlist import NEGATIVE, POSITIVE, Circuit

@@ -22,8 +22,8 @@ from typing import Annotated
 
 from designer.base.errors import InputError, problems_in
 from designer.base.guarded_reading import inside, read_bytes
-from designer.base.netlist_guard import RefusedNetlist, check_netlist
 from designer.base.schema import Accepts, FieldProblems, FileTable, line, lines, validated
+from designer.catalog.netlist_guard import RefusedNetlist, check_netlist
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
 ELEMENTS = "BCDEFGHIJKLMQRSVWX"

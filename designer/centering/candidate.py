@@ -9,7 +9,7 @@ from scipy.special import log_ndtr
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import Agreement
 from designer.centering.operating_points import Scored
-from designer.centering.windows import Stretch
+from designer.centering.response_windows import Stretch
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model.find_responses import ModelResponse

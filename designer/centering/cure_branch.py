@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
+from designer.catalog.parts_catalog import Catalog
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.centering.cure_milp import Demand, Slot
 from designer.centering.cure_slots import PartSlot
 

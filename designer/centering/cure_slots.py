@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from designer.base.errors import InputError, Unreachable
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind
+from designer.catalog.parts_catalog import Catalog
 from designer.centering.cure_branch import GRADE, NETWORK, REFERENCE, TRIMMER
 from designer.centering.cure_milp import Option, Slot
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts

@@ -20,7 +20,7 @@ from designer.base.toml_writer import toml_text
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import components, to_buy
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build
 from designer.circuit.board_values import nominal_board

@@ -22,7 +22,7 @@ from scipy.special import ndtr
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress, doing, part, seeking
 from designer.board.board_check import check_board
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.bandwidth_check import BANDWIDTH, LaggingBoards
 from designer.centering.candidate import (
@@ -45,7 +45,7 @@ from designer.centering.levers import (
 )
 from designer.centering.ngspice_check import LISTENED, RUNG, Listen
 from designer.centering.operating_points import MANY, best_points, room_of, score
-from designer.centering.windows import OperatingPoint, Stretch, open_in, stretches
+from designer.centering.response_windows import OperatingPoint, Stretch, open_in, stretches
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses

@@ -22,7 +22,7 @@ from scipy.special import log_ndtr, ndtr
 
 from designer.base.plain_json import plain
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.windows import OperatingPoint
+from designer.centering.response_windows import OperatingPoint
 from designer.circuit.design import Design
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.model_file import ModelFile

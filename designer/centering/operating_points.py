@@ -1,6 +1,6 @@
 """The place of a response in its windows over ω and b that is farthest from losing it.
 
-Every stretch of the response (``centering.windows``) is scanned with a few boards at one
+Every stretch of the response (``centering.response_windows``) is scanned with a few boards at one
 stretched spread; the best places are asked again with more boards and stretches, and around the
 best of them a pattern of ever smaller steps over ω and b goes on as long as something is gained.
 Distances are those of ``centering.distance``, so borders count by how much boards move them,
@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from designer.centering.distance import LADDER, Stand, StretchCounts, Stretched
-from designer.centering.windows import CLEARANCE_STEP, OperatingPoint, Stretch
+from designer.centering.response_windows import CLEARANCE_STEP, OperatingPoint, Stretch
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)

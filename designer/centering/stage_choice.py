@@ -15,14 +15,14 @@ from typing import get_args
 
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import doing, part
-from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.design_rule import FAIL
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check import checked_design, synthesis_result
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.circuit.ensemble import Ensemble
 from designer.design_rules import run_rules
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import matches

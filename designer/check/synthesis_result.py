@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 from designer.base.frames import table_html
 from designer.base.progress import note, seeking
-from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.design_rule import RuleOutcome
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.circuit.design import Design, settings

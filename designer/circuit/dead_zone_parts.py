@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.dead_zone_place import SUM, DeadZonePlace, part_of
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode, Part, Section
 from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails

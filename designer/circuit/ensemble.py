@@ -15,7 +15,7 @@ import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
 from designer.base.threads import heed, parallel
-from designer.circuit import working_modes as working
+from designer.circuit import board_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.nodal_bandwidth import swinging_sections
 from designer.circuit.reduction import FloatingCircuit, Reduction

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
 from designer.circuit.netlist import Circuit
 from designer.model.circuit_table import CircuitSpec

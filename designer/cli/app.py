@@ -48,7 +48,9 @@ def empty_application() -> typer.Typer:
     return typer.Typer(
         name="designer",
         cls=GroupedVerbs,
-        help="Op-amp circuits for mechanical models with clearances, and how many boards will work.",
+        help=(
+            "Op-amp circuits for mechanical models with clearances, and how many boards will work."
+        ),
         epilog="designer VERB --help says more, with an example.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from designer.base.sexpr import Expression, expression, expression_text, lists, word
 from designer.board.kicad_board import layers
 from designer.board.kicad_names import BOARD_VERSION, HEAD, identifier
 from designer.board.kicad_rules import CANARY_WIDTH, CustomRule
+from designer.board.sexpr import Expression, expression, expression_text, lists, word
 
 APART = 40.0
 """Between the examples of two rules [mm]."""

@@ -24,12 +24,12 @@ from typing import Any
 from designer.base.errors import InputError
 from designer.base.guarded_reading import parse_json, read_text
 from designer.base.progress import doing
-from designer.base.sexpr import Expression, expression, expression_text, read
 from designer.board.footprints import FootprintShape
 from designer.board.kicad_footprint import module
 from designer.board.kicad_names import LIBRARY, circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CANARY, CustomRule, canary, project_rules, rules_text
+from designer.board.sexpr import Expression, expression, expression_text, read
 from designer.catalog.fab import FabLimits
 from designer.design_rules.drc_specimen import canary_track, specimen
 from designer.design_rules.kicad_program import KicadFailed, call, last_words, needed_version

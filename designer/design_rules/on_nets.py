@@ -10,7 +10,7 @@ from designer.board.pins import Pin
 from designer.catalog.design_rule import Finding
 from designer.circuit.feedback_loops import feedback_share
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 
 
 def feedback(s: RuleSubject) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.synthesis.static_shifts import (
     Shifts,
     largest_offset,

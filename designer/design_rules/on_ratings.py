@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Diode
 from designer.circuit.noise_gains import conductance, stages
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.synthesis.limits import bandwidth_limit, guaranteed
 from designer.synthesis.operating_point import Operating, Peak
 from designer.synthesis.side_conditions import guaranteed_swing, saturating

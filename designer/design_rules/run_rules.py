@@ -18,7 +18,7 @@ from designer.catalog.design_rule import (
 )
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.design_rules import on_nets, on_precision, on_ratings
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 
 Look = Callable[[RuleSubject], Iterable[Finding]]
 

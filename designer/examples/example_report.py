@@ -20,7 +20,7 @@ from markupsafe import Markup
 from designer.base.defaults import cores
 from designer.base.page import Block, Page, PageSection, Verbatim
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.examples import (
     backbone,
     bilinear,

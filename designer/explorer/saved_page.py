@@ -8,7 +8,7 @@ from designer.base.atomic_write import appearing
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.explorer.branch_recording import BranchRecording, places, record
-from designer.explorer.page import recorded_page
+from designer.explorer.explorer_page import recorded_page
 from designer.explorer.recorded_yields import RecordedYields, yields
 from designer.explorer.wire import Message
 from designer.jobs.options import Options

@@ -23,8 +23,8 @@ from designer.base import jit
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
+from designer.explorer.explorer_page import ASSETS, asset, page
 from designer.explorer.job_processes import JobProcesses
-from designer.explorer.page import ASSETS, asset, page
 from designer.explorer.questions import boards, planes, read_question, save_model, viewed
 from designer.explorer.wire import Message, text_of
 from designer.explorer.work_queue import DEFECT, WorkQueue

@@ -18,7 +18,7 @@ from designer.board.component import Component, components, to_buy
 from designer.board.footprints import footprint
 from designer.board.kicad_placement import place
 from designer.catalog.build_cost import BuildCost
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 
 Assembly = Literal["surface", "mixed", "through hole"]
 """How the parts are soldered: all on the surface, some of them through holes, or all of them."""

@@ -14,9 +14,9 @@ from typing import Literal
 
 from markupsafe import Markup, escape
 
-from designer.base.sexpr import Atom, Expression, read
 from designer.board.kicad_reader import BoardFile, pad_corners, turned
 from designer.board.outline import pen_path
+from designer.board.sexpr import Atom, Expression, read
 
 Side = Literal["top", "bottom"]
 Point = tuple[float, float]

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from designer.base.guarded_reading import csv_rows, reading
-from designer.base.sexpr import read
 from designer.board.kicad_reader import BoardFile
+from designer.board.sexpr import read
 from designer.design_rules.kicad_program import KicadFailed, call, last_words
 
 TECHNICAL = (

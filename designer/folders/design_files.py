@@ -16,7 +16,7 @@ from designer.base.plain_json import dumps
 from designer.base.progress import doing
 from designer.base.second_process import Ask
 from designer.board.board_check import check_board
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import circuit_notes, first_run
 from designer.check.synthesis_result import Synthesis, with_stage

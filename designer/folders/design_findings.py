@@ -16,7 +16,7 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.design_rules import run_rules
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.report import words
 from designer.report.design_tables import spring_of
 from designer.synthesis.parts_choice import ways_to_less_error

@@ -12,7 +12,7 @@ from designer.base.manifest import Stages, object_hash
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.version import __version__
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files
 from designer.folders.design_files import load

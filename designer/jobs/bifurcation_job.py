@@ -21,7 +21,7 @@ from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import SweepPlan
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.folders.model_source import source
 from designer.folders.sweep_store import GridStore

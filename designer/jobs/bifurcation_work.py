@@ -11,7 +11,7 @@ from designer.base.si_unit import Unit
 from designer.bifurcations.basin_shares import SharePlan
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.sweep import SweepPlan
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.folders.origin import provenance
 from designer.folders.sweep_store import work_hash

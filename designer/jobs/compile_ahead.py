@@ -16,7 +16,7 @@ import numpy as np
 from designer.base import jit
 from designer.base.environment import python_command
 from designer.base.progress import doing
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble

@@ -22,8 +22,8 @@ from designer.board.board_facts import check_edge
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import BoardFile, read_board
-from designer.catalog.catalog import load_catalog
 from designer.catalog.fab import Fab, fab_limits, fabs
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis

@@ -13,7 +13,7 @@ from designer.catalog.fab import fab_limits
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board as rule_board, run_rules
 from designer.design_rules.kicad_program import kicad_version
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.model.model_file import naming
 
 if TYPE_CHECKING:

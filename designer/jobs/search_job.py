@@ -14,7 +14,7 @@ from designer.base.design_folder import Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.limiting_parts import limitings
 from designer.centering.ngspice_check import LEVELS, RUNG
 from designer.centering.result_json import confirmation_json

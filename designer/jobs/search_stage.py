@@ -18,7 +18,7 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.second_process import other_process
 from designer.base.version import __version__
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.design_search import look, search as design_search
 from designer.centering.ngspice_check import Listener

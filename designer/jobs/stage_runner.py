@@ -15,7 +15,7 @@ from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
 from designer.base.second_process import Ask, other_process
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files, design_files, kicad_files

@@ -12,7 +12,7 @@ from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis

@@ -14,7 +14,7 @@ from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files

@@ -32,9 +32,9 @@ from designer.base.json_schema import DIALECT, either, of_tables
 from designer.base.schema import FileTable, checked, line, such, whole_number
 from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
-from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
+from designer.catalog.parts_catalog import Catalog
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec

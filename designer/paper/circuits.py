@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
 from designer.circuit.board_values import nominal_board

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit import paper_values
 from designer.circuit.paper_values import ComparedCircuit
 from designer.model.model import Dimensionless

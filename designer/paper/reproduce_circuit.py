@@ -24,7 +24,7 @@ from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.dynamics.flow import Flow
 from designer.folders.origin import provenance
 from designer.model.find_responses import ModelResponse, find

@@ -26,7 +26,7 @@ from designer.base.report_pieces import check_report_folder
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.windows import all_windows, outside
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import settle, starts, twin
 from designer.dynamics.coexisting_attractors import coexisting

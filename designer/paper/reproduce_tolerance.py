@@ -24,7 +24,7 @@ from designer.base.atomic_write import write
 from designer.base.defaults import at_least, cores
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.model.tuning_bands import Bands
 from designer.paper.circuits import OMEGA, model_file

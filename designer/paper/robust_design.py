@@ -28,7 +28,7 @@ from designer.base.report_pieces import CaseStore
 from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
 from designer.base.version import __version__
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.centering.limiting_parts import limitings
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
 from designer.circuit.board_values import nominal_board

@@ -20,9 +20,9 @@ from designer.base.errors import Unreachable
 from designer.base.plain_json import FORMAT, plain
 from designer.board.bom import bill
 from designer.board.component import components
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, OpAmp
 from designer.catalog.fields import PRICE_CLASSES
+from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
 from designer.circuit.board_values import Board, nominal_board

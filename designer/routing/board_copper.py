@@ -12,11 +12,11 @@ import shapely
 from shapely import Geometry
 
 from designer.base.arrays import Array
-from designer.base.sexpr import Expression, expression, word
 from designer.board.kicad_names import identifier
 from designer.board.kicad_reader import TRACKS, pad_corners, turned
 from designer.board.net_classes import VIA
 from designer.board.outline import pen_path, read_outline
+from designer.board.sexpr import Expression, expression, word
 
 FRONT, BACK = "F.Cu", "B.Cu"
 LAYERS = (FRONT, BACK)

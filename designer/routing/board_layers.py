@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_board import layers
 from designer.board.kicad_reader import TRACKS
+from designer.board.sexpr import Expression, expression_text, read
 from designer.routing.board_copper import FRONT, inner_layers
 
 INNER = {2: (), 4: ((4, "In1.Cu", "power"), (6, "In2.Cu", "power"))}

@@ -9,9 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from designer.base.arrays import Array
-from designer.base.sexpr import Expression, expression, expression_text, lists, read, word
 from designer.board.kicad_names import circuit_net, identifier
 from designer.board.kicad_rules import CustomRule
+from designer.board.sexpr import Expression, expression, expression_text, lists, read, word
 from designer.circuit.netlist import Circuit
 from designer.routing.board_copper import (
     ALL,

@@ -19,7 +19,11 @@ import shapely
 from shapely import Geometry
 
 from designer.base.guarded_reading import read_bytes, reading
-from designer.base.sexpr import (
+from designer.base.version import __version__
+from designer.board.kicad_reader import TRACKS, BoardFile, PlacedPad
+from designer.board.kicad_rules import CustomRule
+from designer.board.net_classes import DEFAULT, VIA
+from designer.board.sexpr import (
     Expression,
     expression,
     expression_text,
@@ -27,10 +31,6 @@ from designer.base.sexpr import (
     read,
     word,
 )
-from designer.base.version import __version__
-from designer.board.kicad_reader import TRACKS, BoardFile, PlacedPad
-from designer.board.kicad_rules import CustomRule
-from designer.board.net_classes import DEFAULT, VIA
 from designer.circuit.netlist import Circuit
 from designer.routing.board_copper import (
     LAYERS,

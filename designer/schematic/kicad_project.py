@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from designer.base.sexpr import expression, expression_text
 from designer.board import kicad_sim
 from designer.board.component import Component
 from designer.board.kicad_board import board
@@ -18,6 +17,7 @@ from designer.board.kicad_netlist import netlist
 from designer.board.kicad_placement import place
 from designer.board.kicad_symbols import library
 from designer.board.net_classes import net_settings
+from designer.board.sexpr import expression, expression_text
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
 from designer.schematic.kicad_sheet import schematic, shapes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from designer.base.sexpr import Expression, expression, lists, word
 from designer.board import kicad_symbols as symbols
 from designer.board.kicad_board import revision
 from designer.board.kicad_items import Entry
@@ -18,6 +17,7 @@ from designer.board.kicad_names import (
     symbol_id,
 )
 from designer.board.kicad_symbols import GRID, SymbolShape, effects, position
+from designer.board.sexpr import Expression, expression, lists, word
 from designer.schematic.sheet_drawing import SIZES, NetLabel, Note, Placed, Sheet
 
 

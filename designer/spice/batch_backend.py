@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from designer.base.environment import clean_environment
 from designer.base.errors import EnvironmentMissing
-from designer.base.netlist_guard import check_netlist
+from designer.catalog.netlist_guard import check_netlist
 from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from designer.base.environment import changed_environment, clean_environment
 from designer.base.errors import EnvironmentMissing
-from designer.base.netlist_guard import check_netlist
+from designer.catalog.netlist_guard import check_netlist
 from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from designer.base.errors import Unreachable
 from designer.base.natural_sort import natural_key
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.netlist import Capacitor, Circuit, Resistor
 from designer.model.board_table import PartArray
 from designer.model.model_file import ModelFile

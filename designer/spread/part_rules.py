@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from designer.base.errors import InputError, Unreachable
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, PartFamily
 from designer.catalog.fields import Figure
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
 from designer.model.distributions import Distribution, Split, Uniform

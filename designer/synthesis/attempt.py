@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, OpAmp
 from designer.catalog.output_stage import OutputStage, output_at
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage

@@ -14,9 +14,9 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError, Unreachable
 from designer.base.schema import did_you_mean
-from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, stage_kind
 from designer.circuit.netlist import Circuit

@@ -19,8 +19,8 @@ import numpy as np
 
 from designer.base.errors import Unreachable
 from designer.base.progress import best_so_far, doing, part
-from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import ROUNDING
+from designer.catalog.parts_catalog import Catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design

@@ -128,7 +128,7 @@ def bench(
     InputError : no design folder, a file that is no record, channels that cannot be told apart,
         several boards in one folder, or files in the way; nothing is written then.
     """
-    from designer.catalog.catalog import load_catalog
+    from designer.catalog.parts_catalog import load_catalog
     from designer.folders.design_source import read_design
     from designer.folders.origin import provenance
     from designer.folders.report_sections import BENCHED as NAME, design_hash, renew_report

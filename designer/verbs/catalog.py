@@ -12,7 +12,7 @@ from designer.verbs.console import say, table
 from designer.verbs.declared import Verb, option
 
 if TYPE_CHECKING:
-    from designer.catalog.catalog import Catalog
+    from designer.catalog.parts_catalog import Catalog
     from designer.spice.opamp_check import FigureCheck
 
 KINDS = (
@@ -56,7 +56,7 @@ def catalog(
     InputError : no such op-amp, or a catalogue that cannot be read.
     EnvironmentMissing : ``check``, and no ngspice.
     """
-    from designer.catalog.catalog import load_catalog
+    from designer.catalog.parts_catalog import load_catalog
 
     entries = load_catalog()
     if check is None:

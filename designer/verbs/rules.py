@@ -89,8 +89,8 @@ def rules(
         nothing is written then.
     """
     from designer.board.kicad_reader import read_board
-    from designer.catalog.catalog import load_catalog
     from designer.catalog.fab import fabs
+    from designer.catalog.parts_catalog import load_catalog
     from designer.design_rules import rule_reports
     from designer.folders.design_source import read_design
     from designer.folders.origin import provenance

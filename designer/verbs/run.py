@@ -22,7 +22,7 @@ from designer.verbs.declared import (
 from designer.verbs.tables import design_written, tolerance, whole_job
 
 if TYPE_CHECKING:
-    from designer.catalog.catalog import Catalog
+    from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
 
 

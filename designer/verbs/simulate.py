@@ -116,7 +116,7 @@ def simulate(
     ------
     InputError : as ``simulation.simulate``, or pictures that are in the way.
     """
-    from designer.catalog.catalog import load_catalog
+    from designer.catalog.parts_catalog import load_catalog
     from designer.check import simulation
     from designer.folders.json_answers import simulate_json
     from designer.folders.model_source import model_file, source

@@ -14,7 +14,7 @@ from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, 
 from designer.verbs.tables import design_written, synthesised
 
 if TYPE_CHECKING:
-    from designer.catalog.catalog import Catalog
+    from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
 
 

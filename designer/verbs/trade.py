@@ -118,7 +118,7 @@ def trade(
 
 def _need_vendor_model(modelfile: ModelFile) -> None:
     """InputError unless the catalogue names a vendor's model of the wanted op-amp."""
-    from designer.catalog.catalog import load_catalog
+    from designer.catalog.parts_catalog import load_catalog
     from designer.fidelity.rungs import TOP, VENDOR
 
     spec = modelfile.circuit

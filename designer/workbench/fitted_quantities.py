@@ -14,9 +14,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_modes import BoardModes
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit
-from designer.circuit.working_modes import BoardModes
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.workbench.board_fit import BoardFit
 from designer.workbench.board_prior import PROBE

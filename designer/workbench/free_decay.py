@@ -16,7 +16,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.circuit.working_modes import mode_rows
+from designer.circuit.board_modes import mode_rows
 from designer.workbench.board_prior import PROBE, Prior
 from designer.workbench.observation import CELLS, ScopeErrors
 from designer.workbench.prediction import BoardPrediction, PredictedStop

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array, Index
+from designer.circuit.board_modes import ModeRows, mode_rows
 from designer.circuit.netlist import Excitation
 from designer.circuit.nodal_bandwidth import swinging_sections
-from designer.circuit.working_modes import ModeRows, mode_rows
 from designer.workbench.board_orbits import POINTS, NetOrbit, whole_states
 from designer.workbench.board_prior import PROBE, Prior
 

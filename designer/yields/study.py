@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED
 from designer.base.frames import frame, table_html
 from designer.base.reason import Reason
-from designer.catalog.catalog import Catalog
+from designer.catalog.parts_catalog import Catalog
 from designer.check.checked_design import CheckedResponse
 from designer.check.trust import Trust
 from designer.circuit.design import Design

@@ -18,10 +18,10 @@ from designer.base.arrays import Array
 from designer.base.views import View
 from designer.board.board_parts import board_circuit, trimmed_clearance
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_modes import at_rest
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Resistor
-from designer.circuit.working_modes import at_rest
 from designer.spread.spread import draw_many
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, rounded

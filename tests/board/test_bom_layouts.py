@@ -15,7 +15,7 @@ from designer.board.board_parts import fitted
 from designer.board.bom import COLUMNS, Line, bill, bill_csv
 from designer.board.bom_layouts import file_of, layouts
 from designer.board.component import Component, components
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.read import LAYOUTS
 from designer.model.board_table import BoardChoice
 from tests.base.test_views import CIRCUITS

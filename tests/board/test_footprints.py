@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.sexpr import expression_text, read
 from designer.board.footprints import EXAMPLES, FootprintShape, footprint
 from designer.board.kicad_footprint import module
-from designer.catalog.catalog import load_catalog
+from designer.board.sexpr import expression_text, read
+from designer.catalog.parts_catalog import load_catalog
 
 CATALOG = load_catalog()
 KICAD = Path("/usr/share/kicad/footprints")

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from designer.base.sexpr import Expression, expression, expression_text, read
 from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY, VIA
+from designer.board.sexpr import Expression, expression, expression_text, read
 from designer.catalog.design_rules import BY_ID
 from tests.shared.kicad_cases import case, case_files, kicad, written
 from tests.shared.kicad_python import asked_of_pcbnew

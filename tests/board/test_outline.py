@@ -12,8 +12,8 @@ from matplotlib.path import Path as Polygon
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.sexpr import read
 from designer.board.outline import Outline, circle, read_outline
+from designer.board.sexpr import read
 
 L_SHAPE = [(0.0, 0.0), (40.0, 0.0), (40.0, 20.0), (20.0, 20.0), (20.0, 50.0), (0.0, 50.0)]
 

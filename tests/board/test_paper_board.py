@@ -13,7 +13,7 @@ from designer.board.board_parts import board_circuit, fitted, trim_reach
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.paper_values import MODEL, OPAMP, circuit, corrected, rounded
 from designer.design_rules import run_rules
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import parse_model_file
 from designer.schematic.kicad_project import Project, files

@@ -19,7 +19,7 @@ from designer.board import board_notes
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill, bill_csv
 from designer.board.component import components, to_buy
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.read import read_catalog_file
 from designer.centering.cure_upgrade import price
 from designer.check.synthesis_result import Synthesis

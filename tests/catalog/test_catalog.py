@@ -16,9 +16,9 @@ from hypothesis import given, strategies as st
 from designer.base.errors import InputError, InputErrors, Unreachable
 from designer.base.eseries import SERIES, eseries, series_values
 from designer.base.units import decode_value
-from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.entries import OpAmp
 from designer.catalog.fields import PRICE_CLASSES, Figure
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.catalog.read import ENVIRONMENT
 
 SHIPPED = Path(__file__).resolve().parents[2] / "catalogs"

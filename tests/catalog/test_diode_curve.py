@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.netlist_guard import check_netlist
-from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import card, diode_model
 from designer.catalog.fields import Figure
+from designer.catalog.netlist_guard import check_netlist
+from designer.catalog.parts_catalog import load_catalog
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.worker import open_simulator
 

@@ -11,7 +11,7 @@ import pytest
 from designer.base.errors import InputError
 from designer.board.bom import bill
 from designer.board.bom_layouts import layouts
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.stock_list import StockRow, order_number, stock_rows
 from tests.board.test_bom_layouts import listed
 from tests.shared.stages import CATALOG

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.netlist_guard import check_netlist
-from designer.catalog.catalog import load_catalog
+from designer.catalog.netlist_guard import check_netlist
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.vendor_model import MOST_BYTES, PINS, read_vendor_model
 from designer.spice.opamp_check import OpAmpBench
 

@@ -22,7 +22,7 @@ from designer.base.defaults import StudyEngine
 from designer.base.errors import InputError
 from designer.base.figure_style import to_svg
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering import cure_measure, cure_search
 from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest

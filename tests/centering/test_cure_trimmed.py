@@ -13,8 +13,8 @@ from designer.centering.cure_measure import Book
 from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways, without_wiper
 from designer.centering.cure_ways import Looker, ResponseWay
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_modes import at_rest
 from designer.circuit.board_values import nominal_board
-from designer.circuit.working_modes import at_rest
 from designer.spread.board_quantities import quantities
 from designer.spread.spread import draw_many
 from designer.verdicts.exact_rung import block

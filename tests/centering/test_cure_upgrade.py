@@ -20,8 +20,8 @@ from designer.base.toml_writer import toml_text
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill, bill_csv
 from designer.board.component import components
-from designer.catalog.catalog import load_catalog
 from designer.catalog.fields import PRICE_CLASSES
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.cure_branch import CureBranch, better_opamps, branch_of, branches
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_upgrade import (

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import LADDER, STREAM, StretchCounts, Stretched
-from designer.centering.windows import OperatingPoint
+from designer.centering.response_windows import OperatingPoint
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
 from designer.spread.board_quantities import between

@@ -18,7 +18,7 @@ from designer.centering.distance import Stand, Stretched
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
 from designer.centering.ngspice_check import RUNG, Agreement
 from designer.centering.operating_points import Scored, score
-from designer.centering.windows import OperatingPoint, Stretch
+from designer.centering.response_windows import OperatingPoint, Stretch
 from designer.model import find_responses
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.response_table import Response

@@ -21,7 +21,7 @@ from designer.centering.ngspice_check import (
     Agreement,
     Listener,
 )
-from designer.centering.windows import OperatingPoint
+from designer.centering.response_windows import OperatingPoint
 from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool

@@ -7,7 +7,7 @@ import pytest
 
 from designer.centering.distance import LADDER, Stretched
 from designer.centering.operating_points import MANY, best_points, room_of, score
-from designer.centering.windows import OperatingPoint, stretches
+from designer.centering.response_windows import OperatingPoint, stretches
 from designer.dynamics.counts import Counts
 from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec

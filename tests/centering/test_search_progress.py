@@ -12,7 +12,7 @@ from designer.base.progress import MINUTE, ProgressLines
 from designer.centering import design_search
 from designer.centering.candidate import Candidate
 from designer.centering.levers import DesignChoice
-from designer.centering.windows import OperatingPoint, Stretch
+from designer.centering.response_windows import OperatingPoint, Stretch
 from designer.model.find_responses import ModelResponse
 from tests.shared.search_cases import catalog, file, made
 

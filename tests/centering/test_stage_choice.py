@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import Finding, judged
 from designer.catalog.design_rules import BY_ID
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast
 from designer.check import checked_design

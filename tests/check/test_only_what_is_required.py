@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import build, paper_values, terms as matching
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Excitation, Resistor

@@ -12,12 +12,12 @@ from hypothesis import given, settings, strategies as st
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_modes import at_rest
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
 from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
-from designer.circuit.working_modes import at_rest
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 from designer.model.mechanics import Clearance, SecondOrderSystem, Side

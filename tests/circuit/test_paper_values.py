@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import paper_values
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.paper_values import PRINTED

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Excitation, Part, Resistor, Section

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import build
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import (

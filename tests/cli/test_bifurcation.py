@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from designer.base.design_folder import Folder
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.cli import entry
 from designer.dynamics import attractors

@@ -18,13 +18,13 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import pdist, squareform
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression, expression_text, read, read_all
 from designer.base.views import View
 from designer.board import kicad_rules
 from designer.board.component import Component, joined
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import MOST_LAID, BoardFile, check_belongs, read_board
 from designer.board.kicad_rules import CustomRule, rules_text, spacing
+from designer.board.sexpr import Expression, expression, expression_text, read, read_all
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
 from designer.design_rules import drc_specimen, kicad_drc, on_board, on_fab

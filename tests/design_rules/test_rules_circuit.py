@@ -18,7 +18,7 @@ from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, run_rules
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
 from designer.synthesis import output_loads

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.sexpr import Expression, expression, expression_text, read, word
+from designer.board.sexpr import Expression, expression, expression_text, read, word
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.design_rules import kicad_drc, on_board
 from tests.design_rules.test_rules_board import (

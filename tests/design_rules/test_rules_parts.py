@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.sexpr import Expression, expression_text, read
 from designer.board.component import Component
+from designer.board.sexpr import Expression, expression_text, read
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.design_rules import on_board
 from tests.design_rules.test_rules_board import (

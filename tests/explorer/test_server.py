@@ -17,7 +17,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from designer import InputError, explore, parse_model_file, read_model_file
 from designer.base.jit import compilation_watched
-from designer.explorer.page import page
+from designer.explorer.explorer_page import page
 from designer.explorer.questions import read_question
 from designer.explorer.server import Explorer, application
 from designer.explorer.work_queue import WorkQueue

@@ -72,7 +72,7 @@ def test_a_via_is_seen_from_both_sides_and_a_track_from_its_own(tmp_path: Path) 
 
 
 def test_zones_arcs_and_texts_are_drawn(tmp_path: Path) -> None:
-    from designer.base.sexpr import read
+    from designer.board.sexpr import read
 
     items = [
         read('(zone (net 1) (net_name "GND") (layer "F.Cu") (filled_polygon (layer "F.Cu") '

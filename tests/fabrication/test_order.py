@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.sexpr import Expression, expression, expression_text, read
 from designer.board.board_facts import facts_of
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import BoardFile, PlacedFootprint, read_board
+from designer.board.sexpr import Expression, expression, expression_text, read
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome, Status
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fab import fab_limits, fabs

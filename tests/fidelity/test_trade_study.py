@@ -22,7 +22,7 @@ from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.si_unit import drive_text
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Excitation

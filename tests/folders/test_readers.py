@@ -22,7 +22,7 @@ from designer.base.parquet_entry import ParquetForm
 from designer.base.report_pieces import check_report_folder
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.read import read_catalog_file
 from designer.catalog.vendor_model import read_vendor_model
 from designer.folders.design_files import load, starts

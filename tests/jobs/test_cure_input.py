@@ -14,7 +14,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.cure_branch import KINDS, kind_named
 from designer.centering.cure_upgrade import Upgrades, upgraded_file
 from designer.cli import entry

@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.design_folder import MODEL
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
 from designer.centering.cure_measure import plan_of, questions_of
 from designer.folders.design_source import read_design

@@ -12,8 +12,8 @@ import pytest
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.board.board_check import check_board
-from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.entries import PartCase, mounting_of
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.centering import design_search
 from designer.check import synthesis_result
 from designer.cli import entry

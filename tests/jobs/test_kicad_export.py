@@ -15,8 +15,8 @@ import pytest
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression_text, read
-from designer.catalog.catalog import load_catalog
+from designer.board.sexpr import Expression, expression_text, read
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.read import ENVIRONMENT
 from designer.check.synthesis_result import Synthesis
 from designer.cli import entry

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.sexpr import Expression, expression, expression_text, read
+from designer.board.sexpr import Expression, expression, expression_text, read
 from designer.catalog.design_rule import NOT_RUN, PASS, RuleOutcome
 from designer.catalog.design_rules import RULES
 from designer.jobs import export_job

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
-from designer.circuit import working_modes as working
+from designer.circuit import board_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.kernel_nodal import solve_all

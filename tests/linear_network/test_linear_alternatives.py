@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.linear_network.linear_terms import Shortfall
 from designer.model.circuit_table import CircuitSpec

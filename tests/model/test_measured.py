@@ -11,7 +11,7 @@ import pytest
 
 from designer.base.design_folder import is_design_folder
 from designer.base.errors import InputError
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.cli import entry
 from designer.folders.model_source import model_file
 from designer.model.measured_values import read_measured

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import paper_values
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors

@@ -22,7 +22,7 @@ from designer.base.report_pieces import check_report_folder
 from designer.bifurcations.doubling_cascade import cascade
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.windows import BranchWindow, WindowEnd
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.cli import entry
 from designer.dynamics.attractors import settle

@@ -10,7 +10,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.paper import reproduce_tolerance
 from designer.paper.circuits import OMEGA
 from designer.paper.reproduce_tolerance import KINDS, reproduce

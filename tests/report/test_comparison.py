@@ -13,8 +13,8 @@ import pytest
 
 from designer.base import figure_style
 from designer.base.manifest import MANIFEST
-from designer.catalog.catalog import load_catalog
 from designer.catalog.fields import PRICE_CLASSES
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import paper_values
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Circuit

@@ -18,7 +18,7 @@ from designer.base import figure_style
 from designer.base.errors import InputError
 from designer.base.page import PageSection, Table
 from designer.board.kicad_reader import read_board
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check import checked_design
 from designer.check.synthesis_result import synthesise
 from designer.circuit.coefficients import coefficient_errors

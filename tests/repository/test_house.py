@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import textwrap
-from collections import defaultdict
+from collections import Counter, defaultdict
 from graphlib import TopologicalSorter
 
 import pytest
@@ -114,6 +114,12 @@ def test_no_module_grows_beyond_a_sitting() -> None:
         if (count := len(path.read_text("utf-8").splitlines())) > 1000
     }
     assert longer == {}
+
+
+def test_a_module_name_stands_once() -> None:
+    """A name that two packages use says in neither what the module is."""
+    names = Counter(module.split(".")[1] for module in sources())
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_no_import_runs_back(every: tuple[Import, ...]) -> None:

@@ -115,7 +115,7 @@ def test_catalogues_are_found(environment: Path) -> None:
     shown = _run(environment / "bin" / "designer", "catalog", "--json", cwd=environment.parent)
     assert '"TL074C"' in json.dumps(json.loads(shown))
     code = (
-        "from designer.catalog.catalog import load_catalog;"
+        "from designer.catalog.parts_catalog import load_catalog;"
         "print(*(a.name for a in load_catalog().opamps))"
     )
     names = _run(environment / "bin" / "python", "-c", code, cwd=environment.parent)

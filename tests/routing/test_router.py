@@ -12,9 +12,9 @@ import shapely
 from hypothesis import given, strategies as st
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_rules import board_rules
+from designer.board.sexpr import Expression, expression_text, read
 from designer.routing.board_copper import BoardCopper, read_copper
 from designer.routing.board_layers import layer_count, with_layers
 from designer.routing.ground_pour import cut_open

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression, expression_text, read, word
 from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY
+from designer.board.sexpr import Expression, expression, expression_text, read, word
 from designer.routing.board_copper import read_copper
 from designer.routing.routed_board import route_board
 from designer.routing.specctra import design_text, with_session

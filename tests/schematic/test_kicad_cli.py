@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.sexpr import read
+from designer.board.sexpr import read
 from designer.check import checked_design
 from designer.check.deck_runs import FirstRun
 from designer.circuit import nominal

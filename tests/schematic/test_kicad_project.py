@@ -18,7 +18,6 @@ from hypothesis import given, strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import pdist, squareform
 
-from designer.base.sexpr import Expression, read, read_all
 from designer.base.views import View
 from designer.board.component import joined
 from designer.board.footprints import footprint
@@ -31,6 +30,7 @@ from designer.board.kicad_names import (
     safe_text,
 )
 from designer.board.kicad_placement import Placement, place
+from designer.board.sexpr import Expression, read, read_all
 from designer.board.summing_nodes import node_spans, shortest_tree
 from designer.circuit.netlist import Resistor
 from designer.schematic.kicad_project import Project, files

@@ -23,7 +23,7 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Resistor, Section
 from designer.design_rules import run_rules
-from designer.design_rules.subject import RuleSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.model.find_responses import find
 from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_rules import spread_of

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
 from designer.circuit.netlist import Circuit

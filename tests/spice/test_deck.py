@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
-from designer.base.netlist_guard import check_netlist
+from designer.catalog.netlist_guard import check_netlist
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction

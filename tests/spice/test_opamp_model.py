@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from designer.base.netlist_guard import check_netlist
-from designer.catalog.catalog import load_catalog
 from designer.catalog.fields import Figure
+from designer.catalog.netlist_guard import check_netlist
+from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Excitation

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from designer.catalog.catalog import load_catalog
 from designer.catalog.output_stage import output_at
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import build
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Excitation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from designer.base.netlist_guard import check_netlist
+from designer.catalog.netlist_guard import check_netlist
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Circuit, Excitation

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.base.netlist_guard import check_netlist
-from designer.catalog.catalog import load_catalog
+from designer.catalog.netlist_guard import check_netlist
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
 from designer.circuit.board_values import nominal_board

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Excitation, Reference
 from designer.spice import deck

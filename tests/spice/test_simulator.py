@@ -16,7 +16,7 @@ import pytest
 
 import designer
 from designer.base.errors import EnvironmentMissing
-from designer.base.netlist_guard import check_netlist
+from designer.catalog.netlist_guard import check_netlist
 from designer.spice import batch_backend
 from designer.spice.batch_backend import BatchNgspice, program_version, read_raw
 from designer.spice.pool import SpicePool

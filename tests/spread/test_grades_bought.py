@@ -16,7 +16,7 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import series_values
 from designer.base.manifest import file_hash
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_upgrade import Upgrades, upgraded_file
 from designer.centering.design_search import look

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, truncnorm
 
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_values import Board
 from designer.spread.spread import Spread, draw, draw_many
 from tests.circuit.test_reduction import EXACT, circuit_of

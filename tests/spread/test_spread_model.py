@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.model.distributions import Binned, Normal, Split, Uniform

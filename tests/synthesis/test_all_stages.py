@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from designer.base.errors import InputError
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.synthesis_result import synthesise
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.model_file import parse_model_file

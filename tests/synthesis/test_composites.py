@@ -14,7 +14,7 @@ import pytest
 from designer.base.progress import Progress
 from designer.board.bom import bill
 from designer.board.component import components, designator
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.resistors import effective

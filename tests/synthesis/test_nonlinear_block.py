@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from designer.base.eseries import series_values
-from designer.catalog.catalog import load_catalog
 from designer.catalog.output_stage import OutputStage
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.linear_network import linear_search
 from designer.linear_network.linear_terms import Targets

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from designer.base.errors import InputError, Unreachable
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.design import Design
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach, find, peaks

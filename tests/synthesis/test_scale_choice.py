@@ -12,7 +12,7 @@ import pytest
 
 from designer.base.arrays import Array
 from designer.base.errors import Unreachable
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
 from designer.circuit.noise_gains import stages

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from designer.base.errors import Unreachable
-from designer.catalog.catalog import load_catalog
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.synthesis_result import synthesise as synthesise_file
 from designer.circuit import build
 from designer.circuit.board_values import nominal_board

@@ -15,12 +15,12 @@ from designer.base.toml_writer import toml_text
 from designer.board.board_parts import drive_resistance, driven_nodes
 from designer.centering.cure_upgrade import with_same_parts
 from designer.circuit.board_arrays import Boards
+from designer.circuit.board_modes import at_rest
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Resistor
 from designer.circuit.reduction import Reduction
-from designer.circuit.working_modes import at_rest
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.folders.study_json import study_json

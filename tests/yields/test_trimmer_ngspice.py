@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from designer.circuit.board_modes import at_rest
 from designer.circuit.reduction import Reduction
-from designer.circuit.working_modes import at_rest
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from designer.base import sexpr
 from designer.base.errors import InputError
-from designer.base.sexpr import (
+from designer.board import sexpr
+from designer.board.sexpr import (
     DEEPEST,
     Atom,
     Expression,

@@ -9,7 +9,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.bifurcations import windows
-from designer.centering.windows import STEP, check, clearances, stretches
+from designer.centering.response_windows import STEP, check, clearances, stretches
 from designer.dynamics.counts import Counts
 from designer.model import find_responses, swept_model
 from designer.model.response_table import Response

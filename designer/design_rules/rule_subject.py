@@ -13,9 +13,9 @@ from designer.base.second_process import Ask
 from designer.base.units import parse_quantity
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
-from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import NotRun
 from designer.catalog.entries import OpAmp
+from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
