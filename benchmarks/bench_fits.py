@@ -42,8 +42,13 @@ from designer.check.synthesis_result import synthesise
 from designer.circuit.ensemble import Ensemble
 from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.fitted_board import FittedBoard, board_behind
-from designer.workbench.fitted_quantities import BoardFigure, board_figures, figures
+from designer.workbench.fitted_board import (
+    BoardFigure,
+    FittedBoard,
+    board_behind,
+    board_figures,
+    figures,
+)
 from designer.workbench.free_decay import FreeDecay, recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.prediction import BoardPrediction

@@ -30,7 +30,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
-from designer.workbench.ngspice_motion import FINER, RELTOL, NgspiceMotion, full_subject, motion_job
+from designer.workbench.overlay import FINER, RELTOL, NgspiceMotion, full_subject, motion_job
 from designer.yields.adjustment import AS_BUILT, Adjustment
 
 RECORDED = 20

@@ -14,7 +14,7 @@ import numpy as np
 from designer.base.arrays import Array, Index
 from designer.linear_network.kernel_linear import Rules, Values
 from designer.linear_network.linear_block import SCALES, elementary
-from designer.linear_network.tie_break import residuals
+from designer.linear_network.pair_search import residuals
 
 CENTRE = float(np.log(3e4))
 """ln of the resistance around which the continuous solution is laid."""

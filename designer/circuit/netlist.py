@@ -8,10 +8,10 @@ has them, and the role they play: the term of Eq. (10) that they realise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -29,9 +29,40 @@ from designer.circuit.board_parts_only import (
     TestPoint,
     Trimmer,
 )
-from designer.circuit.resistor_network import Conductance, without_inner_nets
 from designer.circuit.stop import Contact, Stop
 from designer.dynamics.piecewise_linear import Drive
+
+
+@dataclass(frozen=True)
+class Conductance:
+    """A conductance between two nets."""
+
+    a: str
+    """Net of one end."""
+    b: str
+    """Net of the other end."""
+    siemens: Any
+    """Its size [S], a number or an array with one for each board."""
+
+    def other(self, net: str) -> str:
+        """The end that is not this net."""
+        return self.b if net == self.a else self.a
+
+
+def without_inner_nets(wires: Iterable[Conductance], held: Collection[str]) -> list[Conductance]:
+    """The same between the nets ``held`` alone: every other net is taken out, star to mesh, such as
+    the middle of two resistors in series and the tap of a divider."""
+    out = list(wires)
+    for net in sorted({end for wire in out for end in (wire.a, wire.b)} - set(held)):
+        star = [wire for wire in out if net in (wire.a, wire.b)]
+        total = sum(wire.siemens for wire in star)
+        out = [wire for wire in out if net not in (wire.a, wire.b)]
+        out += [
+            Conductance(one.other(net), two.other(net), one.siemens * two.siemens / total)
+            for one, two in combinations(star, 2)
+        ]
+    return out
+
 
 GROUND = "0"
 POSITIVE, NEGATIVE = "vcc", "vee"

@@ -9,16 +9,47 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from designer.base.guarded_reading import read_text
+from designer.dynamics.attractors import same, settle, starts
+from designer.dynamics.orbit import ANSWERS, Orbit
+from designer.dynamics.step_budget import Budget
 from designer.explorer.board_box import Choose, board_box, expected
 from designer.explorer.job_processes import JobProcesses, JobVerb
 from designer.explorer.omega_strip import strip
-from designer.explorer.other_attractors import others
-from designer.explorer.place import read_place
+from designer.explorer.place import ModelPlace, read_place, start_text
 from designer.explorer.response_map import borders, mapped, read_map
-from designer.explorer.response_view import respond
+from designer.explorer.response_view import STEPS, respond, summary
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
 from designer.explorer.wire import Message
+from designer.model.driven import model_flow
+from designer.model.find_responses import STARTS, scale_of
 from designer.model.model_file import MAX_BYTES, ModelFile, need_responses, parse_model_file
+
+
+def others(place: ModelPlace, shown: Orbit) -> Iterator[Message]:
+    """After each start all attractors so far, the shown one first, with how many starts of those so
+    far lead to each. The starts are those of ``model.find_responses``: rest, then a Sobol set."""
+    flow = model_flow(place.model, place.omega)
+    known = [shown] if shown.status in ANSWERS else []
+    counts = [0] * len(known)
+    for tried, start in enumerate(starts(scale_of(place.model, place.omega), STARTS), start=1):
+        orbit = settle(flow, start, budget=Budget(STEPS))
+        if orbit.status in ANSWERS:
+            which = next((k for k, each in enumerate(known) if same(flow, orbit, each)), None)
+            if which is None:
+                which = len(known)
+                known.append(orbit)
+                counts.append(0)
+            counts[which] += 1
+        yield _message(known, counts, tried)
+
+
+def _message(known: list[Orbit], counts: list[int], tried: int) -> Message:
+    attractors = [
+        {"summary": summary(orbit), "starts": count, "start": start_text(tuple(orbit.start))}
+        for orbit, count in zip(known, counts, strict=True)
+    ]
+    return {"kind": "others", "attractors": attractors, "tried": tried, "of": STARTS}
+
 
 Kind = Literal["view", "map", "borders", "save", "run", "search", "board"]
 

@@ -5,12 +5,27 @@ reach it; the error of what they return is computed afresh by linear programming
 conditions hold on nominal scales, which need no solver: the least squares of the errors. At error
 eps those are within a fixed multiple of eps of any scales with that error, and by so much the loops
 are wider.
+
+The terms of a linear block are chosen group by group, and each group is probed at one place. A term
+that ties two sets of states together is free; every further term between states that are tied
+already has to meet a value. So a group is a term that ties, with all that become ties by it. The
+group with the fewest choices comes first; one that nothing later needs comes last, and is probed as
+soon as its states are tied.
+
+A mixed-integer program mixes the values of known choices of a linear block. It is one-hot in
+logarithms: each part has one of the values that it has in some choice, all scales are free, the
+largest error stays within a limit. Fewest distinct values, then the lowest price; cvxpy states it
+and HiGHS solves it, with a limit on its nodes.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,14 +37,187 @@ from designer.linear_network.kernel_terms import TermRules, choices
 from designer.linear_network.linear_terms import (
     Levels,
     LinearQuestion,
+    Targets,
     equal_values,
     preferred_logs,
     scale_columns,
     sums,
 )
+from designer.linear_network.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.linear_network.term_conditions import TermConditions
-from designer.linear_network.term_order import TermOrder, order_of
-from designer.linear_network.term_program import TermProgram
+
+if TYPE_CHECKING:
+    pass
+
+
+MOST = 12
+"""Choices whose values are mixed: the last ones, which are the best."""
+
+
+@dataclass(frozen=True)
+class TermProgram:
+    """What the program chooses from."""
+
+    choices: Index
+    """(k, parts) indices of values, in the order of ``Targets.parts``."""
+    logs: tuple[Array, Array]
+    """ln of the resistances and of the capacitances."""
+    free: Mask
+    """Which resistances, then which capacitances do not count as distinct."""
+    prices: Array
+    """Price class of each capacitance."""
+    targets: Targets
+    conditions: TermConditions
+    """The side conditions."""
+    equal: Index
+    """(j, 2) places of parts that must be equal."""
+
+    def solve(self, limit: float, most: int) -> tuple[str, Index | None]:
+        """HiGHS' status, and the choice of fewest values with an error up to ``limit``, if it has
+        one. most : distinct values that are known to do."""
+        import cvxpy as cp  # takes a second
+
+        known, terms = self.choices[-1], len(self.targets.entries)
+        values = [np.unique(column) for column in self.choices[-MOST:].T]
+        picks = [cp.Variable(len(own), boolean=True) for own in values]
+        r, c = self.logs
+        # Relative to a choice that is known: small numbers only.
+        logs = [(r if k < terms else c) for k in range(len(picks))]
+        moved = [
+            (log[own] - log[known[k]]) @ pick
+            for k, (log, own, pick) in enumerate(zip(logs, values, picks, strict=True))
+        ]
+        states = [a for a, _ in self.targets.entries]
+        change = cp.hstack([-(moved[k] + moved[terms + a]) for k, a in enumerate(states)])
+        start = -(r[known[:terms]] + c[known[terms:]][states] + self.targets.wanted)
+        columns = scale_columns(self.targets)
+        near = np.linalg.lstsq(columns, -start, rcond=None)[0]
+        shift = cp.Variable(columns.shape[1], bounds=[-20.0, 20.0])
+        errors = start + columns @ near + change + columns @ shift
+        G, g = self.conditions.inequalities
+        shifted = [own + (0 if k < terms else len(r)) for k, own in enumerate(values)]
+        used, rest = distinct_values(
+            list(zip(picks, shifted, strict=True)), np.flatnonzero(self.free)
+        )
+        rest += [cp.sum(pick) == 1 for pick in picks]
+        rest += [cp.abs(errors) <= limit, cp.sum(used) <= most]
+        rest += [G @ start + G @ change <= g] if len(g) else []
+        rest += [values[i] @ picks[i] == values[j] @ picks[j] for i, j in self.equal if i < j]
+        price = sum(
+            self.prices[own] @ pick for own, pick in zip(values[terms:], picks[terms:], strict=True)
+        )
+        problem = cp.Problem(cp.Minimize(cp.sum(used) + PRICE_WEIGHT * price), rest)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an answer at the limit of nodes
+            problem.solve(solver=cp.HIGHS, **SOLVER, mip_max_nodes=NODES)
+        rows = [chosen_row(pick) for pick in picks]
+        if any(row is None for row in rows):
+            return str(problem.status), None
+        chosen = [own[row] for own, row in zip(values, rows, strict=True)]
+        return str(problem.status), np.array(chosen, dtype=np.int64)
+
+
+NARROW = 2e-5
+"""Of all values, those that a term between tied states leaves: any small number gives the order."""
+Entry = tuple[int, int]
+"""A term: the state of its integrator and the state fed in."""
+
+
+@dataclass(frozen=True)
+class TermOrder:
+    """An order of terms."""
+
+    entries: tuple[Entry, ...]
+    """The terms in the order in which they are chosen."""
+    probes: Index
+    """(j, 3) probes, ascending: before which place, and the range of places that must have
+    parts."""
+
+
+@dataclass(frozen=True)
+class _Tied:
+    """Which states are tied to each other, by a number for each set, and which have a capacitor."""
+
+    sets: tuple[int, ...]
+    capacitors: frozenset[int]
+
+    def joins(self, entry: Entry) -> bool:
+        return self.sets[entry[0]] != self.sets[entry[1]]
+
+    def after(self, entry: Entry) -> _Tied:
+        one, other = (self.sets[state] for state in entry)
+        sets = tuple(one if number == other else number for number in self.sets)
+        return _Tied(sets, self.capacitors | {entry[0]})
+
+    def choices(self, entry: Entry, resistors: int, capacitors: int) -> float:
+        many = resistors * (1 if entry[0] in self.capacitors else capacitors)
+        return many if self.joins(entry) else many * NARROW
+
+
+def order_of(entries: Sequence[Entry], states: int, resistors: int, capacitors: int) -> TermOrder:
+    """The order for so many states, resistor and capacitor values."""
+    start = _Tied(tuple(range(states)), frozenset())
+    left, tied, groups, last = list(entries), start, list[list[Entry]](), list[bool]()
+    while left:
+        options = [_group(entry, left, tied) for entry in left]
+        ranks = [_rank(group, left, tied, resistors, capacitors) for group in options]
+        best = min(range(len(options)), key=ranks.__getitem__)
+        groups.append(options[best])
+        last.append(ranks[best][0])
+        for entry in options[best]:
+            left.remove(entry)
+            tied = tied.after(entry)
+    begins = [0, *accumulate(len(group) for group in groups)]
+    probes = []
+    for number, group in enumerate(groups):
+        if last[number]:
+            early = _earliest(group, groups[:number], start)
+            if early < number:
+                probes.append((begins[early], begins[number], begins[number + 1]))
+    chosen = tuple(entry for group in groups for entry in group)
+    return TermOrder(chosen, np.array(sorted(probes), dtype=np.int64).reshape(-1, 3))
+
+
+def _group(first: Entry, left: Sequence[Entry], tied: _Tied) -> list[Entry]:
+    """A term and what becomes narrow by it, those without a capacitor yet at the end."""
+    if not tied.joins(first):
+        return [first]
+    now = tied.after(first)
+    narrow = [e for e in left if e != first and tied.joins(e) and not now.joins(e)]
+    return [first, *sorted(narrow, key=lambda e: e[0] not in now.capacitors)]
+
+
+def _rank(
+    group: Sequence[Entry], left: Sequence[Entry], tied: _Tied, resistors: int, capacitors: int
+) -> tuple[bool, float, float]:
+    """Whether nothing later needs the group, ln of its choices, and the work to make them."""
+    rest, now, total, work = [e for e in left if e not in group], tied, 1.0, 0.0
+    for entry in group:
+        total *= now.choices(entry, resistors, capacitors)
+        work += total
+        now = now.after(entry)
+    # What is new: the states of the smaller of the two sets, and the capacitors.
+    sets = [{i for i, n in enumerate(tied.sets) if n == tied.sets[e]} for e in group[0]]
+    states = min(sets, key=len) if tied.joins(group[0]) else set()
+    new = now.capacitors - tied.capacitors
+    needed = any(a in states or b in states or a in new for a, b in rest)
+    return not needed, round(float(np.log(total)), 6), work
+
+
+def _earliest(group: Sequence[Entry], before: Sequence[Sequence[Entry]], tied: _Tied) -> int:
+    """How many of the groups before it this one needs: its ties and its capacitors."""
+    whole = tied
+    for entry in (e for earlier in before for e in earlier):
+        whole = whole.after(entry)
+    owned = whole.capacitors & {entry[0] for entry in group}
+    for number, earlier in enumerate(before):
+        now = tied.after(group[0])
+        if owned <= tied.capacitors and not any(now.joins(entry) for entry in group):
+            return number
+        for entry in earlier:
+            tied = tied.after(entry)
+    return len(before)
+
 
 CANDIDATE, OF_STATES = 20, 6
 """Steps of a search that one candidate of the compiled loops counts for with so many states or

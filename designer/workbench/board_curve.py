@@ -6,6 +6,11 @@ board's orbit is taken off the record, and only what is left of it is smoothed, 
 takes up what the exact circuit leaves out. One curve draws the displacement's samples and those of
 the dead zone's output, which in contact tell the displacement several times better. Where the stops
 are follows from the same samples.
+
+How likely contact with a stop is at an extreme of the displacement is told by the samples about it.
+The displacement's curve says how far the extreme is from the stop, with an error. Whatever that is,
+it says the course of the dead zone's output about the extreme too: its samples there, which the
+curve itself does not rest on, are held against every distance.
 """
 
 from __future__ import annotations
@@ -13,19 +18,73 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from designer.base.arrays import Array, Mask
+from designer.base.arrays import Array, Index, Mask
 from designer.base.errors import DesignerError
 from designer.workbench.board_fit import BoardFit, fit_board
-from designer.workbench.contact_likelihood import ContactLikelihood
+from designer.workbench.contact_count import PROMINENT, extremes
 from designer.workbench.dead_zone_curve import DeadZoneCurve, fitted
 from designer.workbench.folding import POINTS, RIDGE, Fold, Samples, best_knots, fold, spline_basis
 from designer.workbench.observation import observe
 from designer.workbench.prediction import BoardPrediction, PredictedStop
 from designer.workbench.record import RecordedMotion
+
+FAR = 8.0
+"""Standard errors beyond which the curve alone decides."""
+DISTANCES = 321
+"""That are tried within ``FAR`` of either side of the curve's own."""
+
+
+@dataclass(frozen=True)
+class ContactLikelihood:
+    """What a curve and the samples near a stop say of contact with it; positive is beyond it."""
+
+    trace: Array
+    """(k,) the displacement less the stop along a lap [V]."""
+    errors: Array
+    """(k,) standard error of it [V]."""
+    noise: float
+    """Standard error from one extreme to the next [V]."""
+    place: Array
+    """(m,) points of the lap at which samples near the stop were taken."""
+    depth: Array
+    """(m,) the depth of the contact [V] by the output there: 0 but for noise without contact."""
+    depth_error: float
+    """Standard deviation of the noise of one [V]."""
+
+    @cached_property
+    def _turns(self) -> Index:
+        return np.sort(extremes(self.trace, PROMINENT * self.noise))
+
+    def ratio(self, at: int) -> float:
+        """Logarithm of the likelihood of contact over that of none at an extreme, each at the
+        distance from the stop that is best for it."""
+        curve, error = float(self.trace[at]), float(self.errors[at])
+        if abs(curve) > FAR * error:
+            return 0.5 * curve * abs(curve) / error**2
+        beyond = np.append(curve + error * np.linspace(-FAR, FAR, DISTANCES), 0.0)
+        here = self._about(at)
+        closed = np.append(self.trace, self.trace[0])
+        shape = np.interp(self.place[here], np.arange(len(closed)), closed) - curve
+        left = self.depth[here] - np.maximum(beyond[:, None] + shape, 0.0)
+        squares = (left**2).sum(axis=1) / self.depth_error**2 + ((beyond - curve) / error) ** 2
+        without, touching = squares[beyond <= 0.0].min(), squares[beyond >= 0.0].min()
+        return float(0.5 * (without - touching))
+
+    def _about(self, at: int) -> Mask:
+        """(m,) which samples lie between the extremes on either side."""
+        size, turns = len(self.trace), self._turns
+        others = (turns - at) % size
+        others = others[others > 0]
+        after = int(others.min(initial=size))
+        before = size - int(others.max(initial=0))
+        way = (self.place - at + 0.5 * size) % size - 0.5 * size
+        return np.asarray((way > -before) & (way < after))
+
 
 SURE = 4.5
 """Logarithm of the ratio of the likelihoods at which an extreme of this curve is decided: three

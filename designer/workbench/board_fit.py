@@ -2,29 +2,210 @@
 
 Maximum a posteriori by Gauss and Newton (Nocedal and Wright, Numerical Optimization, 2006, chapter
 10; Tarantola, Inverse Problem Theory, 2005, chapter 3). The unknowns are the coordinates of the
-board (``board_prior.Prior``), and for each record the gain and offset of each channel, its shift
-in time and, where nobody knows it better, the generator's amplitude. What is held against the
-record is the board's exact orbit, with its linear variation (``orbit_slopes``); against a record of
-the generator switched off, the board's resonances (``free_decay``).
+board (``board_prior.Prior``), and for each record the gain and offset of each channel, its shift in
+time and, where nobody knows it better, the generator's amplitude. What is held against the record
+is the board's exact orbit, with its linear variation; against a record of the generator switched
+off, the board's resonances (``free_decay``).
+
+The linear variation says how a board's orbit moves with the board, all coordinates at once. Along
+the orbit x(t) of x' = f(x, t, z), the derivative by a coordinate z_k obeys
+
+    y' = A y + ∂f/∂z_k,
+
+with A and ∂f/∂z_k of the mode that holds. Where a mode begins f is continuous, so y is as well, and
+what a coordinate does to a stop is in ∂f/∂z_k of the contact. Steps are those of the orbit's grid:
+A by its exponential, ∂f/∂z_k by the trapezoidal rule, a step with an entry or exit shared between
+both modes. The orbit's own y closes after n periods.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.base.errors import DesignerError
+from designer.circuit.board_modes import ModeRows, mode_rows
 from designer.circuit.netlist import Excitation
-from designer.workbench.board_orbits import POINTS, NetOrbit, follow
-from designer.workbench.board_prior import Prior
+from designer.circuit.nodal_bandwidth import swinging_sections
+from designer.dynamics.orbit import OrbitStatus
+from designer.workbench.board_orbits import POINTS, NetOrbit, follow, whole_states
+from designer.workbench.board_prior import PROBE, Prior
 from designer.workbench.free_decay import FreeDecay
 from designer.workbench.observation import Observation
-from designer.workbench.orbit_match import OrbitMatch, interpolated, matches
-from designer.workbench.orbit_slopes import OrbitSlopes, orbit_slopes
+
+TERMS = 12
+"""Of Taylor's series of an exponential: 1e-12 where the matrix has a norm of a half."""
+
+
+@dataclass(frozen=True)
+class OrbitSlopes:
+    """Derivatives of an orbit by the K coordinates of the board and by the generator's amplitude
+    over what it is, which stands last."""
+
+    volts: Array
+    """(n · POINTS, nets, K + 1) of its nets' voltages [V]."""
+    start: Array
+    """(states, K + 1) of its start."""
+
+
+def orbit_slopes(
+    prior: Prior, z: Array, orbit: NetOrbit, excitation: Excitation, nets: tuple[str, ...]
+) -> OrbitSlopes:
+    """The slopes of the orbit of the board at z (K,) under this setting.
+
+    Where op-amps drive diodes, their lag is left out of the slopes (not of the orbit).
+    """
+    circuit = prior.circuit
+    boards = prior.boards(np.vstack([z, z + PROBE * np.eye(len(z))]))
+    sides, which = np.unique(orbit.sides, axis=0, return_inverse=True)
+    keys = [circuit.in_contact(each.tolist()) for each in sides]
+    if swinging_sections(circuit):
+        boards = replace(boards, bandwidth=False)
+    modes = [mode_rows(boards, key, nets) for key in keys]
+    whole = whole_states(orbit.states[:, : len(circuit.states)], excitation)
+    which = which.reshape(-1)
+    moved = _variation(modes, which, orbit, whole, excitation)
+    volts = np.empty((len(which), len(nets), len(z) + 1))
+    for k, mode in enumerate(modes):
+        here = which == k
+        rows = mode.rows[:, :, :-2]
+        volts[here] = np.einsum("ni,mik->mnk", rows[0], moved[here])
+        volts[here, :, :-1] += np.einsum("knj,mj->mnk", _change(mode.rows), whole[here])
+    more = np.zeros((len(orbit.start) - moved.shape[1], len(z) + 1))
+    return OrbitSlopes(volts, np.vstack([moved[0], more]))
+
+
+def _change(rows: Array) -> Array:
+    """(K, ...) derivatives of rows (1 + K, ...) of a board and of those beside it."""
+    return np.asarray((rows[1:] - rows[0]) / PROBE)
+
+
+def _variation(
+    modes: list[ModeRows], which: Index, orbit: NetOrbit, whole: Array, excitation: Excitation
+) -> Array:
+    """(m, states, K + 1) derivatives of the states along the orbit."""
+    steps, step = len(which), 1.0 / (excitation.frequency * POINTS)
+    n, count = modes[0].rates.shape[1], len(modes[0].rates)
+    force = np.zeros((steps, n, count + n))
+    for k, mode in enumerate(modes):
+        here = which == k
+        force[here, :, : count - 1] = np.einsum("kij,mj->mik", _change(mode.rates), whole[here])
+        swing = whole[here, n] - excitation.offset
+        force[here, :, count - 1] = swing[:, None] * mode.rates[0, :, n]
+    after = np.roll(which, -1)
+    share = _shares(orbit)
+    A = np.stack([mode.rates[0, :, :n] for mode in modes])
+    held, at = np.unique(np.column_stack([which, after, share]), axis=0, return_inverse=True)
+    first, last, part = held[:, 0].astype(int), held[:, 1].astype(int), held[:, 2, None, None]
+    jumps = _exponentials(step * (part * A[first] + (1.0 - part) * A[last]))[at.reshape(-1)]
+    # The last n columns are the free motion from each unit vector: the matrix of the whole lap.
+    path = np.zeros((steps + 1, n, count + n))
+    path[0, :, count:] = np.eye(n)
+    for j in range(steps):
+        path[j + 1] = jumps[j] @ (path[j] + step * share[j] * force[j])
+        path[j + 1] += step * (1.0 - share[j]) * force[(j + 1) % steps]
+    lap = path[steps]
+    start = np.linalg.solve(np.eye(n) - lap[:, count:], lap[:, :count])
+    return np.asarray(path[:steps, :, :count] + path[:steps, :, count:] @ start)
+
+
+def _exponentials(A: Array) -> Array:
+    """(k, n, n) exponentials of small matrices (k, n, n), by Taylor's series of them divided by a
+    power of two, then squared: SciPy's, made for large ones, takes a thousand times as long."""
+    halvings = max(0, math.ceil(math.log2(max(float(np.abs(A).sum(axis=2).max()), 1e-300))) + 1)
+    small, out = A / 2.0**halvings, np.eye(A.shape[1])
+    for order in range(TERMS, 0, -1):
+        out = np.eye(A.shape[1]) + small @ out / order
+    for _ in range(halvings):
+        out = out @ out
+    return out
+
+
+def _shares(orbit: NetOrbit) -> Array:
+    """(m,) how much of each step of the grid its first mode holds; a half where it does not
+    change."""
+    share = np.full(len(orbit.sides), 0.5)
+    after, ahead = np.roll(orbit.sides, -1, axis=0), np.roll(orbit.beyond, -1, axis=0)
+    for j, c in zip(*np.nonzero(after != orbit.sides), strict=True):
+        side = orbit.sides[j, c] or after[j, c]
+        k = 0 if side > 0 else 1
+        here, there = orbit.beyond[j, c, k], ahead[j, c, k]
+        share[j] = float(np.clip(here / (here - there), 0.0, 1.0)) if here != there else 0.5
+    return share
+
+
+LOOK = 1024
+"""Samples of a record that it takes."""
+SAME = 1e-6
+"""Relative difference of two starts of one orbit."""
+
+
+@dataclass(frozen=True)
+class OrbitMatch:
+    """How far a record is from an orbit, at the shift at which it is nearest."""
+
+    cost: float
+    """Squares of what is left of the record, over what is allowed for."""
+    orbit: NetOrbit
+    shift: float
+    """In time [drive periods]."""
+
+
+def matches(
+    prior: Prior, draws: Array, obs: Observation, starts: Sequence[Array]
+) -> dict[int, OrbitMatch]:
+    """For each of the boards at draws (N, K) that settles on the record's period from one of the
+    starts, by its number: its orbit that is nearest to the record."""
+    boards = prior.ensemble(draws)
+    which = [i for i in range(len(draws)) for _ in starts]
+    asked = np.array([state for _ in draws for state in starts])
+    asked = asked.reshape(len(which), len(prior.circuit.states))
+    settled = boards.settle(which, [obs.excitation.drive] * len(which), asked)
+    best: dict[int, OrbitMatch] = {}
+    seen: dict[int, list[Array]] = {}
+    for i, motion in zip(which, settled, strict=True):
+        if motion.status is not OrbitStatus.PERIODIC or obs.n not in (None, motion.n):
+            continue
+        known = seen.setdefault(i, [])
+        if any(np.allclose(motion.start, start, rtol=SAME, atol=0.0) for start in known):
+            continue
+        known.append(motion.start)
+        orbit = follow(boards.reduction(i), obs.excitation, obs.nets, motion.start, motion.n)
+        look = None if orbit is None else _nearest(obs, orbit)
+        if look is not None and (i not in best or look.cost < best[i].cost):
+            best[i] = look
+    return best
+
+
+def _nearest(obs: Observation, orbit: NetOrbit) -> OrbitMatch:
+    """At the best of the shifts that the record allows."""
+    width = max(1, len(obs.phase) // LOOK)
+    phase, volts = obs.phase[::width], obs.volts[::width]
+    sigma = obs.spread_of(np.abs(orbit.volts).max(axis=0)) / np.sqrt(width)
+    fine = 1 if obs.aligned else 64
+    costs = []
+    for k in range(orbit.n * fine):
+        shown = interpolated(orbit.volts, phase + k / fine)
+        rest = (volts - shown - (volts - shown).mean(axis=0)) / sigma
+        costs.append((float((rest**2).sum()), k / fine))
+    cost, shift = min(costs)
+    return OrbitMatch(cost, orbit, shift)
+
+
+def interpolated(values: Array, phase: Array) -> Array:
+    """(k, ...) periodic values (m, ...) of whole drive periods at phases (k,), straight between the
+    points of the grid."""
+    place = phase * POINTS
+    cell = np.floor(place).astype(np.int64)
+    share = (place - cell).reshape(-1, *(1,) * (values.ndim - 1))
+    size = len(values)
+    return np.asarray((1.0 - share) * values[cell % size] + share * values[(cell + 1) % size])
+
 
 DRAWS, MORE = 16, 96
 """Boards of the spread whose orbits are held against a record first, the nominal one among them;

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from designer.base.defaults import (
     SAMPLES as SAMPLES,
     SEED as SEED,
@@ -15,10 +17,12 @@ from designer.base.defaults import (
     at_least,
     cores,
 )
+from designer.base.errors import InputError
 from designer.base.progress import Laps, Progress
 from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
+from designer.circuit.ensemble import Ensemble
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import need_responses
 from designer.model.tuning_bands import Bands
@@ -27,11 +31,11 @@ from designer.spice.pool import SpicePool
 from designer.spread.spread import NO_BANDWIDTH
 from designer.verdicts import cross_check
 from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
+from designer.verdicts.rung_gate import gated
 from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields import layers
 from designer.yields.blame_analysis import Blame, blame
 from designer.yields.blame_replay import BUDGET, extent_of
-from designer.yields.lagging_plan import lagging_plan
 from designer.yields.layers import LayerName, Runner, Task
 from designer.yields.power_up import power_up_block
 from designer.yields.row_store import BlockStore
@@ -42,6 +46,44 @@ from designer.yields.study import Study, plan_study
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
 from designer.yields.tuned_yield import tuned_block
 from designer.yields.yield_maps import yield_map
+
+
+def lagging_plan(
+    plan: StudyPlan, pool: SpicePool | None
+) -> tuple[StudyPlan, tuple[int, ...], dict[int, str]]:
+    """The plan of the same boards with bandwidth, which of its questions are left in order, and
+    why the others are not.
+
+    Each question starts on the nominal orbit of the circuit with bandwidth. pool : of ngspice,
+    which must pass the gate with op-amps that lag too; without one it is not asked.
+
+    Raises
+    ------
+    InputError : the circuit's op-amp has no gain-bandwidth.
+    """
+    if plan.circuit.figures is None:
+        expected = "a circuit whose op-amp has figures in the catalogue"
+        raise InputError(None, "--rung", "bandwidth", expected)
+    plan = replace(plan, bandwidth=True)
+    if not plan.questions:
+        return plan, (), {}
+    orbits = Ensemble(plan.nominal()).settle(
+        [0] * len(plan.questions),
+        [q.excitation.drive for q in plan.questions],
+        np.array([q.start.start for q in plan.questions]),
+    )
+    left = tuple(k for k, o in enumerate(orbits) if o.status is OrbitStatus.PERIODIC)
+    why = {
+        k: f"the nominal circuit with bandwidth is {orbit.response}"
+        for k, orbit in enumerate(orbits)
+        if k not in left
+    }
+    questions = tuple(replace(plan.questions[k], start=orbits[k], settings=None) for k in left)
+    plan = replace(plan, questions=questions)
+    if pool is not None and questions:
+        plan, _ = gated(plan, pool, plan.rung)
+    return plan, left, why
+
 
 MOST_UNTIL = 100_000
 """Samples at which a study that grows until its intervals are narrow gives up."""

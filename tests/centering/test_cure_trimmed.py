@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from designer.centering import cure_trimmed
+from designer.centering import cure_linear_model as cure_trimmed
+from designer.centering.cure_linear_model import trimmed_margins, trimmer_ways, without_wiper
 from designer.centering.cure_measure import Book
-from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways, without_wiper
 from designer.centering.cure_ways import Looker, ResponseWay
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest

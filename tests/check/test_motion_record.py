@@ -13,7 +13,7 @@ from designer.check import simulation
 from designer.check.motion_record import power_spectrum, section
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
-from designer.plots.section_plots import section_csv, section_figure, spectrum_figure
+from designer.plots.simulate_plots import section_csv, section_figure, spectrum_figure
 from tests.cli.test_entry import BASE
 from tests.shared.figure_text import clipped, overlapping
 from tests.shared.oracles import Plain, response_amplitude

@@ -13,11 +13,10 @@ from playwright.sync_api import Page, sync_playwright
 
 from designer import InputError, explore
 from designer.base.progress import Progress
-from designer.explorer import branch_recording, saved_page
-from designer.explorer.branch_recording import BranchRecording, places, record
+from designer.explorer import saved_page, saved_page as branch_recording
 from designer.explorer.place import ModelPlace
-from designer.explorer.recorded_yields import yields
 from designer.explorer.response_view import respond
+from designer.explorer.saved_page import BranchRecording, places, record, yields
 from designer.explorer.wire import short_column
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file

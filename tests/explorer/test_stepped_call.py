@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from designer.explorer.stepped_call import stepped
+from designer.explorer.response_map import stepped
 
 
 def test_its_result_comes_after_its_steps() -> None:

@@ -16,7 +16,7 @@ import pytest
 from designer.board.bom import bill
 from designer.board.kicad_reader import BoardFile
 from designer.fabrication.board_picture import board_svg
-from designer.fabrication.interactive_bom import bom_page
+from designer.fabrication.order import bom_page
 from tests.fabrication.test_order import VIA, board_of, board_text, with_items
 from tests.shared.kicad_cases import case
 

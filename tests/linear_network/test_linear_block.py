@@ -21,7 +21,7 @@ from designer.linear_network.linear_block import (
     slice_from,
 )
 from designer.linear_network.linear_terms import ANY, Bounds, Targets
-from designer.linear_network.tie_break import error_of, residuals
+from designer.linear_network.pair_search import error_of, residuals
 from designer.model.model import Dimensionless
 from tests.shared import oracles
 from tests.shared.linear_enumeration import CAPACITOR

@@ -13,8 +13,7 @@ from designer.base.arrays import Array
 from designer.check.synthesis_result import synthesise
 from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.fitted_board import FittedBoard, board_behind
-from designer.workbench.fitted_quantities import NORMAL, board_figures
+from designer.workbench.fitted_board import NORMAL, FittedBoard, board_behind, board_figures
 from designer.workbench.free_decay import recorded_decay
 from designer.workbench.naming import NamedMotion, named
 from designer.workbench.prediction import BoardPrediction

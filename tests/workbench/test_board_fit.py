@@ -15,12 +15,11 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.spread.spread import Spread, draw_many
-from designer.workbench.board_fit import BoardFit, NoSuchBoard, fit_board
+from designer.workbench.board_fit import BoardFit, NoSuchBoard, fit_board, orbit_slopes
 from designer.workbench.board_orbits import NetOrbit, follow
 from designer.workbench.board_prior import Prior
-from designer.workbench.fitted_quantities import NORMAL, board_figures, figures, told_figures
+from designer.workbench.fitted_board import NORMAL, board_figures, figures, told_figures
 from designer.workbench.observation import observe
-from designer.workbench.orbit_slopes import orbit_slopes
 from designer.workbench.record import Record, RecordedMotion
 from tests.shared.paper_cases import subject
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from designer.base.arrays import Array
-from designer.workbench.contact_likelihood import ContactLikelihood
+from designer.workbench.board_curve import ContactLikelihood
 
 POINTS, ERROR, NOISE = 1000, 0.01, 0.05
 PHASE = np.arange(POINTS) / POINTS

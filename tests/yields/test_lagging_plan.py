@@ -14,8 +14,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.spread.spread import draw
 from designer.verdicts import exact_rung
-from designer.yields.lagging_plan import lagging_plan
 from designer.yields.study_identity import study_hash
+from designer.yields.tolerance_study import lagging_plan
 from tests.shared.bench_plans import plan
 
 
