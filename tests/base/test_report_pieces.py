@@ -8,7 +8,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.report_pieces import FOLDER, CaseStore, read_key
-from designer.paper import robust_design
+from reports.makers import robust_design
 
 
 def test_the_key_of_a_piece_is_read(tmp_path: Path) -> None:

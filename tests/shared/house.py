@@ -40,7 +40,6 @@ ORDER = (
     "explorer",
     "paper",
     "verbs",
-    "examples",
     "cli",
 )
 """A package may use those before it. The picture in docs/architecture.md is drawn from this."""

@@ -19,17 +19,17 @@ from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, plain_numbers, styled
 from designer.base.page import table
 from designer.dynamics.attractors import settle
-from designer.examples.evidence import (
+from designer.model.driven import model_flow
+from designer.model.mechanics import MechanicalModel
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
     comparison_table,
     figure_block,
 )
-from designer.examples.first_touch import linear_state, located_touch
-from designer.model.driven import model_flow
-from designer.model.mechanics import MechanicalModel
-from designer.model.model_file import ModelFile
+from reports.makers.first_touch import linear_state, located_touch
 
 RATIOS = (2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
 """m = 2 ω₀/ω that are looked at."""

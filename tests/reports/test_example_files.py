@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.examples.first_touch import first_touches, located_touch
 from designer.model.driven import model_flow
 from designer.model.find_responses import find
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
+from reports.makers.first_touch import first_touches, located_touch
 from tests.shared.event_integrator import integrate
 from tests.shared.mechanism_file import mechanism_of, omega_of
 from tests.shared.mechanisms import absolute

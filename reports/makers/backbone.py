@@ -21,7 +21,10 @@ from designer.base.figure_style import INK, MUTED, new_figure, styled
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.continuation import Branch
 from designer.bifurcations.points import PointKind
-from designer.examples.evidence import (
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile
+from designer.model.swept_model import of_model
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
@@ -29,10 +32,7 @@ from designer.examples.evidence import (
     figure_block,
     name_axes,
 )
-from designer.examples.first_touch import first_touches, linear_orbit
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile
-from designer.model.swept_model import of_model
+from reports.makers.first_touch import first_touches, linear_orbit
 
 SOFTER = (1.0, 0.7, 0.5)
 """Factors on force and damping: the weaker both are, the nearer the fold lies to the backbone."""

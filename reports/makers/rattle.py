@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
 from designer.base.figure_style import INK, MUTED, new_figure, styled
-from designer.examples.evidence import (
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
@@ -20,9 +22,7 @@ from designer.examples.evidence import (
     figure_block,
     name_axes,
 )
-from designer.examples.first_touch import first_touches, located_touch
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile
+from reports.makers.first_touch import first_touches, located_touch
 
 SHARES = (0.0, 0.2, 0.4, 0.55, 0.6, 0.7, 0.75, 0.9, 1.0)
 """Of the force on the second mass, at which the first touch is located."""

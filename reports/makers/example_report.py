@@ -1,6 +1,6 @@
 """The report on one model file of ``examples/``: what it shows, and what becomes of it on a board.
 
-    python -m designer.examples.example_report examples/aberdeen.toml reports/examples/aberdeen
+    python -m reports.makers.example_report examples/aberdeen.toml reports/examples/aberdeen
 
 The first part holds what the tool computes against closed forms. The second shows the design that
 the verbs ``run``, ``export`` and ``rules`` make in the folder ``design`` beside the page. A file
@@ -21,7 +21,13 @@ from designer.base.defaults import cores
 from designer.base.page import Block, Page, PageSection, Verbatim
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
-from designer.examples import (
+from designer.folders.origin import provenance
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile, read_model_file
+from designer.model.system_equations import equations_of, number_of
+from designer.paper.report_files import make_report, write_files
+from designer.plots import system_drawing
+from reports.makers import (
     backbone,
     bilinear,
     chain_modes,
@@ -30,15 +36,9 @@ from designer.examples import (
     rattle,
     weight,
 )
-from designer.examples.board_part import board_part
-from designer.examples.evidence import Evidence, Example, figure_block
-from designer.examples.frequency_sweep import frequency_sweep
-from designer.folders.origin import provenance
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile, read_model_file
-from designer.model.system_equations import equations_of, number_of
-from designer.paper.report_files import make_report, write_files
-from designer.plots import system_drawing
+from reports.makers.board_part import board_part
+from reports.makers.evidence import Evidence, Example, figure_block
+from reports.makers.frequency_sweep import frequency_sweep
 
 FORMAT = 1
 SAMPLES, SEED = 100, 71
@@ -118,7 +118,7 @@ def _page(
     numbers: Mapping[str, object],
     parts: Sequence[Evidence],
 ) -> Page:
-    command = f"python -m designer.examples.example_report {model} {out}"
+    command = f"python -m reports.makers.example_report {model} {out}"
     command += f" --samples {numbers['samples']} --seed {numbers['seed']}"
     command += "" if numbers["circuit"] else " --no-circuit"
     head = [Markup(f"Made by `{command}` from `{model}`; the numbers are in `{DATA}`.")]
@@ -137,7 +137,7 @@ def _opening(file: ModelFile) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make the report that the command line asks for; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m designer.examples.example_report")
+    parser = argparse.ArgumentParser(prog="python -m reports.makers.example_report")
     parser.add_argument("model", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--samples", type=int, default=SAMPLES)

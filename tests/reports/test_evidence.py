@@ -13,13 +13,13 @@ import pytest
 from scipy.integrate import quad
 
 from designer.base.progress import Progress
-from designer.examples import example_report, frequency_sweep, grazing_map, persistence, rattle
-from designer.examples.backbone import backbone
-from designer.examples.bilinear import bilinear_frequency
-from designer.examples.chain_modes import chain_frequencies
-from designer.examples.first_touch import first_touches
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
+from reports.makers import example_report, frequency_sweep, grazing_map, persistence, rattle
+from reports.makers.backbone import backbone
+from reports.makers.bilinear import bilinear_frequency
+from reports.makers.chain_modes import chain_frequencies
+from reports.makers.first_touch import first_touches
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -13,7 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
-from designer.examples.evidence import (
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
@@ -21,9 +23,7 @@ from designer.examples.evidence import (
     figure_block,
     name_axes,
 )
-from designer.examples.first_touch import located_touch
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile
+from reports.makers.first_touch import located_touch
 
 RATIOS = (0.5, 0.7, 0.9, 1.0, 1.2, 1.5, 2.0)
 """Drive frequencies over the hammer's own."""

@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
 from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
-from designer.examples.evidence import (
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
@@ -22,9 +24,7 @@ from designer.examples.evidence import (
     figure_block,
     name_axes,
 )
-from designer.examples.first_touch import first_touches
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile
+from reports.makers.first_touch import first_touches
 
 GRID_POINTS = 400
 """Frequencies at which the first touch of each stop is drawn."""

@@ -13,14 +13,12 @@ from matplotlib.figure import Figure
 from designer.base.errors import Unreachable
 from designer.base.page import Block, Picture, bullets, table
 from designer.base.progress import Progress
-from designer.board import placement_drawing
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_placement import place
 from designer.check import checked_design
 from designer.check.checked_design import traces
 from designer.check.synthesis_result import Synthesis
-from designer.examples.evidence import Evidence, figure_block
 from designer.jobs.job_outcome import JobOutcome
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.relative_motion import relative_motions
@@ -30,6 +28,8 @@ from designer.spice.pool import SpicePool
 from designer.verbs.export import export
 from designer.verbs.rules import rules
 from designer.verbs.run import run
+from reports.makers import placement_drawing
+from reports.makers.evidence import Evidence, figure_block
 
 FOLDER = "design"
 """Of the report: the whole design folder, which no repository needs."""

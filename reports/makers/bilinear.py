@@ -17,7 +17,11 @@ from designer.base.figure_style import INK, MUTED, new_figure, styled
 from designer.base.page import table
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
-from designer.examples.evidence import (
+from designer.model.driven import model_flow
+from designer.model.lumped_system import LumpedSystem
+from designer.model.mechanics import MechanicalModel
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
@@ -25,10 +29,6 @@ from designer.examples.evidence import (
     figure_block,
     name_axes,
 )
-from designer.model.driven import model_flow
-from designer.model.lumped_system import LumpedSystem
-from designer.model.mechanics import MechanicalModel
-from designer.model.model_file import ModelFile
 
 ORDERS = (1, 2, 3, 4)
 """Periods n of the resonances that are looked for."""

@@ -11,10 +11,10 @@ import pytest
 from designer.base.figure_style import to_png
 from designer.base.page import markdown
 from designer.model.model_file import parse_model_file
-from designer.paper.robust_design import _decided, at_model_clearance
-from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.verdicts.verdict import Verdict
 from designer.yields.yield_count import Yield
+from reports.makers.robust_design import _decided, at_model_clearance
+from reports.makers.robust_design_page import lever_chart, robust_design_page, yield_chart
 from tests.shared.search_cases import asked
 
 

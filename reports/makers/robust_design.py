@@ -1,6 +1,6 @@
 """The report on the design that a search finds, beside the paper's circuits.
 
-    python -m designer.paper.robust_design reports/robust-design
+    python -m reports.makers.robust_design reports/robust-design
 
 A search of ``examples/robust.toml`` (every place free) and one at the model's own clearance (ω
 free), the paper's circuit as printed and as corrected, and the rectifier stage by the match alone:
@@ -42,7 +42,6 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
 from designer.paper.report_files import README, make_report, write_files
-from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
 from designer.verdicts import exact_rung
@@ -52,6 +51,7 @@ from designer.yields.blame_analysis import blame
 from designer.yields.study import Study, plan_study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.yield_count import Yield, all_on_one, count
+from reports.makers.robust_design_page import lever_chart, robust_design_page, yield_chart
 
 FORMAT = 1
 MODEL = Path("examples/robust.toml")
@@ -128,7 +128,7 @@ def report(
     source = provenance(file, catalog.hash, seed=seed, settings=numbers)
     document = {"format": FORMAT, "cases": pieces, "provenance": source}
     command = (
-        "python -m designer.paper.robust_design reports/robust-design "
+        "python -m reports.makers.robust_design reports/robust-design "
         f"--samples {samples} --short {short} --seed {seed}"
     )
     page = robust_design_page(pieces, command, model.name)
@@ -249,7 +249,7 @@ def _counted(counted: Yield) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m designer.paper.robust_design")
+    parser = argparse.ArgumentParser(prog="python -m reports.makers.robust_design")
     parser.add_argument("out", type=Path)
     parser.add_argument("--model", type=Path, default=MODEL)
     parser.add_argument("--samples", type=int, default=SAMPLES)

@@ -8,10 +8,10 @@ from designer.base.page import Table, table
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
 from designer.dynamics.steady_state import Course
-from designer.examples.evidence import Evidence, figure_block
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots
+from reports.makers.evidence import Evidence, figure_block
 
 STEPS = 240
 COURSE = Course(settle=240, keep=16)

@@ -29,17 +29,17 @@ from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.base.page import table
 from designer.dynamics.flow import Flow
-from designer.examples.evidence import (
+from designer.model.driven import model_flow
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import ModelFile
+from reports.makers.evidence import (
     Comparison,
     Evidence,
     Example,
     comparison_table,
     figure_block,
 )
-from designer.examples.first_touch import first_touches, linear_state
-from designer.model.driven import model_flow
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model_file import ModelFile
+from reports.makers.first_touch import first_touches, linear_state
 
 DEPTHS = np.geomspace(1e-8, 1e-3, 11)
 """δ over the gap."""

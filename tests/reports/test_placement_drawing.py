@@ -9,7 +9,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from designer.board.kicad_placement import place
 from designer.board.kicad_reader import read_board
-from designer.board.placement_drawing import placement_drawing
+from reports.makers.placement_drawing import placement_drawing
 from tests.shared.figure_text import clipped, overlapping
 from tests.shared.kicad_cases import case, case_files, written
 
