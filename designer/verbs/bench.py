@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import cores
-from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.verbs.console import answering, say, table
 from designer.verbs.declared import DesignDir, Jobs, Overwrite, Verb, option
@@ -128,6 +126,8 @@ def bench(
     InputError : no design folder, a file that is no record, channels that cannot be told apart,
         several boards in one folder, or files in the way; nothing is written then.
     """
+    from designer.base.design_folder import Folder
+    from designer.base.plain_json import plain
     from designer.catalog.parts_catalog import load_catalog
     from designer.folders.design_source import read_design
     from designer.folders.origin import provenance

@@ -6,12 +6,13 @@ import contextlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
-
-from rich.console import Console
-from rich.table import Column, Table
-from rich.text import Text
+from typing import TYPE_CHECKING
 
 from designer.base.printed import printable
+
+if TYPE_CHECKING:  # a verb's help needs none of it
+    from rich.console import Console
+    from rich.text import Text
 
 _ANSWERING = ContextVar("_ANSWERING", default=False)
 
@@ -44,6 +45,8 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
         return
     say(f"\n{title}")
     # A word that is too long goes on in the next line: what is cut off may be the answer.
+    from rich.table import Column, Table
+
     rich_table = Table(*(Column(_text(head), overflow="fold") for head in heads), box=None)
     rich_table.padding = (0, gap, 0, 0)
     for row in rows:
@@ -52,10 +55,14 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
 
 
 def _text(text: str) -> Text:
+    from rich.text import Text
+
     return Text(printable(text))
 
 
 def _console() -> Console:
     """Wide enough for a row where there is no terminal to ask."""
+    from rich.console import Console
+
     stream = sys.stdout if _ANSWERING.get() else sys.stderr
     return Console(file=stream, width=None if stream.isatty() else 120)

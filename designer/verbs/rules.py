@@ -9,14 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from designer.base import atomic_write
-from designer.base.atomic_write import NotWritten
-from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
-from designer.base.seal import sha256
 from designer.base.version import __version__
 from designer.verbs import next_steps
 from designer.verbs.console import say, table
@@ -88,6 +83,11 @@ def rules(
     InputError : no design folder, a board that is not of this design, or a fab without a file;
         nothing is written then.
     """
+    from designer.base import atomic_write
+    from designer.base.atomic_write import NotWritten
+    from designer.base.design_folder import Folder, is_design_folder
+    from designer.base.plain_json import dumps, plain
+    from designer.base.seal import sha256
     from designer.board.kicad_reader import read_board
     from designer.catalog.fab import fabs
     from designer.catalog.parts_catalog import load_catalog

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from designer.base.defaults import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
 from designer.base.frames import frame
-from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.si_unit import DIGITS, value_text
 from designer.verbs import next_steps
@@ -116,6 +115,7 @@ def simulate(
     ------
     InputError : as ``simulation.simulate``, or pictures that are in the way.
     """
+    from designer.base.plain_json import plain
     from designer.catalog.parts_catalog import load_catalog
     from designer.check import simulation
     from designer.folders.json_answers import simulate_json
