@@ -212,6 +212,11 @@ class Placement:
 
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     """The board; InputError for a footprint that is not known here."""
+    return _placement(circuit, tuple(components))
+
+
+@lru_cache(maxsize=4)  # the notes, the cost, the project and the page of a design ask for the same
+def _placement(circuit: Circuit, components: tuple[Component, ...]) -> Placement:
     spots = {
         c.reference: PlacedComponent(
             c,

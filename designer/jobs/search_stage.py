@@ -42,17 +42,6 @@ RULES = 6
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 
-def design_file(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
-    """The model file that a verb works with: the given one, or, where it leaves the design to a
-    search, that of the folder ``out``, in which the search then writes the design.
-
-    A design folder's own model file has its design already.
-    """
-    if modelfile.circuit.objective != "yield" or modelfile.source == out / MODEL:
-        return modelfile
-    return searched_into(modelfile, out, options, progress)
-
-
 def searched_into(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress
 ) -> ModelFile:

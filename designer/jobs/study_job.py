@@ -20,9 +20,10 @@ from designer.folders import design_files, kicad_files
 from designer.folders.design_source import bills_are_of_old, design_inputs
 from designer.folders.json_answers import run_json
 from designer.folders.model_source import source
-from designer.jobs import folder_numbers, rung_choice, search_stage, usual_times
+from designer.jobs import folder_numbers, rung_choice, usual_times
 from designer.jobs.board_routing import route_own_board
 from designer.jobs.job_outcome import JobOutcome
+from designer.jobs.open_design import design_file
 from designer.jobs.options import Options
 from designer.jobs.stage_runner import StageRunner
 from designer.jobs.study_layers import merged
@@ -81,7 +82,7 @@ def design_and_study(
     place = None if out is None else Path(out)
     usual = usual_times.RUN if whole_job else usual_times.STUDIED
     with progress.whole({**usual_times.of_design(modelfile), **usual}):
-        modelfile = search_stage.design_file(modelfile, folder, options, progress)
+        modelfile = design_file(modelfile, folder, options, progress)
         path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
         return run_into(
             modelfile,

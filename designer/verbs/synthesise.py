@@ -44,7 +44,8 @@ def synthesise(
     ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     """
     from designer.folders.model_source import source
-    from designer.jobs import search_stage, synthesise_job, usual_times
+    from designer.jobs import synthesise_job, usual_times
+    from designer.jobs.open_design import design_file
     from designer.jobs.options import Options
     from designer.model.model_file import ModelFile, read_model_file
 
@@ -59,7 +60,7 @@ def synthesise(
         )
     modelfile, folder = source(model, out)
     with progress.whole(usual_times.of_design(modelfile)):
-        modelfile = search_stage.design_file(modelfile, folder, options, progress)
+        modelfile = design_file(modelfile, folder, options, progress)
         return synthesise_job.synthesise_into(modelfile, folder, options, progress, compare=compare)
 
 

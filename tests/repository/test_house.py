@@ -62,6 +62,7 @@ LAZY = {
         ("folders.origin", "spice.batch_backend"),
         ("check.simulation", "check.synthesis_result"),
         ("jobs.bifurcation_job", "folders.design_source"),
+        ("jobs.open_design", "jobs.search_stage"),
         ("jobs.study_stage", "jobs.dask_runner"),
     },
 }
