@@ -50,7 +50,7 @@ from designer.workbench.fitted_board import (
     figures,
 )
 from designer.workbench.free_decay import FreeDecay, recorded_decay
-from designer.workbench.naming import NamedMotion, named
+from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.yields.adjustment import Adjustment
 from designer.yields.setting_search import BoardCase, seek
@@ -97,7 +97,7 @@ class _Bench:
             motion = recorded_motion(record, self.prediction)
         except InputError:
             return None
-        return f"{run.asked.question}.csv", named(motion, self.prediction)
+        return f"{run.asked.question}.csv", identify_response(motion, self.prediction)
 
     def behind(
         self, runs: Sequence[BoardRun], wanted: Sequence[int] = (), *, decay: bool = False

@@ -40,7 +40,7 @@ from designer.spice.read_orbit import ENGINE_ERROR
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.contact_count import extremes
 from designer.workbench.dead_zone_curve import fitted
-from designer.workbench.naming import NamedMotion, named
+from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from tests.shared.simulated_scope import SimulatedScope
 
@@ -119,7 +119,7 @@ def _named(run: BoardRun, prediction: BoardPrediction) -> NamedMotion | None:
     at = np.arange(RECORDED * POINTS + 1) * run.period / POINTS
     record = scope.record(at, run.signals, run.period, rng)
     try:
-        return named(recorded_motion(record, prediction), prediction)
+        return identify_response(recorded_motion(record, prediction), prediction)
     except InputError:
         return None
 
@@ -167,7 +167,7 @@ def named_exact(
     outcome = partial(NamedExact, model, seed, drawn.number, channels, *known, drawn.response)
     try:
         motion = recorded_motion(drawn.record, prediction, frequency=about, told=drawn.told)
-        name = named(motion, prediction)
+        name = identify_response(motion, prediction)
     except InputError as error:
         return outcome(str(error), REFUSED, math.nan, said=False)
     off = name.motion.frequency / drawn.frequency - 1.0

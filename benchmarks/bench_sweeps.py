@@ -20,12 +20,12 @@ from designer.base.defaults import cores
 from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.sweep import SweepPlan
-from designer.dynamics.steady_state import Course, by_flow
+from designer.dynamics.steady_state import TransientSettings, by_flow
 from designer.model.model import Dimensionless
 from designer.model.swept_model import ModelSubject
 
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-COURSE = Course(settle=500, keep=30)
+COURSE = TransientSettings(settle=500, keep=30)
 ROUNDS = 3
 """The best is stated, all are kept in the JSON file."""
 REPORT = Path(__file__).parent.parent / "reports" / "sweep-speed"
@@ -102,9 +102,9 @@ def costs(
     out = []
     for omega in omegas:
         (setting,) = ModelSubject(PAPER).settings([{"omega": omega}])
-        start = setting.steady(np.zeros(4), Course(500, 16, 0)).end
+        start = setting.steady(np.zeros(4), TransientSettings(500, 16, 0)).end
 
-        def cpu(course: Course, x: Any = start, s: Any = setting) -> float:
+        def cpu(course: TransientSettings, x: Any = start, s: Any = setting) -> float:
             best = np.inf
             for _ in range(3):
                 before = time.process_time()
@@ -112,9 +112,9 @@ def costs(
                 best = min(best, time.process_time() - before)
             return best
 
-        none = cpu(Course(0, 1, 0))
-        plain = cpu(Course(periods, 1, 0)) - none  # half of it with a tangent
-        shown = cpu(Course(0, periods, 0)) - none
+        none = cpu(TransientSettings(0, 1, 0))
+        plain = cpu(TransientSettings(periods, 1, 0)) - none  # half of it with a tangent
+        shown = cpu(TransientSettings(0, periods, 0)) - none
         flow = setting.flow()
         free = np.inf
         for _ in range(3):
@@ -122,9 +122,9 @@ def costs(
             flow.run(start, periods)
             free = min(free, time.process_time() - before)
         before = time.process_time()
-        by_flow(flow, start, Course(0, 50, 0))
+        by_flow(flow, start, TransientSettings(0, 50, 0))
         slow = (time.process_time() - before) / 50
-        seen = setting.steady(start, Course(0, 100, 0))
+        seen = setting.steady(start, TransientSettings(0, 100, 0))
         per = 1e6 / periods
         out.append(
             Cost(

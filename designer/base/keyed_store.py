@@ -46,7 +46,7 @@ def quiet(_text: str) -> None:
     """Tells nobody."""
 
 
-class Form(Protocol[Entry]):
+class EntryCodec(Protocol[Entry]):
     """How an entry is written."""
 
     def encode(self, head: Mapping[str, Any], value: Entry) -> bytes:
@@ -67,7 +67,7 @@ class KeyedStore(Generic[Entry]):
 
     root: Path
     """The folder."""
-    form: Form[Entry]
+    form: EntryCodec[Entry]
     """How an entry is written."""
     note: Note = quiet
     """Told of entries that are not taken."""

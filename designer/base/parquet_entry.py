@@ -33,7 +33,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class ParquetForm:
-    """Rows as mappings from column names to values (``keyed_store.Form``)."""
+    """Rows as mappings from column names to values (``keyed_store.EntryCodec``)."""
 
     schema: pa.Schema
     """Columns and their types."""

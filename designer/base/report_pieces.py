@@ -115,7 +115,7 @@ class CaseStore:
 
 
 class _Json:
-    """A JSON object with its key first and its seal last (``keyed_store.Form``)."""
+    """A JSON object with its key first and its seal last (``keyed_store.EntryCodec``)."""
 
     def encode(self, head: Mapping[str, Any], value: Mapping[str, Any]) -> bytes:
         document = {**head, **value, SEAL: BLANK}

@@ -30,7 +30,7 @@ from designer.dynamics.counts import Pairs
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import MOST_COUNTED, Motion, Orbit, OrbitStatus
-from designer.dynamics.steady_state import UPPER, Course, DrivenSystem, stopped
+from designer.dynamics.steady_state import UPPER, DrivenSystem, TransientSettings, stopped
 from designer.kernels.kernel_orbit import CHAOS
 from designer.kernels.kernel_sweep import ALIGN, SPAN
 
@@ -62,7 +62,7 @@ class SharePlan:
     periods."""
     seed: int
     """Seed that the numbers were drawn with."""
-    course: Course = COURSE
+    course: TransientSettings = COURSE
     """Periods of a run to an attractor that is not known."""
 
     @property

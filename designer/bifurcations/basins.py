@@ -13,7 +13,7 @@ from designer.base.threads import parallel
 from designer.bifurcations.attractor_list import AttractorList
 from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of, may_be
 from designer.bifurcations.subject import Subject
-from designer.dynamics.steady_state import Course, DrivenSystem
+from designer.dynamics.steady_state import DrivenSystem, TransientSettings
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class BasinPlan:
     """(rows,) values of the state y, ascending."""
     start: Array
     """(states,) the starts; the two states of the plane are replaced."""
-    course: Course = COURSE
+    course: TransientSettings = COURSE
     """Periods of each run."""
 
     def as_dict(self) -> dict[str, Any]:

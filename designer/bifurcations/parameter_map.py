@@ -13,16 +13,16 @@ from designer.base.threads import parallel
 from designer.bifurcations.subject import Subject
 from designer.dynamics.counts import Pairs
 from designer.dynamics.orbit import Motion, OrbitStatus
-from designer.dynamics.steady_state import Course, Steady
+from designer.dynamics.steady_state import SteadyMotion, TransientSettings
 from designer.dynamics.step_budget import Budget
 
-COURSE = Course(settle=134, keep=16, patience=1000)
+COURSE = TransientSettings(settle=134, keep=16, patience=1000)
 """150 periods a point, and up to a thousand more where they leave the motion undecided."""
 
 
 @dataclass(frozen=True)
 class MapCell(Motion):
-    """What a grid point shows; the fields are those of ``Steady``."""
+    """What a grid point shows; the fields are those of ``SteadyMotion``."""
 
     i: int
     """Row of the cell."""
@@ -74,7 +74,7 @@ class MapPlan:
     """(rows,) values of the parameter y, ascending."""
     start: Array = field(default_factory=lambda: np.zeros(0))
     """(states,) start of every point; rest where it is not given."""
-    course: Course = COURSE
+    course: TransientSettings = COURSE
     """Periods of each run."""
 
     def __post_init__(self) -> None:
@@ -144,7 +144,7 @@ def cells_at(
         yield cell_of(i, j, setting.steady(plan.start, plan.course, budget))
 
 
-def cell_of(i: int, j: int, steady: Steady) -> MapCell:
+def cell_of(i: int, j: int, steady: SteadyMotion) -> MapCell:
     """The cell that shows this motion."""
     s, strobe = steady, tuple(steady.start.tolist())
     named = (s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov)

@@ -33,7 +33,7 @@ class Subject(Protocol):
     """
 
     @property
-    def whose(self) -> str:
+    def name(self) -> str:
         """Whose motion it is, in words, for titles."""
         ...
 

@@ -19,7 +19,7 @@ from designer.base.threads import parallel
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import UPPER, Course, Steady
+from designer.dynamics.steady_state import UPPER, SteadyMotion, TransientSettings
 
 BLOCK = 64
 """Steps of a block."""
@@ -33,10 +33,12 @@ DOWN, UP = "down", "up"
 class Store(Protocol):
     """Where finished blocks are kept."""
 
-    def read(self, track: str, block: int) -> list[Steady] | None:
+    def read(self, track: str, block: int) -> list[SteadyMotion] | None:
         """The steps of a block, in the order they were made; None where there is none."""
 
-    def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
+    def write(
+        self, track: str, block: int, values: Sequence[float], steps: list[SteadyMotion]
+    ) -> None:
         """Keep a finished block."""
 
 
@@ -54,7 +56,7 @@ class SweepPlan:
     """"down", "up", or "start K" for row K of ``starts``."""
     starts: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """(K, states) starts of the tracks that begin anew at each value; rest where none is given."""
-    course: Course = field(default_factory=Course)
+    course: TransientSettings = field(default_factory=TransientSettings)
     """Periods of each step."""
 
     def __post_init__(self) -> None:
@@ -132,8 +134,8 @@ class Sweep:
 
     plan: SweepPlan
     """What the sweep was asked for."""
-    steps: Mapping[str, tuple[Steady, ...]]
-    """For each track one ``Steady`` per value, in the order of ``plan.values``."""
+    steps: Mapping[str, tuple[SteadyMotion, ...]]
+    """For each track one ``SteadyMotion`` per value, in the order of ``plan.values``."""
 
     @property
     def windows(self) -> list[Window]:
@@ -180,7 +182,7 @@ def run(
         numbers = [(track, k) for k in range(len(plan.blocks(track)))]
         tasks += [numbers] if plan.followed else [[each] for each in numbers]
 
-    def work(task: list[tuple[str, int]]) -> list[tuple[str, list[Steady]]]:
+    def work(task: list[tuple[str, int]]) -> list[tuple[str, list[SteadyMotion]]]:
         out, x = [], np.zeros(len(plan.subject.states))
         for track, number in task:
             block = plan.blocks(track)[number]
@@ -197,7 +199,7 @@ def run(
             progress()
         return out
 
-    by_track: dict[str, list[Steady]] = {track: [] for track in plan.tracks}
+    by_track: dict[str, list[SteadyMotion]] = {track: [] for track in plan.tracks}
     for blocks in parallel(work, tasks, jobs):
         for track, steps in blocks:
             by_track[track] += steps
@@ -207,7 +209,7 @@ def run(
     )
 
 
-def _may_be(steps: Sequence[Steady], plan: SweepPlan, block: Array) -> bool:
+def _may_be(steps: Sequence[SteadyMotion], plan: SweepPlan, block: Array) -> bool:
     """Whether stored steps are of these values and this system."""
     states, periods, stops = len(plan.subject.states), plan.course.keep, len(plan.subject.stops)
     return len(steps) == len(block) and all(
@@ -220,7 +222,7 @@ def _may_be(steps: Sequence[Steady], plan: SweepPlan, block: Array) -> bool:
     )
 
 
-def next_start(step: Steady, weights: Array) -> Array:
+def next_start(step: SteadyMotion, weights: Array) -> Array:
     """Where the next followed step starts: the end of this one, slightly pushed; rest where this
     one had no end. weights : as ``Subject`` has them."""
     if not len(step.minima):
@@ -230,7 +232,7 @@ def next_start(step: Steady, weights: Array) -> Array:
     return np.asarray(step.end + push / weights)
 
 
-def _followed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady]:
+def _followed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[SteadyMotion]:
     out = []
     for setting in plan.subject.settings([{plan.parameter: float(v)} for v in values]):
         out.append(setting.steady(x, plan.course))
@@ -238,7 +240,7 @@ def _followed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady
     return out
 
 
-def _fixed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady]:
+def _fixed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[SteadyMotion]:
     settings = plan.subject.settings([{plan.parameter: float(v)} for v in values])
     return [setting.steady(x, plan.course) for setting in settings]
 
@@ -264,7 +266,7 @@ def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
     return sorted(out, key=lambda w: (w.low, w.high, w.response, str(w.symmetric)))
 
 
-def _exponents(steps: Sequence[Steady]) -> tuple[tuple[float, float] | None, float | None]:
+def _exponents(steps: Sequence[SteadyMotion]) -> tuple[tuple[float, float] | None, float | None]:
     """Least and greatest exponent of aperiodic steps, and the largest error of one."""
     if steps[0].status is not OrbitStatus.APERIODIC:
         return None, None

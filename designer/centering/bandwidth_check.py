@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import Stand, Stretched
+from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement, agreements
 from designer.verdicts.verdict import Verdict, judge
 
@@ -26,15 +26,15 @@ class LaggingBoards:
 
     def __call__(
         self,
-        bench: Stretched,
-        stands: Sequence[Stand | None],
+        bench: ScaledBoards,
+        stands: Sequence[OperatingOrbit | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
         """Agreement of each response with the exact circuit; see `ngspice_check.agreements`."""
         return agreements(self._memory, bench, stands, (BANDWIDTH,), _counted, progress)
 
 
-def _counted(bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
+def _counted(bench: ScaledBoards, stand: OperatingOrbit, _: Sequence[int]) -> list[tuple[int, ...]]:
     orbits = bench.lagging(stand, range(LISTENED), STRETCH)
     verdicts = [judge(orbit, stand.spec, stand.orbit)[0] for orbit in orbits]
     unanswered = sum(v in (Verdict.GRAZING, Verdict.FAILED) for v in verdicts)

@@ -27,11 +27,11 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch
 from designer.centering.cure_couplings import couplings, finest
-from designer.centering.cure_measure import Book, questions_of
+from designer.centering.cure_measure import VerdictCache, questions_of
 from designer.centering.cure_milp import CureProgram, Demand, Option, Slot
 from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
-from designer.centering.cure_ways import FEW, SAMPLES, Looker, ResponseWay, foretold
+from designer.centering.cure_ways import FEW, SAMPLES, ResponseSurvey, ResponseWay, foretold
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import column
@@ -47,7 +47,7 @@ FITTED = 1000
 
 
 def trimmer_ways(
-    looker: Looker, trim: DcTrim, firsts: Sequence[ResponseWay]
+    looker: ResponseSurvey, trim: DcTrim, firsts: Sequence[ResponseWay]
 ) -> list[ResponseWay] | None:
     """The trimmer as a way to each response; None where it is hopeless for one of them.
 
@@ -324,7 +324,7 @@ def picture(
     branch: CureBranch,
     target: float,
     seed: int,
-    book: Book,
+    book: VerdictCache,
     *,
     trim: float,
     without: frozenset[str] = frozenset(),
@@ -349,7 +349,7 @@ def picture(
         StudyPlan(*bare.spread(pick), seed, SAMPLES, ())
         for pick in finest(parts, synthesis.catalog)
     )
-    looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress, missed)
+    looker = ResponseSurvey(branch, target, seed, book, trim, without, best, jobs, progress, missed)
     rows = [
         [looker.with_rate(ResponseWay(r, "as it is", question))]
         for r, question in enumerate(questions)

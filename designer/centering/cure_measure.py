@@ -34,7 +34,7 @@ VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdi
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
 
 
-def fresh(seed: int, number: int) -> int:
+def study_seed(seed: int, number: int) -> int:
     """The seed of study ``number`` of a cure: boards that no other one has seen."""
     return int(np.random.SeedSequence([seed, number, TAG]).generate_state(1)[0])
 
@@ -58,7 +58,7 @@ def plan_of(synthesis: Synthesis, question: Question, seed: int, samples: int = 
     return StudyPlan(circuit, spread, seed, samples, (question,))
 
 
-class Book:
+class VerdictCache:
     """Verdicts that are known, by study and by block of boards: one letter a board.
 
     save : called with everything after each block.
@@ -158,7 +158,7 @@ class MeasuredYield:
 def measure(
     plan: StudyPlan,
     target: float,
-    book: Book,
+    book: VerdictCache,
     *,
     trim: float | DcTrim | None = None,
     least: int = 2 * BLOCK,
@@ -193,7 +193,7 @@ def measure(
 def measure_together(
     plans: Sequence[tuple[StudyPlan, float | DcTrim | None] | None],
     target: float,
-    book: Book,
+    book: VerdictCache,
     *,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
@@ -203,8 +203,8 @@ def measure_together(
     One block of boards each. Once a response has missed the target the choice is out, whatever
     becomes of the others: only those that miss it are asked on more boards, for their share.
 
-    plans : each with what its boards are trimmed by (``Book.block``), None: as built; None where
-    there is no response to ask for, which misses.
+    plans : each with what its boards are trimmed by (``VerdictCache.block``), None: as built; None
+    where there is no response to ask for, which misses.
     """
     measured = [MeasuredYield(Yield(0, 0, 0, 0), target) for _ in plans]
     for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):

@@ -22,19 +22,19 @@ from designer.centering.cure_linear_model import LinearModel, picture, pictured
 from designer.centering.cure_measure import (
     FIRST,
     MOST,
-    Book,
     MeasuredYield,
-    fresh,
+    VerdictCache,
     measure,
     measure_together,
     plan_of,
     questions_of,
+    study_seed,
 )
 from designer.centering.cure_milp import CureProgram, cheapest
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
 from designer.centering.cure_ways import ResponseWay
-from designer.centering.limiting_parts import limiting, together
+from designer.centering.limiting_parts import joint_boards, limiting
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.model.model_file import need_responses
@@ -70,7 +70,7 @@ def find_cure(
     without: frozenset[str] = frozenset(),
     seed: int = 1,
     jobs: int | None = None,
-    book: Book | None = None,
+    book: VerdictCache | None = None,
     progress: Progress | None = None,
 ) -> Cure:
     """Search, in memory.
@@ -85,7 +85,7 @@ def find_cure(
     """
     need_responses(base.modelfile)
     progress = Progress() if progress is None else progress
-    book = Book() if book is None else book
+    book = VerdictCache() if book is None else book
     threads = cores() if jobs is None else jobs
     search = _Search(base, target, budget, trim, without, seed, threads, book, progress)
     with seeking("cure"):
@@ -102,7 +102,7 @@ class _Search:
         without: frozenset[str],
         seed: int,
         jobs: int,
-        book: Book,
+        book: VerdictCache,
         progress: Progress,
     ) -> None:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
@@ -152,7 +152,9 @@ class _Search:
         for number, question in enumerate(questions_of(synthesis, synthesis.model_responses)):
             if question is None:
                 self.unseen.append(number)
-            plan = None if question is None else plan_of(synthesis, question, fresh(self.seed, 1))
+            plan = (
+                None if question is None else plan_of(synthesis, question, study_seed(self.seed, 1))
+            )
             plans.append(None if plan is None else (plan, None))
         trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         rates = tuple(m.rate for m in trials)
@@ -185,7 +187,7 @@ class _Search:
             model = picture(
                 branch,
                 self.target,
-                fresh(self.seed, 0),
+                study_seed(self.seed, 0),
                 self.book,
                 trim=self.trim,
                 without=self.without,
@@ -306,7 +308,7 @@ class _Search:
         step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = model.upgrades(pick)
         circuit, spread = model.spread(pick)
-        seed = fresh(self.seed, number)
+        seed = study_seed(self.seed, number)
         plans = list[tuple[StudyPlan, float | DcTrim | None]]()
         for way in model.ways_of(pick):
             setting: float | DcTrim | None = upgrades.trim if way.kind == "trim" else None
@@ -403,7 +405,7 @@ class _Search:
             return ""
         synthesis = model.branch.synthesis
         spread = spread_of(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
-        return limiting(margin, together(synthesis.design.circuit, spread, model.seed)).line
+        return limiting(margin, joint_boards(synthesis.design.circuit, spread, model.seed)).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper

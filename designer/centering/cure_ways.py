@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import bdtrc
 
 from designer.centering.cure_branch import PLACE, TRIM, CureBranch
-from designer.centering.cure_measure import Book, measure, plan_of, questions_of
+from designer.centering.cure_measure import VerdictCache, measure, plan_of, questions_of
 from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file, with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
@@ -109,7 +109,7 @@ def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
 
 
 @dataclass(frozen=True)
-class Looker:
+class ResponseSurvey:
     """Computes the ways in which a branch may show each response."""
 
     branch: CureBranch
@@ -117,7 +117,7 @@ class Looker:
     """Yield that is wanted of every response."""
     seed: int
     """Seed of the boards."""
-    book: Book
+    book: VerdictCache
     """Keeps what has been computed."""
     trim: float
     """Half-width of the band of the DC offset, over the amplitude."""

@@ -33,7 +33,7 @@ from designer.centering.candidate import (
     Step,
     better,
 )
-from designer.centering.distance import Stretched
+from designer.centering.distance import ScaledBoards
 from designer.centering.levers import (
     LEVERS,
     PLACES,
@@ -50,7 +50,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.model.response_table import Response
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
@@ -75,7 +75,7 @@ def search(
 
     seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
     search of the same. windows : of ``look``, if they are known. listen : asks ngspice whether it
-    bears a design out (``ngspice_check.Listener``); the exact circuit alone decides if None.
+    bears a design out (``ngspice_check.AgreementCheck``); the exact circuit alone decides if None.
 
     Raises
     ------
@@ -85,11 +85,11 @@ def search(
     """
     progress = Progress() if progress is None else progress
     catalog = modelfile.choices(catalog)
-    with naming(modelfile):
+    with errors_in(modelfile):
         all_windows = (
             look(modelfile, catalog, jobs, progress) if windows is None else tuple(windows)
         )
-        hunt = _Hunt(
+        hunt = _DesignSearch(
             modelfile,
             catalog,
             all_windows,
@@ -114,7 +114,7 @@ def look(
     """
     need_responses(modelfile)
     catalog = modelfile.choices(catalog)
-    with naming(modelfile):
+    with errors_in(modelfile):
         _check_topologies(modelfile, catalog.mounted(modelfile.board.mounting))
         wanted = {n: r for n, r in enumerate(modelfile.responses, start=1) if not open_in(r)}
         found = find_responses.find(modelfile.model, list(wanted.values()))
@@ -144,7 +144,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
         raise short[0]
 
 
-class _Hunt:
+class _DesignSearch:
     """One search. ``steps`` and the counters grow while it runs."""
 
     def __init__(
@@ -236,7 +236,9 @@ class _Hunt:
     def _placed(self, best: Candidate) -> Candidate:
         """The same choice with every open response at its best place."""
         spread = spread_of(self.modelfile, best.design.circuit, self.catalog)
-        bench = Stretched(best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory)
+        bench = ScaledBoards(
+            best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory
+        )
         responses = []
         for number, spec in enumerate(self.modelfile.responses):
             if not open_in(spec):
@@ -331,9 +333,9 @@ class _Hunt:
 
     def _bench(
         self, choice: DesignChoice, responses: Sequence[ModelResponse], design: Design, boards: int
-    ) -> Stretched:
+    ) -> ScaledBoards:
         spread = spread_of(self._resolved(choice, responses), design.circuit, self.catalog)
-        return Stretched(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
+        return ScaledBoards(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
 
     def _candidate(
         self, choice: DesignChoice, responses: tuple[ModelResponse, ...], title: str

@@ -76,7 +76,7 @@ class StretchCounts:
 
 
 @dataclass(frozen=True)
-class Stand:
+class OperatingOrbit:
     """A place on the nominal board of a design: the orbit there, which boards start from."""
 
     spec: Response
@@ -89,7 +89,7 @@ class Stand:
     """The nominal board's orbit, which boards start from."""
 
 
-class Stretched:
+class ScaledBoards:
     """The boards of a design, each at every stretch, reduced once.
 
     count : boards. seed : of their numbers, with a stream of their own. memory : of answers that
@@ -115,22 +115,26 @@ class Stretched:
         circuit = design.circuit
         self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
 
-    def stands(self, wanted: Sequence[tuple[Response, OperatingPoint]]) -> list[Stand | None]:
+    def stands(
+        self, wanted: Sequence[tuple[Response, OperatingPoint]]
+    ) -> list[OperatingOrbit | None]:
         """Each place on the nominal board; None where that does not show the response there."""
         if not wanted:
             return []
         drives = [self.excitation(place).drive for _, place in wanted]
         starts = np.array([p.start * self.design.volts(p.b) for _, p in wanted])
         orbits = self._boards.quick([0] * len(wanted), drives, starts, jobs=self.jobs)
-        out: list[Stand | None] = []
+        out: list[OperatingOrbit | None] = []
         for (spec, place), drive, orbit in zip(wanted, drives, orbits, strict=True):
             fine = orbit is not None and judge(orbit, spec, orbit)[0] is Verdict.OK
-            out.append(Stand(spec, place, drive, orbit) if fine and orbit is not None else None)
+            out.append(
+                OperatingOrbit(spec, place, drive, orbit) if fine and orbit is not None else None
+            )
         return out
 
     def ask(
         self,
-        stands: Sequence[Stand],
+        stands: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float] = LADDER,
         progress: Callable[[], None] = lambda: None,
@@ -147,7 +151,7 @@ class Stretched:
 
     def _made(
         self,
-        stands: Sequence[Stand],
+        stands: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float],
         progress: Callable[[], None],
@@ -163,7 +167,7 @@ class Stretched:
         ok = np.array(fine).reshape(len(rungs), len(boards), len(stands)).sum(axis=1)
         return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
 
-    def query(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
+    def query(self, stand: OperatingOrbit, boards: range, stretches: Sequence[float]) -> object:
         """Everything that decides an answer, as plain data."""
         drive, spec = stand.drive, stand.spec
         setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
@@ -176,11 +180,11 @@ class Stretched:
         frequency = self.design.errors.scales.frequency(place.omega)
         return Excitation(frequency, self.design.amplitude(place.b, place.omega))
 
-    def nominal(self, stand: Stand) -> GateSubject:
+    def nominal(self, stand: OperatingOrbit) -> GateSubject:
         """The nominal board at a place, for ngspice."""
         return GateSubject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
 
-    def subjects(self, stand: Stand, boards: range, stretch: float) -> list[GateSubject]:
+    def subjects(self, stand: OperatingOrbit, boards: range, stretch: float) -> list[GateSubject]:
         """Those of these boards that show the response at this stretch, for ngspice."""
         excitation = self.excitation(stand.place)
         return [
@@ -188,7 +192,7 @@ class Stretched:
             for row, orbit in self._showing(stand, boards, stretch)
         ]
 
-    def lagging(self, stand: Stand, boards: range, stretch: float) -> list[Orbit]:
+    def lagging(self, stand: OperatingOrbit, boards: range, stretch: float) -> list[Orbit]:
         """Where those of these boards that show the response at this stretch settle from their own
         orbit, their op-amps with bandwidth."""
         showing = self._showing(stand, boards, stretch)
@@ -201,7 +205,9 @@ class Stretched:
         drives = [stand.drive] * len(rows)
         return some.settle(range(len(rows)), drives, starts, jobs=self.jobs)
 
-    def _showing(self, stand: Stand, boards: range, stretch: float) -> list[tuple[int, Orbit]]:
+    def _showing(
+        self, stand: OperatingOrbit, boards: range, stretch: float
+    ) -> list[tuple[int, Orbit]]:
         """Rows and orbits of those of these boards that show the response at this stretch."""
         rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
         starts = np.tile(stand.orbit.start, (len(rows), 1))
@@ -213,7 +219,7 @@ class Stretched:
         ]
 
 
-def _shows(orbit: Orbit | None, stand: Stand) -> bool:
+def _shows(orbit: Orbit | None, stand: OperatingOrbit) -> bool:
     if orbit is None or orbit.status is not OrbitStatus.PERIODIC:
         return False
     return judge(orbit, stand.spec, stand.orbit)[0] is Verdict.OK

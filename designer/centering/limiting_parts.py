@@ -76,11 +76,11 @@ def limitings(
     of_questions = margins.margins(
         plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress
     )
-    drawn = together(plan.circuit, plan.spread, plan.seed)
+    drawn = joint_boards(plan.circuit, plan.spread, plan.seed)
     return tuple(limiting(margin, drawn) for margin in of_questions)
 
 
-def together(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
+def joint_boards(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
     """Boards to take the covariance of their parts from; None where each part varies by itself."""
     shared = spread.groups or spread.temperature is not None or spread.supply > 0.0
     if not shared and spread.measured is None:
@@ -89,7 +89,7 @@ def together(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
 
 
 def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
-    """What limits a response, by its margin. boards : see ``together``."""
+    """What limits a response, by its margin. boards : see ``joint_boards``."""
     if margin.sought and margin.there > HALF * margin.sought:
         border = f"another attractor takes over: {margin.there} of {margin.sought} lost boards"
         return Limiting(

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import Stand, Stretched
+from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
@@ -62,18 +62,20 @@ class Agreement:
         return answers - self.survivors <= FEWER if answers >= LEAST else None
 
 
-Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Agreement, ...]]
+Listen = Callable[
+    [ScaledBoards, Sequence[OperatingOrbit | None], Callable[[], None]], tuple[Agreement, ...]
+]
 """Of the boards of a design and its responses' stands; the last is called once a response."""
 
 
-Count = Callable[[Stretched, Stand, Sequence[int]], list[tuple[int, ...]]]
+Count = Callable[[ScaledBoards, OperatingOrbit, Sequence[int]], list[tuple[int, ...]]]
 """The figures of an `Agreement` for the boards of one response."""
 
 
 def agreements(
     memory: AnswerCache,
-    bench: Stretched,
-    stands: Sequence[Stand | None],
+    bench: ScaledBoards,
+    stands: Sequence[OperatingOrbit | None],
     question: Sequence[object],
     count: Count,
     progress: Callable[[], None] = lambda: None,
@@ -97,7 +99,7 @@ def agreements(
     return tuple(out)
 
 
-class Listener:
+class AgreementCheck:
     """Asks ngspice, and remembers. pool : where it runs. memory : of the search."""
 
     def __init__(self, pool: SpicePool, memory: AnswerCache) -> None:
@@ -105,15 +107,17 @@ class Listener:
 
     def __call__(
         self,
-        bench: Stretched,
-        stands: Sequence[Stand | None],
+        bench: ScaledBoards,
+        stands: Sequence[OperatingOrbit | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
         """Agreement of each response with ngspice; see `agreements`."""
         question = (RUNG, REFINEMENTS, LONGEST)
         return agreements(self._memory, bench, stands, question, self._ask, progress)
 
-    def _ask(self, bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
+    def _ask(
+        self, bench: ScaledBoards, stand: OperatingOrbit, _: Sequence[int]
+    ) -> list[tuple[int, ...]]:
         there = bench.subjects(stand, range(LISTENED), STRETCH)
         near = [s for s in map(_started, there) if s.discard <= LONGEST]
         if len(near) < LEAST:

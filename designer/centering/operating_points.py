@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from designer.centering.distance import LADDER, Stand, StretchCounts, Stretched
+from designer.centering.distance import LADDER, OperatingOrbit, ScaledBoards, StretchCounts
 from designer.centering.response_windows import CLEARANCE_STEP, OperatingPoint, Stretch
 from designer.model.response_table import Response
 
@@ -36,7 +36,7 @@ class Scored:
 
     place: OperatingPoint
     """Where the response is asked for."""
-    stand: Stand | None
+    stand: OperatingOrbit | None
     """The nominal board's orbit there; None where it does not show the response."""
     counts: StretchCounts
     """What boards showed there."""
@@ -64,7 +64,7 @@ def room_of(spec: Response, b: float, omega: tuple[float, float]) -> OperatingRa
 
 
 def best_points(
-    bench: Stretched,
+    bench: ScaledBoards,
     spec: Response,
     stretches: Sequence[Stretch],
     room: OperatingRange,
@@ -90,7 +90,7 @@ def best_points(
 
 
 def score(
-    bench: Stretched,
+    bench: ScaledBoards,
     spec: Response,
     wanted: Sequence[OperatingPoint],
     boards: int,
@@ -121,7 +121,7 @@ def _step(stretches: Sequence[Stretch], place: OperatingPoint) -> float:
 
 
 def _pattern(
-    bench: Stretched,
+    bench: ScaledBoards,
     spec: Response,
     start: OperatingPoint,
     room: OperatingRange,

@@ -18,7 +18,7 @@ from designer.base.errors import MISSING, InputError
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Course, Steady
+from designer.dynamics.steady_state import SteadyMotion, TransientSettings
 from designer.model import find_responses
 from designer.model.mechanics import MechanicalModel
 from designer.model.response_table import Response
@@ -29,7 +29,7 @@ STEP = 0.005
 """Of ω, between two steps of a sweep."""
 CLEARANCE_STEP = 0.06
 """Of b, between two clearances of a range, at most."""
-COURSE = Course(settle=300, keep=10, patience=300)
+COURSE = TransientSettings(settle=300, keep=10, patience=300)
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ def stretches(
     check(wanted)
     band = spec.band(model)
     omegas = _grid(band)
-    swept: dict[float, list[tuple[Steady, ...]]] = {}
+    swept: dict[float, list[tuple[SteadyMotion, ...]]] = {}
 
-    def at(b: float) -> list[tuple[Steady, ...]]:
+    def at(b: float) -> list[tuple[SteadyMotion, ...]]:
         if b not in swept:
             subject = ModelSubject(model.at(b))
             plan = SweepPlan(subject, "omega", omegas, tracks=(DOWN, UP), course=COURSE)
@@ -153,7 +153,7 @@ def clearances(model: MechanicalModel, response: Response) -> list[float]:
     return [float(v) for v in np.geomspace(low, high, count + 1)]
 
 
-def shows(response: Response, step: Steady) -> bool:
+def shows(response: Response, step: SteadyMotion) -> bool:
     """Whether a step of a sweep is the response that is wanted."""
     if step.status is not OrbitStatus.PERIODIC or not step.radius < 1.0:
         return False
@@ -169,7 +169,7 @@ def _grid(ends: tuple[float, float]) -> Array:
 
 
 def _runs(
-    response: Response, omegas: Array, b: float, tracks: Sequence[Sequence[Steady]]
+    response: Response, omegas: Array, b: float, tracks: Sequence[Sequence[SteadyMotion]]
 ) -> list[Stretch]:
     places: list[OperatingPoint | None] = []
     for i, omega in enumerate(omegas):

@@ -43,7 +43,7 @@ from designer.model.find_responses import (
     scale_of,
 )
 from designer.model.mechanics import MechanicalModel, check_omega
-from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.model.relative_motion import (
     RelativeMotion,
     companion_motions,
@@ -245,7 +245,7 @@ def _timed(
 def _on_model(
     modelfile: ModelFile, traces: bool, sampling: tuple[int, int], spec: Response
 ) -> Simulated:
-    with naming(modelfile):
+    with errors_in(modelfile):
         (r,) = find(modelfile.model, [spec])
     model = modelfile.model.at(r.b)
     flow = model_flow(model, r.omega)
@@ -333,7 +333,7 @@ def _circuit_orbits(
     synthesis: Synthesis, spec: Response, scan: bool
 ) -> tuple[ModelResponse, Flow, list[Orbit]]:
     """The wanted orbit first, in volts and seconds; with ``scan`` what is reached from rest."""
-    with naming(synthesis.modelfile):
+    with errors_in(synthesis.modelfile):
         same = [r for r in synthesis.model_responses if r.spec is spec]
         (r,) = same or find(synthesis.modelfile.model, [spec])
     flow = circuit_flow(nominal.nominal_reduction(synthesis.design).system(), synthesis.design, r)

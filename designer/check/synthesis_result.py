@@ -17,7 +17,7 @@ from designer.circuit.dead_zone_parts import stage_kind
 from designer.circuit.design import Design, settings
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import ModelResponse, find, need_found, peaks
-from designer.model.model_file import ModelFile, naming
+from designer.model.model_file import ModelFile, errors_in
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
 from designer.synthesis.part_checks import check_choices, unit_circuit
@@ -77,7 +77,7 @@ def synthesise(
     began = time.perf_counter()
     modelfile = with_stage(modelfile)
     catalog = modelfile.choices(load_catalog() if catalog is None else catalog)
-    with naming(modelfile):
+    with errors_in(modelfile):
         choice = modelfile.model, modelfile.circuit, catalog
         check_choices(*choice)
         check_names(modelfile, unit_circuit(*choice), catalog)

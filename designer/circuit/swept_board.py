@@ -46,7 +46,7 @@ class BoardSubject:
     model's clearance by default. frequency [Hz] may be None where it is among the changes.
     """
 
-    whose = "nominal board"
+    name = "nominal board"
     parameters = ("frequency", "omega", "amplitude", "offset")
     """ω is the frequency by the design's time scale."""
     si: Mapping[str, Unit] = NO_UNITS

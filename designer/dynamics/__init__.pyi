@@ -69,9 +69,9 @@ from .piecewise_linear import (
 )
 from .steady_state import (
     UPPER as UPPER,
-    Course as Course,
     DrivenSystem as DrivenSystem,
-    Steady as Steady,
+    SteadyMotion as SteadyMotion,
+    TransientSettings as TransientSettings,
     stopped as stopped,
 )
 from .step_budget import (

@@ -55,7 +55,7 @@ _STOPPED = {
 
 
 @dataclass(frozen=True)
-class Course:
+class TransientSettings:
     """How many drive periods a run towards a steady state takes."""
 
     settle: int = 500
@@ -72,7 +72,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Steady(Motion):
+class SteadyMotion(Motion):
     """What a start leads to."""
 
     status: OrbitStatus
@@ -129,7 +129,9 @@ class DrivenSystem:
     stops: Stops = UPPER
     """The stops whose impacts are noted; others than ``UPPER`` need the flow."""
 
-    def steady(self, x: Array, course: Course, budget: Budget | None = None) -> Steady:
+    def steady(
+        self, x: Array, course: TransientSettings, budget: Budget | None = None
+    ) -> SteadyMotion:
         """What the start x (states,) leads to. budget : steps for a motion that the compiled engine
         does not name; those of ``settle`` unless given.
 
@@ -149,8 +151,8 @@ class DrivenSystem:
 
 
 def _outlasting(
-    flow: Callable[[], Flow], steady: Steady, course: Course, budget: Budget | None
-) -> Steady:
+    flow: Callable[[], Flow], steady: SteadyMotion, course: TransientSettings, budget: Budget | None
+) -> SteadyMotion:
     """What is left of chaos after it was watched for ``WATCHES`` times the periods of settling."""
     if steady.status is not OrbitStatus.APERIODIC:
         return steady
@@ -168,8 +170,12 @@ def _outlasting(
 
 
 def by_flow(
-    flow: Flow, x: Array, course: Course, stops: Stops = UPPER, budget: Budget | None = None
-) -> Steady:
+    flow: Flow,
+    x: Array,
+    course: TransientSettings,
+    stops: Stops = UPPER,
+    budget: Budget | None = None,
+) -> SteadyMotion:
     """By the general flow, period after period. stops : whose impacts are noted, one at least.
     budget : steps for settling."""
     growth, state = None, np.array(x, dtype=float)
@@ -238,13 +244,13 @@ def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> tuple[Orb
     return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error), None
 
 
-def _of_orbit(orbit: Orbit, end: Array, extremes: tuple[Array, ...], spent: int) -> Steady:
+def _of_orbit(orbit: Orbit, end: Array, extremes: tuple[Array, ...], spent: int) -> SteadyMotion:
     """An orbit with the ``extremes`` of the run that led to it: minima, then impact velocities of
     each stop, after ``spent`` periods."""
     if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
         orbit = replace(orbit, status=OrbitStatus.PERIODIC)
     periodic = orbit.status is OrbitStatus.PERIODIC
-    return Steady(
+    return SteadyMotion(
         status=orbit.status,
         n=orbit.n if periodic else 0,
         p=orbit.p if periodic else 0,
@@ -270,15 +276,15 @@ def _repeats(flow: Flow, strobes: list[Array]) -> bool:
     return any(bool((np.abs(s - strobes[-1]) <= WORTH * peak).all()) for s in earlier)
 
 
-def stopped(status: FlowStatus, x: Array, spent: int) -> Steady:
+def stopped(status: FlowStatus, x: Array, spent: int) -> SteadyMotion:
     """What a run that came to no end leads to: left at x (states,) after ``spent`` periods."""
     diverged = status is FlowStatus.DIVERGED
     return _nothing(OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED, x, spent)
 
 
-def _nothing(status: OrbitStatus, x: Array, spent: int) -> Steady:
+def _nothing(status: OrbitStatus, x: Array, spent: int) -> SteadyMotion:
     nan, none = float("nan"), np.zeros(0)
-    return Steady(status, 0, 0, 0, None, nan, nan, x, x, none, none, spent)
+    return SteadyMotion(status, 0, 0, 0, None, nan, nan, x, x, none, none, spent)
 
 
 def _by_kernel(
@@ -286,9 +292,9 @@ def _by_kernel(
     tables: ModalTables,
     period: float,
     x: Array,
-    course: Course,
+    course: TransientSettings,
     budget: Budget | None,
-) -> Steady:
+) -> SteadyMotion:
     model = kernel.DrivenModel(tables, period, MAX_EVENTS)
     strobes, cursor = np.empty((course.keep + 1, 4)), np.zeros(2, dtype=np.int64)
     rates = np.empty(max(course.tangents - kernel.ALIGN, 0) // kernel.RENEWAL)
@@ -339,7 +345,7 @@ def _by_kernel(
         int(counted[place]) if code == kernel.PERIODIC else 0
         for place in (0, kernel_orbit.UPPER, kernel_orbit.LOWER)
     )
-    return Steady(
+    return SteadyMotion(
         status=_STOPPED[int(cursor[1])] if stopped else _STATUS[code],
         n=n,
         p=p,

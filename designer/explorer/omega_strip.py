@@ -8,7 +8,7 @@ import numpy as np
 
 from designer.bifurcations.sweep import next_start
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Course, Steady
+from designer.dynamics.steady_state import SteadyMotion, TransientSettings
 from designer.explorer.place import OMEGA, ModelPlace
 from designer.explorer.wire import Message, columns
 from designer.model.mechanics import frequency_range
@@ -20,7 +20,7 @@ STEPS = 60
 """Steps on each side."""
 TOGETHER = 3
 """Steps of a piece: at most some tens of milliseconds, after which a newer place may come first."""
-COURSE = Course(settle=80, keep=10, patience=0)
+COURSE = TransientSettings(settle=80, keep=10, patience=0)
 """Drive periods of a step: what is not settled by then is drawn as it is."""
 PERIODS = COURSE.settle + COURSE.keep
 """Drive periods within which a step has to settle. To be called aperiodic a motion is followed much
@@ -49,7 +49,7 @@ def strip(place: ModelPlace, start: np.ndarray) -> Iterator[Message]:
             yield piece(omegas, steps)
 
 
-def piece(omegas: Sequence[float], steps: Sequence[Steady]) -> Message:
+def piece(omegas: Sequence[float], steps: Sequence[SteadyMotion]) -> Message:
     """Some steps of the diagram, as ``strip`` yields them."""
     counts = [len(step.minima) for step in steps]
     points = {
@@ -60,7 +60,7 @@ def piece(omegas: Sequence[float], steps: Sequence[Steady]) -> Message:
     return {"kind": "strip", "data": columns(points)}
 
 
-def _period(step: Steady) -> int:
+def _period(step: SteadyMotion) -> int:
     if step.status is OrbitStatus.PERIODIC:
         return step.n
     return CHAOS if step.status is OrbitStatus.APERIODIC else OPEN

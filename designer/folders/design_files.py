@@ -35,7 +35,7 @@ from designer.linear_network.milp import SOLVER
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import find, peaks
 from designer.model.measured_values import MEASURED
-from designer.model.model_file import ModelFile, naming
+from designer.model.model_file import ModelFile, errors_in
 from designer.spice import deck
 from designer.spread.part_grades import better_grades
 
@@ -45,7 +45,7 @@ SETUP = "setup.csv"
 def check(modelfile: ModelFile, catalog: Catalog) -> None:
     """Refuse what no design folder could be written for, before any part is chosen
     (``board_check.check_board``)."""
-    with naming(modelfile):
+    with errors_in(modelfile):
         check_board(modelfile, catalog)
 
 
@@ -129,7 +129,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     model, spec = modelfile.model, modelfile.circuit
     responses = find(model, modelfile.responses)
     catalog = modelfile.choices(catalog)
-    with naming(modelfile):
+    with errors_in(modelfile):
         opamp = catalog.opamp(spec.opamp, spec.supply)
     with reading(file, "the design of this folder's model", "parts"):
         values = {name: _size(value, file, name) for name, value in document["parts"].items()}

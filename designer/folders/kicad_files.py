@@ -22,7 +22,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.deck_runs import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.folders.design_files import design_provenance
-from designer.model.model_file import naming
+from designer.model.model_file import errors_in
 from designer.schematic.kicad_project import Project, files
 
 STAGE: StageName = "kicad"
@@ -38,7 +38,7 @@ def texts(synthesis: Synthesis, checked: CheckedResponse | None = None) -> dict[
     ------
     InputError : a footprint that is not known here, or a part of the board that is not sold.
     """
-    with naming(synthesis.modelfile):
+    with errors_in(synthesis.modelfile):
         circuit, choice = board_circuit(synthesis)
         parts = components(circuit, synthesis.catalog, choice)
         rules = rules_text(board_rules(circuit, synthesis.modelfile.rules))

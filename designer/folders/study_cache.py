@@ -96,7 +96,7 @@ class StudyCache:
 
 
 class _Npz:
-    """An archive of arrays, its seal in the archive's comment (``keyed_store.Form``)."""
+    """An archive of arrays, its seal in the archive's comment (``keyed_store.EntryCodec``)."""
 
     def encode(self, head: Mapping[str, Any], value: _Items) -> bytes:
         arrays: list[Array] = []

@@ -18,7 +18,7 @@ from designer.base.record_check import checked_record
 from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import BLOCK, Sweep
 from designer.dynamics.orbit import Motion, OrbitStatus
-from designer.dynamics.steady_state import Steady
+from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.work_files import WorkFiles
 
 RULES = 3
@@ -75,7 +75,7 @@ def _sweep_form(parameter: str, most: int) -> ParquetForm:
 
 
 def _rows(
-    parameter: str, track: str, values: Sequence[float], steps: Sequence[Steady]
+    parameter: str, track: str, values: Sequence[float], steps: Sequence[SteadyMotion]
 ) -> list[dict[str, Any]]:
     return [
         {"track": track, parameter: v, **_columns(s)} for v, s in zip(values, steps, strict=True)
@@ -113,13 +113,13 @@ class SweepStore:
         """File name of a block, inside the folder."""
         return f"sweep.parquet/{track.replace(' ', '-')}-{block:06d}.parquet"
 
-    def read(self, track: str, block: int) -> list[Steady] | None:
+    def read(self, track: str, block: int) -> list[SteadyMotion] | None:
         """The steps of a finished block of this very work, or None."""
         form = _sweep_form(self.parameter, BLOCK)
         name = self.name(track, block)
         return self.files.read(name, form, self._steps, track=track, block=block)
 
-    def _steps(self, rows: Rows) -> list[Steady]:
+    def _steps(self, rows: Rows) -> list[SteadyMotion]:
         out = []
         for row in map(dict, rows):
             del row["track"], row[self.parameter]
@@ -127,10 +127,12 @@ class SweepStore:
             for key in ("start", "end", "minima", "velocities"):
                 row[key] = _numbers(row[key])
             row["further"] = tuple(map(_numbers, row.get("further") or ()))
-            out.append(checked_record(Steady, row))
+            out.append(checked_record(SteadyMotion, row))
         return out
 
-    def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
+    def write(
+        self, track: str, block: int, values: Sequence[float], steps: list[SteadyMotion]
+    ) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
         rows = _rows(self.parameter, track, values, steps)
         form = _sweep_form(self.parameter, BLOCK)

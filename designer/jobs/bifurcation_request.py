@@ -20,7 +20,7 @@ from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.circuit.swept_board import BoardSubject
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.model.mechanics import check_omega
 from designer.model.model_file import ModelFile
 from designer.model.si_units import Reader
@@ -140,7 +140,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     else:
         both = [d for d, wanted in ((DOWN, request.down), (UP, request.up)) if wanted]
         tracks = sweep.follow(*(both or [DOWN]))
-    return SweepPlan(subject, over, values, course=_course(request, Course()), **tracks)
+    return SweepPlan(subject, over, values, course=_course(request, TransientSettings()), **tracks)
 
 
 def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> CurvePlan | None:
@@ -318,7 +318,7 @@ def _check_cells(columns: int, rows: int) -> None:
         raise InputError(None, "--map", text, f"at most {MOST_CELLS} points in all")
 
 
-def _course(request: Request, usual: Course) -> Course:
+def _course(request: Request, usual: TransientSettings) -> TransientSettings:
     settle = usual.settle if request.periods is None else request.periods
     keep = usual.keep if request.keep is None else request.keep
     return replace(usual, settle=settle, keep=keep)

@@ -25,7 +25,7 @@ from designer.base.progress import Progress
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
 from designer.centering.cure_branch import KINDS, cured, kind_named
-from designer.centering.cure_measure import Book
+from designer.centering.cure_measure import VerdictCache
 from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
@@ -38,7 +38,7 @@ from designer.jobs import folder_numbers, rung_choice, usual_times
 from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
-from designer.model.model_file import naming, need_responses
+from designer.model.model_file import errors_in, need_responses
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -207,7 +207,7 @@ def _find_and_write(
             guard()
             folder.write(STUDIES, _LINES.text(studies["studies"]))
 
-        with naming(base.modelfile):
+        with errors_in(base.modelfile):
             best = find_cure(
                 base,
                 target,
@@ -216,7 +216,7 @@ def _find_and_write(
                 without=unwanted,
                 seed=options.seed,
                 jobs=options.jobs,
-                book=Book(studies_before, save),
+                book=VerdictCache(studies_before, save),
                 progress=progress,
             )
         progress.stage("report of the cure")

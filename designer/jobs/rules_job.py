@@ -14,7 +14,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board as rule_board, run_rules
 from designer.design_rules.kicad_program import kicad_version
 from designer.design_rules.rule_subject import RuleSubject
-from designer.model.model_file import naming
+from designer.model.model_file import errors_in
 
 if TYPE_CHECKING:
     pass
@@ -48,7 +48,7 @@ def checked(
     InputError : the board is not of this design, or a part is not in the catalogue.
     """
     limits = synthesis.modelfile.rules
-    with naming(synthesis.modelfile):
+    with errors_in(synthesis.modelfile):
         subject = RuleSubject.of(synthesis)
         custom = board_rules(subject.circuit, limits)
     listed = subject.components

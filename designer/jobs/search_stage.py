@@ -21,7 +21,7 @@ from designer.base.version import __version__
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.design_search import look, search as design_search
-from designer.centering.ngspice_check import Listener
+from designer.centering.ngspice_check import AgreementCheck
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import search_json
 from designer.folders.design_source import design_inputs, design_stage
@@ -97,7 +97,7 @@ def searched_into(
             jobs=options.workers,
             memory=memory,
             windows=windows,
-            listen=Listener(pool, memory),
+            listen=AgreementCheck(pool, memory),
             progress=progress,
         )
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)

@@ -22,7 +22,7 @@ from designer.folders import board_files, design_files, kicad_files
 from designer.folders.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.options import Options
-from designer.model.model_file import ModelFile, naming
+from designer.model.model_file import ModelFile, errors_in
 
 WRITING = "designer.schematic.schematic_drawing", "designer.folders.board_files"
 """Modules that are imported while the parts are chosen, and needed once they stand."""
@@ -112,7 +112,7 @@ def write_design(
     while start recipes are sought. stages : that begin now, the design among them. other : draws
     beside this process, which holds the interpreter, and takes half of the recipes."""
     progress.stage("files of the design")
-    with naming(synthesis.modelfile):
+    with errors_in(synthesis.modelfile):
         files = design_files.texts(synthesis)
         drawing = other(board_files.drawing, synthesis)
     inputs = stages["design"][0]

@@ -41,7 +41,7 @@ from designer.jobs.study_stage import (
     study_of,
 )
 from designer.model.measured_values import MEASURED, read_measured
-from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.spread.part_rules import spread_of
 
 THE_BOARD = "board"
@@ -206,7 +206,7 @@ def measured_into(
         raise InputError(path, "the design", "unfinished", "a finished one (designer synthesise)")
     synthesis = design_files.load(folder, modelfile, runner.catalog)
     synthesis = replace(synthesis, modelfile=replace(modelfile, measured=boards))
-    with naming(modelfile):
+    with errors_in(modelfile):
         spread_of(
             synthesis.modelfile, synthesis.design.circuit, runner.catalog
         )  # refuses what is not theirs

@@ -421,7 +421,7 @@ def need_responses(modelfile: ModelFile, more: str = "") -> None:
 
 
 @contextlib.contextmanager
-def naming(modelfile: ModelFile) -> Iterator[None]:
+def errors_in(modelfile: ModelFile) -> Iterator[None]:
     """Names the model file in an InputError that names none."""
     try:
         yield

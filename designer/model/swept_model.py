@@ -30,7 +30,7 @@ from designer.model.swept_tables import ModalBatch
 class ModelSubject:
     """A model at one drive frequency, whose parameters can be swept."""
 
-    whose: ClassVar[str] = "model"
+    name: ClassVar[str] = "model"
     model: MechanicalModel
     omega: float | None = None
     """Drive frequency in the model's units; None: it has to be among the changes."""

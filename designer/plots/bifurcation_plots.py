@@ -23,7 +23,7 @@ from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Steady
+from designer.dynamics.steady_state import SteadyMotion
 from designer.plots.response_colours import (
     BLACK,
     DOTS,
@@ -162,7 +162,7 @@ NARROW = 0.004
 """Of the sweep: narrower windows get no border, which would hide them."""
 SECOND_AXIS = 0.42
 """How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
-Coloured = tuple[str, Array, list[Steady]]
+Coloured = tuple[str, Array, list[SteadyMotion]]
 """Colour, values of the parameter, and the motions there."""
 SHARE_BAND = 1.6
 """Height of the band of counted basins [inch]."""
@@ -262,7 +262,7 @@ def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
     parameter_x(lowest, plan.subject, plan.parameter, below=SECOND_AXIS)
 
 
-def _met(step: Steady, stop: int) -> Array:
+def _met(step: SteadyMotion, stop: int) -> Array:
     """Impact velocities on one of the shown stops; none of a step that did not come to an end."""
     each = (step.velocities, *step.further)
     return each[stop] if stop < len(each) else np.zeros(0)
@@ -361,9 +361,9 @@ def _coloured(sweep: Sweep) -> list[Coloured]:
         colours = dict(zip(plan.tracks, (BLACK, OTHERS[0]), strict=False))
         return [(colours[t], plan.values, list(sweep.steps[t])) for t in plan.tracks]
     names: dict[str, str] = {}
-    out: dict[str, tuple[list[float], list[Steady]]] = {}
+    out: dict[str, tuple[list[float], list[SteadyMotion]]] = {}
     for i, value in enumerate(plan.values):
-        distinct: list[Steady] = []
+        distinct: list[SteadyMotion] = []
         for track in plan.tracks:
             step = sweep.steps[track][i]
             if any(_same(step, other) for other in distinct):
@@ -381,12 +381,12 @@ def _coloured(sweep: Sweep) -> list[Coloured]:
     return [(c, np.array(v), s) for c, (v, s) in out.items()]
 
 
-def _family(step: Steady) -> str:
+def _family(step: SteadyMotion) -> str:
     """The response up to its mirror image."""
     return str(step.counts.family) if step.status is OrbitStatus.PERIODIC else step.response
 
 
-def _twins(plan: SweepPlan, value: float, a: Steady, b: Steady) -> bool:
+def _twins(plan: SweepPlan, value: float, a: SteadyMotion, b: SteadyMotion) -> bool:
     """Whether b is the mirror image of a: one of a's strobes half a period on, reflected."""
     alike = a.status is OrbitStatus.PERIODIC and a.counts == b.counts.mirrored
     if not alike or a.symmetric or b.symmetric:
@@ -399,7 +399,7 @@ def _twins(plan: SweepPlan, value: float, a: Steady, b: Steady) -> bool:
     return bool((np.abs(image - b.start).max(axis=1) <= SAME * np.abs(image).max()).any())
 
 
-def _same(a: Steady, b: Steady) -> bool:
+def _same(a: SteadyMotion, b: SteadyMotion) -> bool:
     if a.response != b.response or a.symmetric is not b.symmetric:
         return False
     if a.status is not OrbitStatus.PERIODIC:

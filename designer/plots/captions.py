@@ -15,7 +15,7 @@ from designer.bifurcations.sweep import DOWN, Sweep
 from designer.bifurcations.window_ends import SweptEnd
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Steady
+from designer.dynamics.steady_state import SteadyMotion
 from designer.plots.point_captions import caption, doubled, label
 
 LAG = 2
@@ -101,7 +101,7 @@ def _on(sweep: Sweep, track: str, point: Bifurcation) -> tuple[str, str] | None:
     return None
 
 
-def _leaves(point: Bifurcation, before: Steady, after: Steady, step: int) -> bool:
+def _leaves(point: Bifurcation, before: SteadyMotion, after: SteadyMotion, step: int) -> bool:
     """Whether a track was on the branch, stable there, and loses it at the point.
 
     step : 1 where the track rises through the parameter, -1 where it falls.
@@ -116,7 +116,7 @@ def _leaves(point: Bifurcation, before: Steady, after: Steady, step: int) -> boo
     return not sides[step] or _is(after, point, responses[step])
 
 
-def _arrives(point: Bifurcation, before: Steady, after: Steady, step: int) -> bool:
+def _arrives(point: Bifurcation, before: SteadyMotion, after: SteadyMotion, step: int) -> bool:
     """Whether a track was on what is born at the point, and goes over to the branch there."""
     born, sides = _born(point), point.stable_sides
     if born is None or sides is None or not born.stable or born.side != -step:
@@ -125,7 +125,7 @@ def _arrives(point: Bifurcation, before: Steady, after: Steady, step: int) -> bo
     return whence and sides[step] and _is(after, point, point.response)
 
 
-def _begins(point: Bifurcation, after: Steady, step: int) -> bool:
+def _begins(point: Bifurcation, after: SteadyMotion, step: int) -> bool:
     """Whether an orbit that a fixed start leads to is there only past this fold."""
     fold = point.kind is PointKind.FOLD and any(point.stable) and point.side == step
     return fold and _is(after, point, point.response)
@@ -143,12 +143,12 @@ def _born(point: Bifurcation) -> Birth | None:
     return Birth(response, False, unstable, True)
 
 
-def _is(step: Steady, point: Bifurcation, response: str) -> bool:
+def _is(step: SteadyMotion, point: Bifurcation, response: str) -> bool:
     """Whether a track shows this response, with the symmetry of the point's orbit."""
     return family(step.response) == family(response) and step.symmetric is point.symmetric
 
 
-def _step_label(step: Steady) -> str:
+def _step_label(step: SteadyMotion) -> str:
     return label(step.response, step.symmetric)
 
 

@@ -36,7 +36,7 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
     name : the model's title, or "". width : characters of a line.
     """
-    whose = plan.subject.whose
+    whose = plan.subject.name
     if isinstance(plan, SweepPlan):
         over = parameter_name(plan.subject, plan.parameter)
         heading = f"bifurcation diagram of the {whose} over {over}, {_way(plan)}"
@@ -58,7 +58,7 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 def curves_title(name: str, plan: CurvePlan, width: int = 100) -> str:
     """The same of bifurcation curves over two parameters."""
     over = _both(plan.subject, plan.first, plan.second)
-    heading = f"bifurcation curves of the {plan.subject.whose} over {over}"
+    heading = f"bifurcation curves of the {plan.subject.name} over {over}"
     held = _fixed(plan.subject, {plan.first: None, plan.second: None})
     lines = [name, heading, "held: " + ", ".join(held)]
     return "\n".join(

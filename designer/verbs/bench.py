@@ -134,7 +134,7 @@ def bench(
     from designer.folders.report_sections import BENCHED as NAME, design_hash, renew_report
     from designer.jobs import bench_job
     from designer.workbench.channel_roles import recorded_motion
-    from designer.workbench.naming import named
+    from designer.workbench.naming import identify_response
     from designer.workbench.overlay import overlaid
     from designer.workbench.prediction import BoardPrediction
     from designer.workbench.record_formats import read_record
@@ -165,7 +165,7 @@ def bench(
     benched = []
     for file, motion in zip(files, motions, strict=True):
         progress.stage(f"record {file.name}")
-        name = named(motion, prediction)
+        name = identify_response(motion, prediction)
         setting = bench_job.near_setting(name.motion.frequency, prediction)
         benched.append(bench_job.BenchedRecord(file, name, overlaid(name, prediction), setting))
     fitted: dict[str, FittedBoard] = {}

@@ -136,7 +136,7 @@ class NamedMotion:
         return True if self.asymmetry_error < SYMMETRY_TOLERANCE else None
 
 
-def named(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
+def identify_response(motion: RecordedMotion, prediction: BoardPrediction) -> NamedMotion:
     """The name of a recorded motion."""
     nets = tuple(net for net in motion.channels if net != motion.generator)
     channels = [motion.channels[net] for net in nets]

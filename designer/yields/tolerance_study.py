@@ -200,7 +200,7 @@ def tolerance(
     )
     if not indices:
         return study
-    work = Work(
+    work = StudyWork(
         jobs,
         pool,
         Stores() if stores is None else stores,
@@ -247,7 +247,7 @@ def _why_not(checked: CheckedResponse) -> str:
 
 
 @dataclass(frozen=True)
-class Work:
+class StudyWork:
     """Who does the work of a study, and where it goes. Each step takes a study and gives it back
     with more in it."""
 

@@ -7,14 +7,14 @@ import numpy as np
 from designer.base.page import Table, table
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots
 from reports.makers.evidence import Evidence, figure_block
 
 STEPS = 240
-COURSE = Course(settle=240, keep=16)
+COURSE = TransientSettings(settle=240, keep=16)
 """Less than a diagram on the screen asks for: the windows named here are wide."""
 NAMED = 12
 """Windows in the table, the widest."""

@@ -11,7 +11,7 @@ from benchmarks.exact_records import ExactRecord, drawn_records
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.naming import named
+from designer.workbench.naming import identify_response
 from designer.workbench.prediction import BoardPrediction
 
 
@@ -37,7 +37,7 @@ def test_an_output_mostly_in_contact_is_counted_from_its_level_in_the_clearance(
     """The mass rests against stop B: half of the time the output is not at its level."""
     truth, (_, prediction) = drawn(57, 78), preloaded()
     told = {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
-    name = named(recorded_motion(truth.record, prediction, told=told), prediction)
+    name = identify_response(recorded_motion(truth.record, prediction, told=told), prediction)
     assert truth.response == "1-1-0;0-1"
     assert "v1" not in told
     assert truth.response in (name.response, *name.others)

@@ -19,7 +19,7 @@ from designer.bifurcations.points import PointKind, locate
 from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.folders.sweep_store import GridStore, SweepStore
 from designer.folders.work_files import WorkFiles
 from designer.model.model_file import parse_model_file
@@ -120,7 +120,7 @@ TEXT = system_text(
     clearance("B", "casing", "arm", upper=0.2, stiffness=10.0),
     table("force", on="hammer", amplitude=1.0),
 )
-BRIEF = Course(30, 4, 100)
+BRIEF = TransientSettings(30, 4, 100)
 
 
 def subject() -> ModelSubject:

@@ -22,21 +22,23 @@ from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Course, Steady, by_flow
+from designer.dynamics.steady_state import SteadyMotion, TransientSettings, by_flow
 from designer.folders.sweep_store import GridStore, SweepStore, work_hash
 from designer.folders.work_files import WorkFiles
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, response_colours
 from tests.dynamics.test_modal_tables import PAPER
 
-SHORT, QUICK = Course(200, 20, 2000), Course(40, 16, 400)
+SHORT, QUICK = TransientSettings(200, 20, 2000), TransientSettings(40, 16, 400)
 
 
 def _flow(omega: float) -> Flow:
     return Flow(PAPER.second_order().piecewise_linear(), Drive(omega))
 
 
-def _plan(low: float, high: float, steps: int, *tracks: str, course: Course = SHORT) -> SweepPlan:
+def _plan(
+    low: float, high: float, steps: int, *tracks: str, course: TransientSettings = SHORT
+) -> SweepPlan:
     values = np.linspace(low, high, steps)
     return SweepPlan(ModelSubject(PAPER), "omega", values, tracks, course=course)
 
@@ -136,7 +138,7 @@ def test_only_a_mirror_image_is_red() -> None:
     twins = [attractors.twin(_flow(float(w)), o) for w, o in zip(omega, orbits, strict=True)]
     plan = _plan(1.429, 1.43, 2, "start 0", "start 1")
 
-    def steps(starts: list[Any]) -> tuple[Steady, ...]:
+    def steps(starts: list[Any]) -> tuple[SteadyMotion, ...]:
         settings = plan.subject.settings([{"omega": float(w)} for w in omega])
         return tuple(s.steady(x, SHORT) for s, x in zip(settings, starts, strict=True))
 

@@ -20,7 +20,7 @@ from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.bifurcations.windows import NOT_LOCATED
 from designer.cli import entry
 from designer.dynamics.attractors import settle
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.model.driven import model_flow
 from designer.model.model_file import read_model_file
 from designer.model.swept_model import ModelSubject
@@ -30,7 +30,7 @@ from tests.shared.mechanism_file import mechanism_of
 from tests.shared.mechanisms import absolute
 from tests.shared.system_text import clearance, system_text, table
 
-QUICK = Course(200, 16, 400)
+QUICK = TransientSettings(200, 16, 400)
 TIP = 3e-4
 """Of a gap: how much wider and narrower a stop is set to see whether a tip touches it."""
 

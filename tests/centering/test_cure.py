@@ -27,7 +27,7 @@ from designer.centering import cure_measure, cure_search
 from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest
 from designer.centering.cure_linear_model import LinearModel
-from designer.centering.cure_measure import Book, MeasuredYield, measure, measure_together
+from designer.centering.cure_measure import MeasuredYield, VerdictCache, measure, measure_together
 from designer.centering.cure_milp import cheapest
 from designer.centering.cure_plots import front_chart
 from designer.centering.cure_result_json import cure_json
@@ -125,7 +125,7 @@ def test_the_quantile_is_that_of_the_drawn_form() -> None:
 def truth(nominal: float, otherwise: bool = False) -> Any:
     """What a study measures where the limit is known: boards are ok where it is positive."""
 
-    def of(plan: StudyPlan, target: float, book: Book, **_: object) -> MeasuredYield:
+    def of(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
         boards = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((known_margin(nominal, otherwise).of(boards) > 0.0).sum())
         return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)
@@ -272,7 +272,7 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(exact_rung, "block", coin)
     plan = bench_plans.plan(1, samples=8000)
     kept: dict[str, Any] = {}
-    book = Book(save=kept.update)
+    book = VerdictCache(save=kept.update)
     for target in (0.85, 0.93, 0.9):
         found = measure(plan, target, book)
         low, high = found.counts.interval
@@ -281,13 +281,13 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
         for shorter in range(500, found.counts.samples, 250):
             assert not measure(plan, target, book, least=shorter, most=shorter).decided
     assert sorted(set(blocks)) == sorted(blocks)
-    again = measure(plan, 0.9, Book(json.loads(json.dumps(kept))["studies"]))
+    again = measure(plan, 0.9, VerdictCache(json.loads(json.dumps(kept))["studies"]))
     assert again == measure(plan, 0.9, book)
     assert sorted(set(blocks)) == sorted(blocks)
     for letters in ("!" * 250, ["o"] * 250, 250, None):  # with a seal that is right
         blocks.clear()
         strange = {s: {**known, "250": letters} for s, known in kept["studies"].items()}
-        assert measure(plan, 0.9, Book(strange)) == again
+        assert measure(plan, 0.9, VerdictCache(strange)) == again
         assert blocks == [250]
 
 
@@ -310,7 +310,7 @@ def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.Mo
     asked: list[tuple[int, range]] = []
     coins(monkeypatch, asked)
     plans = [(replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (2, 1, 4, 3)]
-    fine, out, close, last = measure_together(plans, 0.99, Book())
+    fine, out, close, last = measure_together(plans, 0.99, VerdictCache())
     assert out.missed
     assert out.counts.samples == cure_measure.FIRST
     assert close.missed
@@ -319,10 +319,10 @@ def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.Mo
         assert not other.missed
         assert other.counts.samples == BLOCK
     known = len(asked)
-    both = measure_together([plans[0], plans[3]], 0.99, Book())
+    both = measure_together([plans[0], plans[3]], 0.99, VerdictCache())
     assert len(asked) > known
     assert all(m.reached and m.counts.samples >= 2 * BLOCK for m in both)
-    nothing, waits = measure_together([None, plans[0]], 0.99, Book())
+    nothing, waits = measure_together([None, plans[0]], 0.99, VerdictCache())
     assert nothing.counts.samples == 0
     assert waits.counts.samples == BLOCK
 
@@ -333,10 +333,10 @@ def test_the_boards_of_a_study_are_those_of_a_longer_one(monkeypatch: pytest.Mon
     asked: list[tuple[int, range]] = []
     coins(monkeypatch, asked)
     plan = replace(bench_plans.plan(1, samples=8000), seed=2)
-    early = measure(plan, 0.99, Book(), first=cure_measure.FIRST)
+    early = measure(plan, 0.99, VerdictCache(), first=cure_measure.FIRST)
     boards = [i for _, indices in asked for i in indices]
     assert boards == list(range(early.counts.samples))
-    book = Book()
+    book = VerdictCache()
     assert measure(plan, 0.99, book, most=early.counts.samples) == early
     known = len(asked)
     book.block(plan, range(cure_measure.FIRST), None, 1)
@@ -372,7 +372,7 @@ def test_the_best_place_is_the_middle_of_the_best_row(
 
 
 def test_seeds_are_their_own() -> None:
-    seeds = [cure_measure.fresh(seed, number) for seed in range(4) for number in range(12)]
+    seeds = [cure_measure.study_seed(seed, number) for seed in range(4) for number in range(12)]
     assert len(set(seeds)) == len(seeds)
     assert not set(seeds) & set(range(1000))
 
@@ -574,7 +574,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
     """Few boards promised what many do not show: the next choice is the cheapest of grades."""
     real = truth(6.5)
 
-    def of(plan: StudyPlan, target: float, book: Book, **more: object) -> MeasuredYield:
+    def of(plan: StudyPlan, target: float, book: VerdictCache, **more: object) -> MeasuredYield:
         if more.get("trim") is not None:
             return MeasuredYield(Yield(7000, 1000, 0, 0), target)
         return cast(MeasuredYield, real(plan, target, book))
@@ -607,7 +607,7 @@ def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     question = bench_plans.question(3)
     circuit = made.design.circuit
     plan = StudyPlan(circuit, Spread(0.01, 0.01, 3e-4, 1e-3), 7, 6, (question,))
-    book = Book()
+    book = VerdictCache()
     letters, new = book.block(plan, range(6), slot.trim, 1)
     assert new
     rows = trimmed_block(slot.trim, plan, range(6), 1)

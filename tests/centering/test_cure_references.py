@@ -12,7 +12,7 @@ import pytest
 
 from designer.centering import cure_linear_model, cure_measure, cure_search
 from designer.centering.cure_branch import KINDS, CureBranch, cured
-from designer.centering.cure_measure import Book, MeasuredYield
+from designer.centering.cure_measure import MeasuredYield, VerdictCache
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_trial import Cure
@@ -59,7 +59,7 @@ def test_the_references_are_taken_where_they_move_the_limit(
     sigma = float(Margin(differing, (limit,)).each(boards).std())
     margin = Margin(differing, (replace(limit, sigma=sigma),))
 
-    def counted(plan: StudyPlan, target: float, book: Book, **_: object) -> MeasuredYield:
+    def counted(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
         drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((margin.of(drawn) > 0.0).sum())
         return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)

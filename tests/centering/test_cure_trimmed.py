@@ -10,8 +10,8 @@ import pytest
 
 from designer.centering import cure_linear_model as cure_trimmed
 from designer.centering.cure_linear_model import trimmed_margins, trimmer_ways, without_wiper
-from designer.centering.cure_measure import Book
-from designer.centering.cure_ways import Looker, ResponseWay
+from designer.centering.cure_measure import VerdictCache
+from designer.centering.cure_ways import ResponseSurvey, ResponseWay
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
 from designer.circuit.board_values import nominal_board
@@ -49,7 +49,7 @@ def test_what_the_trimmer_holds_still_depends_on_nothing() -> None:
     assert after < 0.1 * before
 
 
-class _Looker(Looker):
+class _Looker(ResponseSurvey):
     """Of a plan, where there is no branch."""
 
     @property
@@ -59,7 +59,7 @@ class _Looker(Looker):
 
 def ways(best: StudyPlan, target: float) -> list[ResponseWay] | None:
     none = cast(Any, None)
-    looker = _Looker(none, target, 1, Book(), 0.0, frozenset(), (best,), 2, lambda: None)
+    looker = _Looker(none, target, 1, VerdictCache(), 0.0, frozenset(), (best,), 2, lambda: None)
     return trimmer_ways(
         looker, trim(), [ResponseWay(0, "as it is", plan(6, spread=ROUGH).questions[0])]
     )

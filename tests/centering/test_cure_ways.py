@@ -13,11 +13,11 @@ from scipy.stats import binom
 
 from designer.centering import cure_ways
 from designer.centering.cure_branch import PLACE
-from designer.centering.cure_measure import Book, MeasuredYield
+from designer.centering.cure_measure import MeasuredYield, VerdictCache
 from designer.centering.cure_ways import (
     FEW,
     RARE,
-    Looker,
+    ResponseSurvey,
     ResponseWay,
     first_boards,
     forecast,
@@ -52,7 +52,9 @@ class _Boards:
         return _Boards([self.which[k] for k in which])
 
 
-def looker(monkeypatch: pytest.MonkeyPatch, lost: dict[int, int], verdict: Verdict) -> Looker:
+def looker(
+    monkeypatch: pytest.MonkeyPatch, lost: dict[int, int], verdict: Verdict
+) -> ResponseSurvey:
     """lost : boards without an answer among those from this number on; verdict : that all of them
     have once they are settled."""
 
@@ -63,7 +65,7 @@ def looker(monkeypatch: pytest.MonkeyPatch, lost: dict[int, int], verdict: Verdi
     monkeypatch.setattr(cure_ways, "forecast", forecast)
     monkeypatch.setattr(cure_ways, "settled", lambda boards, *_: [verdict] * len(boards.which))
     nothing = cast(Any, None)
-    return Looker(nothing, TARGET, 1, Book(), 0.0, frozenset(), (), 1, lambda: None)
+    return ResponseSurvey(nothing, TARGET, 1, VerdictCache(), 0.0, frozenset(), (), 1, lambda: None)
 
 
 def bounded(
@@ -134,7 +136,9 @@ def test_boards_that_settle_slowly_are_not_lost() -> None:
     assert set(settled(boards, question, 2)) == {Verdict.OK}
     assert {a.verdict for a in foretold(boards, question, 2)} == {Verdict.OK}
     none = cast(Any, None)
-    looker = Looker(none, TARGET, 1, Book(), 0.0, frozenset(), (plan,), 2, lambda: None)
+    looker = ResponseSurvey(
+        none, TARGET, 1, VerdictCache(), 0.0, frozenset(), (plan,), 2, lambda: None
+    )
     assert not looker.bounded(ResponseWay(0, "as it is", question, rate=0.5)).hopeless
 
 
@@ -155,8 +159,8 @@ def test_what_was_measured_to_miss_gets_further_ways(
         cure_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
     )
     branch = cast(Any, SimpleNamespace(synthesis=nothing))
-    looker = Looker(
-        branch, TARGET, 1, Book(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
+    looker = ResponseSurvey(
+        branch, TARGET, 1, VerdictCache(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
     )
     found = looker.ways(ResponseWay(0, "as it is", nothing, rate=1.0))
     assert [way.kind for way in found] == ["as it is", "trim"][:kinds]

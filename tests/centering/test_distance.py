@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.stats import norm
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import LADDER, STREAM, StretchCounts, Stretched
+from designer.centering.distance import LADDER, STREAM, ScaledBoards, StretchCounts
 from designer.centering.response_windows import OperatingPoint
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
@@ -52,7 +52,7 @@ def test_without_a_loss_it_is_finite() -> None:
 def test_the_boards_are_the_spread_s_stretched() -> None:
     """The compiled shortcut counts what the study's rung, asked one by one, says."""
     synthesis, response = made(), made().model_responses[0]
-    bench = Stretched(synthesis.design, spread(), 5, COUNT)
+    bench = ScaledBoards(synthesis.design, spread(), 5, COUNT)
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = bench.stands([(response.spec, place)])
     assert stand is not None
@@ -78,7 +78,7 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
 
 
 def test_a_place_without_the_response_has_no_stand() -> None:
-    bench = Stretched(made().design, spread(), 5, 1)
+    bench = ScaledBoards(made().design, spread(), 5, 1)
     response = made().model_responses[0]
     there = OperatingPoint(0.85, 0.25, response.orbit.start)
     elsewhere = OperatingPoint(0.6, 0.25, response.orbit.start)
@@ -93,7 +93,7 @@ def test_what_is_known_is_not_asked_again() -> None:
     steps: list[int] = []
     answers = []
     for _ in range(2):
-        bench = Stretched(made().design, spread(), 5, COUNT, memory=memory)
+        bench = ScaledBoards(made().design, spread(), 5, COUNT, memory=memory)
         (stand,) = bench.stands([(response.spec, place)])
         assert stand is not None
         answers.append(bench.ask([stand], range(COUNT), progress=lambda: steps.append(1)))

@@ -14,7 +14,7 @@ from designer.centering import levers
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import ALIKE, GAIN, Candidate, RungOutcome, better
 from designer.centering.design_search import BOARDS, look, search
-from designer.centering.distance import Stand, Stretched
+from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
 from designer.centering.ngspice_check import RUNG, Agreement
 from designer.centering.operating_points import Scored, score
@@ -139,7 +139,7 @@ def test_places_that_stay_where_they_were_are_worth_nothing(
     """The best place is found to be the middle of the window, where the search began."""
 
     def middle(
-        bench: Stretched, spec: Response, seen: Sequence[Stretch], *_: object, **__: object
+        bench: ScaledBoards, spec: Response, seen: Sequence[Stretch], *_: object, **__: object
     ) -> tuple[list[Scored], int]:
         return score(bench, spec, [seen[0].at((0.5,))[0]], 16), 1
 
@@ -179,7 +179,7 @@ def _enumerated(modelfile: ModelFile, choice: DesignChoice) -> Candidate:
     held = find_responses.peaks(model, found)
     design = parts_choice.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
     spread = spread_of(modelfile, design.circuit, catalog())
-    bench = Stretched(design, spread, 1, BOARDS)
+    bench = ScaledBoards(design, spread, 1, BOARDS)
     places = [OperatingPoint(r.omega, r.b, r.orbit.start) for r in found]
     scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))
     return Candidate(choice, design, found, scored)
@@ -194,7 +194,9 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
 
     def asked(limit: float) -> list[RungOutcome]:
         def listen(
-            bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
+            bench: ScaledBoards,
+            stands: Sequence[OperatingOrbit | None],
+            progress: Callable[[], None],
         ) -> tuple[Agreement, ...]:
             fast = bench.design.errors.scales.frequency(1.0) > limit
             assert all(s is not None for s in stands)
@@ -228,7 +230,7 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
 
     def listen(
-        bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
+        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], progress: Callable[[], None]
     ) -> tuple[Agreement, ...]:
         first = bench.design.errors.scales.frequency(1.0) == pytest.approx(fastest[0])
         return (Agreement(16, 13) if first else Agreement(10, 10),) * len(stands)
@@ -247,7 +249,9 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     asked: list[float] = []
 
-    def listen(bench: Stretched, stands: Sequence[Stand | None], _: object) -> Agreements:
+    def listen(
+        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], _: object
+    ) -> Agreements:
         asked.append(bench.design.errors.scales.frequency(1.0))
         return (Agreement(16, 16),) * len(stands)
 

@@ -17,10 +17,10 @@ from designer.centering.limiting_parts import (
     OFFSET,
     RAILS,
     cause,
+    joint_boards,
     limiting,
     limitings,
     shares,
-    together,
 )
 from designer.check import checked_design
 from designer.spread.board_quantities import Quantity, quantities
@@ -92,7 +92,7 @@ def test_parts_that_track_count_with_what_they_share() -> None:
     circuit, s = paper_cases.subject(1).circuit, 0.9
     grouped = Group("network:1", ("R201", "R203", "R4"), s)
     spread = replace(bench_plans.SPREAD, groups=(grouped,))
-    drawn = together(circuit, spread, 3)
+    drawn = joint_boards(circuit, spread, 3)
     assert drawn is not None
     every = quantities(circuit, drawn)
     parts = tuple(q for q in every if q.part in ("R201", "R203", "R4", "R11"))
@@ -112,7 +112,7 @@ def test_parts_that_track_count_with_what_they_share() -> None:
 def test_a_cause_may_take_off_what_another_adds() -> None:
     circuit = paper_cases.subject(1).circuit
     spread = replace(bench_plans.SPREAD, groups=(Group("network:1", ("R201", "R4"), 1.0),))
-    drawn = together(circuit, spread, 3)
+    drawn = joint_boards(circuit, spread, 3)
     assert drawn is not None
     parts = tuple(q for q in quantities(circuit, drawn) if q.part in ("R201", "R4"))
     slope = {"R201": 2.0, "R4": -1.0}
@@ -124,9 +124,9 @@ def test_a_cause_may_take_off_what_another_adds() -> None:
 
 def test_only_what_varies_together_is_drawn() -> None:
     circuit = paper_cases.subject(1).circuit
-    assert together(circuit, bench_plans.SPREAD, 3) is None
+    assert joint_boards(circuit, bench_plans.SPREAD, 3) is None
     warm = replace(bench_plans.SPREAD, temperature=(10.0, 40.0))
-    assert together(circuit, warm, 3) is not None
+    assert joint_boards(circuit, warm, 3) is not None
 
 
 def test_causes() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import STREAM, Stand, Stretched
+from designer.centering.distance import STREAM, OperatingOrbit, ScaledBoards
 from designer.centering.ngspice_check import (
     FEWER,
     LEAST,
@@ -19,7 +19,7 @@ from designer.centering.ngspice_check import (
     LONGEST,
     STRETCH,
     Agreement,
-    Listener,
+    AgreementCheck,
 )
 from designer.centering.response_windows import OperatingPoint
 from designer.circuit.reduction import Reduction
@@ -32,8 +32,8 @@ from designer.verdicts.ngspice_runs import NgspiceAnswer, Query
 from tests.shared.search_cases import made, spread
 
 
-def bench(memory: AnswerCache | None = None) -> tuple[Stretched, Stand]:
-    found = Stretched(made().design, spread(), 1, LISTENED, memory=memory)
+def bench(memory: AnswerCache | None = None) -> tuple[ScaledBoards, OperatingOrbit]:
+    found = ScaledBoards(made().design, spread(), 1, LISTENED, memory=memory)
     (response,) = made().model_responses
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = found.stands([(response.spec, place)])
@@ -100,7 +100,7 @@ def test_what_ngspice_says_is_counted(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
     monkeypatch.setattr("designer.centering.ngspice_check.run_queries", run_queries)
-    assert Listener(None, AnswerCache())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
+    assert AgreementCheck(None, AnswerCache())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
 
 
 def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,7 +108,7 @@ def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.M
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=False)]
     )
-    (found,) = Listener(None, AnswerCache())(boards, [stand])  # type: ignore[arg-type]
+    (found,) = AgreementCheck(None, AnswerCache())(boards, [stand])  # type: ignore[arg-type]
     assert found == Agreement(LISTENED, 0, LISTENED)
     assert found.borne_out is None
 
@@ -132,7 +132,7 @@ def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(
             "designer.centering.ngspice_check.way_to_rung", lambda _, ways=ways: next(ways)
         )
-        assert Listener(None, AnswerCache())(boards, [stand]) == (found,)  # type: ignore[arg-type]
+        assert AgreementCheck(None, AnswerCache())(boards, [stand]) == (found,)  # type: ignore[arg-type]
 
 
 def test_the_boards_are_those_of_the_prediction() -> None:
@@ -156,8 +156,8 @@ def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyP
     boards, stand = bench()
     calls: list[int] = []
     with SpicePool(2) as pool:
-        (heard,) = Listener(pool, memory)(boards, [stand], lambda: calls.append(1))
-        nothing = Listener(pool, memory)(boards, [None])
+        (heard,) = AgreementCheck(pool, memory)(boards, [stand], lambda: calls.append(1))
+        nothing = AgreementCheck(pool, memory)(boards, [None])
     assert heard == Agreement(LISTENED, LISTENED)
     assert calls == [1]
     assert nothing == (Agreement(0, 0),)
@@ -169,4 +169,4 @@ def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("designer.centering.ngspice_check.numerics_gate.check", never)
     known = AnswerCache(tmp_path / "said.jsonl", "mine")
     with SpicePool(1) as pool:
-        assert Listener(pool, known)(boards, [stand]) == (heard,)
+        assert AgreementCheck(pool, known)(boards, [stand]) == (heard,)

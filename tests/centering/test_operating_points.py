@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from designer.centering.distance import LADDER, Stretched
+from designer.centering.distance import LADDER, ScaledBoards
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, stretches
 from designer.dynamics.counts import Counts
@@ -20,7 +20,7 @@ BAND = SearchSpec(omega=(0.49, 0.58))
 @pytest.mark.slow
 def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
     model = made().modelfile.model
-    bench = Stretched(made().design, spread(), 3, MANY)
+    bench = ScaledBoards(made().design, spread(), 3, MANY)
     (seen,) = stretches(model, [SPEC], BAND)
     ranked, tried = best_points(bench, SPEC, seen, room_of(SPEC, model.b, (0.49, 0.58)))
     best = ranked[0]
@@ -45,7 +45,7 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
 def test_what_is_fixed_stays_fixed() -> None:
     model = made().modelfile.model
     spec = Response(0.85, Counts(1, ((2, 2),)), b=(0.25, 0.27))
-    bench = Stretched(made().design, spread(), 3, MANY)
+    bench = ScaledBoards(made().design, spread(), 3, MANY)
     (seen,) = stretches(model, [spec], SearchSpec(omega=(0.7, 1.0)))
     ranked, _ = best_points(bench, spec, seen, room_of(spec, model.b, (0.7, 1.0)))
     assert {s.place.omega for s in ranked} == {0.85}

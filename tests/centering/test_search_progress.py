@@ -59,8 +59,8 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Heard:
         scored: Any = SimpleNamespace(distance=3.0 if number[0] == 3 else 1.0)
         return Candidate(choice, made().design, responses, (scored,))
 
-    monkeypatch.setattr(design_search._Hunt, "_made", make)
-    monkeypatch.setattr(design_search._Hunt, "_synthesis", lambda *_: made())
+    monkeypatch.setattr(design_search._DesignSearch, "_made", make)
+    monkeypatch.setattr(design_search._DesignSearch, "_synthesis", lambda *_: made())
     asked = file('omega = 0.85\nexpect = "1-2-2"', zones='"rectifier", "saturation"')
     start = made().model_responses[0].orbit.start
     windows = ((Stretch((OperatingPoint(0.85, 0.25, start),)),),)

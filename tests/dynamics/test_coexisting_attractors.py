@@ -13,7 +13,7 @@ from designer.dynamics.attractors import followed, settle, starts, with_exponent
 from designer.dynamics.coexisting_attractors import coexisting, outlived
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from tests.dynamics.test_attractors import REST, SCALE, flow_at
 from tests.dynamics.test_steady_state import setting
 
@@ -104,6 +104,8 @@ def test_a_motion_said_to_be_chaotic_without_growth_is_settled_anew() -> None:
 
 def test_a_step_of_a_sweep_is_no_transient_of_some_hundred_periods() -> None:
     x = np.array([-1.2, 1.3, 0.7, -0.4])
-    ends = [setting(TRANSIENT).steady(x * k, Course()) for k in np.linspace(0.2, 1.5, 12)]
+    ends = [
+        setting(TRANSIENT).steady(x * k, TransientSettings()) for k in np.linspace(0.2, 1.5, 12)
+    ]
     assert all(end.status is OrbitStatus.PERIODIC for end in ends[:1])
     assert sum(end.status is OrbitStatus.PERIODIC for end in ends) >= 9

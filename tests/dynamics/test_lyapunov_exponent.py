@@ -9,7 +9,7 @@ from designer.base.arrays import Array
 from designer.dynamics.attractors import settle, with_exponent
 from designer.dynamics.lyapunov_exponent import BATCHES, Bound, batch_error, lyapunov, until
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import SWEPT, Course, by_flow
+from designer.dynamics.steady_state import SWEPT, TransientSettings, by_flow
 from tests.dynamics.test_attractors import REST, flow_at
 from tests.dynamics.test_steady_state import setting
 
@@ -62,7 +62,7 @@ def test_a_series_is_made_longer_until_its_error_is_below_the_bound() -> None:
 def test_the_stated_error_is_what_runs_of_chaos_scatter_by() -> None:
     """At ω = 0.6 runs of 300 periods scatter by some per cent, as each of them says, about the
     exponent that the two engines measure closely."""
-    motion = setting(0.6).steady(REST, Course())
+    motion = setting(0.6).steady(REST, TransientSettings())
     assert motion.lyapunov_error < max(SWEPT.relative * motion.lyapunov, SWEPT.absolute)
     flow, x, runs = flow_at(0.6), motion.end, []
     for _ in range(40):
@@ -79,8 +79,8 @@ def test_the_stated_error_is_what_runs_of_chaos_scatter_by() -> None:
 
 
 def test_both_engines_of_a_diagram_measure_to_the_same_bound() -> None:
-    fast = setting(1.2).steady(REST, Course())
-    slow = by_flow(flow_at(1.2), REST, Course())
+    fast = setting(1.2).steady(REST, TransientSettings())
+    slow = by_flow(flow_at(1.2), REST, TransientSettings())
     assert fast.status is slow.status is OrbitStatus.APERIODIC
     off = abs(fast.lyapunov - slow.lyapunov)
     assert off < 4.0 * np.hypot(fast.lyapunov_error, slow.lyapunov_error)

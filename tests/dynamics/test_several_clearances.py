@@ -21,7 +21,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.lyapunov_exponent import lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Course, by_flow
+from designer.dynamics.steady_state import TransientSettings, by_flow
 from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
 
@@ -116,7 +116,7 @@ def test_a_sweep_reads_the_first_clearance_and_the_stops_of_interest() -> None:
     for system in (between, fixed):
         flow, orbit = settled(system)
         stops = tuple((k, side) for k, gap in enumerate(system.gaps) for side in (1, -1))
-        steady = by_flow(flow, orbit.start, Course(20, orbit.n, 100), stops)
+        steady = by_flow(flow, orbit.start, TransientSettings(20, orbit.n, 100), stops)
         assert steady.counts == orbit.counts
         for (k, side), met in zip(stops, (steady.velocities, *steady.further), strict=True):
             here = (orbit.impact_clearances == k) & (orbit.impact_sides == side)

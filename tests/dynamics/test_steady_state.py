@@ -16,7 +16,7 @@ from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Course, DrivenSystem, Steady, by_flow
+from designer.dynamics.steady_state import DrivenSystem, SteadyMotion, TransientSettings, by_flow
 from designer.kernels import kernel_algebra, kernel_orbit, kernel_sweep
 from designer.kernels.kernel_modal import CHANGE, WIDTH
 from designer.model.model import Dimensionless
@@ -120,9 +120,9 @@ def test_linear_algebra_of_size_four(seed: int) -> None:
 @pytest.mark.parametrize("omega", [1.55, 0.85, 0.54, 0.215, 1.0, 0.6])
 def test_least_displacement_and_exponent_against_integration(omega: float) -> None:
     """One period from an arbitrary point of the attractor, chaotic ones too."""
-    x = setting(omega).steady(np.zeros(4), Course(100, 16, 0)).end
+    x = setting(omega).steady(np.zeros(4), TransientSettings(100, 16, 0)).end
     end, low, growth = exact(omega, x)
-    once = setting(omega).steady(x, Course(0, 1, 0))
+    once = setting(omega).steady(x, TransientSettings(0, 1, 0))
     np.testing.assert_allclose(once.end, end, atol=2e-7)
     assert once.minima[0] == pytest.approx(low, abs=1e-6)
     tables = setting(omega).tables
@@ -146,7 +146,7 @@ def test_least_displacement_and_exponent_against_integration(omega: float) -> No
     assert mine == pytest.approx(want, abs=1e-4)
 
 
-def _alike(a: Steady, b: Steady, tolerance: float) -> None:
+def _alike(a: SteadyMotion, b: SteadyMotion, tolerance: float) -> None:
     np.testing.assert_allclose(a.minima, b.minima, atol=tolerance)
     np.testing.assert_allclose(a.velocities, b.velocities, atol=tolerance)
     np.testing.assert_allclose(a.end, b.end, atol=tolerance)
@@ -154,7 +154,7 @@ def _alike(a: Steady, b: Steady, tolerance: float) -> None:
 
 @pytest.mark.parametrize("omega", PERIODIC)
 def test_periodic_motions_equal_the_slow_version(omega: float) -> None:
-    course = Course(500, 30)
+    course = TransientSettings(500, 30)
     fast, slow = (
         setting(omega).steady(np.zeros(4), course),
         by_flow(flow(omega), np.zeros(4), course),
@@ -169,22 +169,24 @@ def test_periodic_motions_equal_the_slow_version(omega: float) -> None:
 
 @pytest.mark.parametrize("omega", CHAOTIC)
 def test_chaos_shows_the_slow_version_for_a_while(omega: float) -> None:
-    x = setting(omega).steady(np.zeros(4), Course()).end
+    x = setting(omega).steady(np.zeros(4), TransientSettings()).end
     _alike(
-        setting(omega).steady(x, Course(0, 5, 0)), by_flow(flow(omega), x, Course(0, 5, 0)), 1e-8
+        setting(omega).steady(x, TransientSettings(0, 5, 0)),
+        by_flow(flow(omega), x, TransientSettings(0, 5, 0)),
+        1e-8,
     )
-    motion = setting(omega).steady(x, Course())
+    motion = setting(omega).steady(x, TransientSettings())
     assert motion.status is OrbitStatus.APERIODIC
     assert motion.lyapunov * 2 * np.pi / omega > 0.3
 
 
 @pytest.mark.parametrize("omega", [0.625734293717487, 0.38073229291716687])
 def test_long_periods_are_found_by_both_engines(omega: float) -> None:
-    fast = setting(omega).steady(np.zeros(4), Course())
-    slow = by_flow(flow(omega), np.zeros(4), Course())
+    fast = setting(omega).steady(np.zeros(4), TransientSettings())
+    slow = by_flow(flow(omega), np.zeros(4), TransientSettings())
     assert fast.response == slow.response == attractors.settle(flow(omega), np.zeros(4)).response
     assert fast.n > MAX_PERIOD
-    hurried = setting(omega).steady(np.zeros(4), Course(patience=0))
+    hurried = setting(omega).steady(np.zeros(4), TransientSettings(patience=0))
     assert hurried.status is OrbitStatus.NOT_SETTLED
 
 
@@ -193,7 +195,7 @@ def test_long_periods_are_found_by_both_engines(omega: float) -> None:
 def test_names_what_settling_names(omega: float) -> None:
     """Wherever a motion is periodic, settling from where it is says the same; a motion called
     aperiodic is not periodic by settling either."""
-    seen = setting(omega).steady(np.zeros(4), Course())
+    seen = setting(omega).steady(np.zeros(4), TransientSettings())
     orbit = attractors.settle(flow(omega), seen.end)
     if seen.status is OrbitStatus.PERIODIC:
         assert (orbit.response, orbit.symmetric) == (seen.response, seen.symmetric)
@@ -201,7 +203,7 @@ def test_names_what_settling_names(omega: float) -> None:
     elif orbit.status is OrbitStatus.PERIODIC:
         # It was on a chaotic transient: later it is periodic, and so it is here.
         assert seen.status in (OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED)
-        later = setting(omega).steady(orbit.start, Course(50, 30))
+        later = setting(omega).steady(orbit.start, TransientSettings(50, 30))
         assert later.response == orbit.response
 
 
@@ -219,7 +221,7 @@ def test_only_periodic_motions_are_counted(
 ) -> None:
     orbit = replace(attractors.settle(flow(1.55), np.zeros(4)), status=settled)
     monkeypatch.setattr(steady_state, "settle", lambda *_, **__: orbit)
-    got = by_flow(flow(1.55), orbit.start, Course(4, 2))
+    got = by_flow(flow(1.55), orbit.start, TransientSettings(4, 2))
     assert got.response == shown
     if shown == "1-1-1":
         assert (got.n, got.p, got.q, got.symmetric) == (1, 1, 1, True)
@@ -230,14 +232,14 @@ def test_only_periodic_motions_are_counted(
 
 def test_one_sided_and_free_models() -> None:
     upper = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.1, sides="upper")
-    got = setting(1.2, upper).steady(np.zeros(4), Course())
+    got = setting(1.2, upper).steady(np.zeros(4), TransientSettings())
     orbit = attractors.settle(flow(1.2, upper), got.end)
     assert got.response == orbit.response
     assert got.q == 0
     free = Dimensionless(m=0.5, k=0.5, k0=0.0, c=0.5, zeta=0.1, f20=0.0, b=0.1)
     (linear,) = ModelSubject(free).settings([{"omega": 1.2}])
     assert linear.tables is None  # by the general flow
-    motion = linear.steady(np.zeros(4), Course(200, 16))
+    motion = linear.steady(np.zeros(4), TransientSettings(200, 16))
     assert (motion.response, motion.symmetric) == ("1-0-0", True)
     assert len(motion.velocities) == 0
     assert np.ptp(motion.minima) < 1e-9
@@ -246,7 +248,7 @@ def test_one_sided_and_free_models() -> None:
 def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Room grows to what is met: chattering has more impacts than are allowed for."""
     monkeypatch.setattr(steady_state, "ROOM", 1)
-    got = setting(0.215).steady(np.zeros(4), Course(40, 3, 0))
+    got = setting(0.215).steady(np.zeros(4), TransientSettings(40, 3, 0))
     run = flow(0.215).run(np.zeros(4), 43, measure=True)
     shown = (run.impacts.time > 40 * 2 * np.pi / 0.215) & (run.impacts.side > 0)
     assert len(got.velocities) == shown.sum() > 3
@@ -272,7 +274,7 @@ def test_chaos_that_fades_while_its_exponent_is_taken_is_a_transient() -> None:
     chaos = Flow(press, Drive(122.0)).run(np.array([2e-3, 0.1]), 400).strobes[-100:]
     phasor = force / (stiffness - mass * omega**2 + 1j * omega * damping)
     linear = np.array([phasor.imag, omega * phasor.real])
-    ended = [by_flow(Flow(press, Drive(omega)), x, Course()) for x in chaos]
+    ended = [by_flow(Flow(press, Drive(omega)), x, TransientSettings()) for x in chaos]
     assert all(s.lyapunov > 0.0 for s in ended if s.status is OrbitStatus.APERIODIC)
     settled = [s for s in ended if s.status is OrbitStatus.PERIODIC]
     assert len(settled) > len(chaos) / 2

@@ -19,7 +19,7 @@ from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.sweep import SweepPlan
 from designer.bifurcations.touch import StopTouch
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.folders.curve_store import CurveBlocks
 from designer.folders.share_store import ShareBlocks
 from designer.folders.sweep_store import GridStore, SweepStore
@@ -29,7 +29,7 @@ from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.resealed import Change, reseal, with_value
 
 SUBJECT = ModelSubject(PAPER)
-QUICK = Course(40, 16, 400)
+QUICK = TransientSettings(40, 16, 400)
 VALUES = np.linspace(1.4, 1.5, 3)
 SWEEP = SweepPlan(SUBJECT, "omega", VALUES, ("down",), course=QUICK)
 AXES = ("omega", np.linspace(1.4, 1.5, 2), "b", np.array([0.25]))

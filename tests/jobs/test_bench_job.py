@@ -206,7 +206,7 @@ def test_a_wrong_decay_is_refused_before_anything_is_named(
     def late(*_: object) -> None:
         raise AssertionError("a record was named")
 
-    monkeypatch.setattr(naming, "named", late)
+    monkeypatch.setattr(naming, "identify_response", late)
     off = csv_of(3, tmp_path / "off.csv")  # the generator is on to its end
     if what == "no record":
         off.write_text("nothing\n" * 200)

@@ -197,7 +197,7 @@ def test_a_damaged_study_is_made_again_and_no_other(
         save({"format": 1, "studies": studies})
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("designer.jobs.cure_job.Book", lambda known, save: (known, save))
+    monkeypatch.setattr("designer.jobs.cure_job.VerdictCache", lambda known, save: (known, save))
     monkeypatch.setattr("designer.jobs.cure_job.find_cure", interrupted)
     words = ["search", str(out), "--yield", "0.9"]
     assert [entry.status(words), entry.status([*words, "--resume"])] == [130, 130]

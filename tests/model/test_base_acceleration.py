@@ -10,7 +10,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.dynamics.attractors import settle
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.explorer.place import read_place
 from designer.explorer.saved_model import saved_text
 from designer.fidelity import system_runge_kutta
@@ -66,7 +66,7 @@ def test_without_a_stop_it_is_the_closed_form_at_every_frequency(
     subject = ModelSubject(moved)
     settings = subject.settings([{"omega": omega} for omega in omegas])
     for omega, setting in zip(omegas, settings, strict=True):  # as a sweep over ω has them
-        least = setting.steady(np.zeros(2), Course(settle=200, keep=2)).minima
+        least = setting.steady(np.zeros(2), TransientSettings(settle=200, keep=2)).minima
         assert least == pytest.approx(-abs(linear(acceleration, omega)), rel=1e-5)
 
 

@@ -23,14 +23,14 @@ from designer.cli import entry
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, captions, point_captions, titles
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.figure_text import clipped, overlapping
 
-QUICK = Course(40, 16, 400)
+QUICK = TransientSettings(40, 16, 400)
 ONE_STOP = """
 format = 2
 [[mass]]

@@ -18,7 +18,7 @@ from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Steady
+from designer.dynamics.steady_state import SteadyMotion
 from designer.model import swept_model
 from designer.model.swept_model import ModelSubject
 from designer.plots.captions import changes
@@ -148,9 +148,9 @@ def test_a_track_that_is_not_on_the_branch_says_nothing_of_its_point(
         assert change.text.startswith("period doubling of 1-2-2 asymmetric: stable above")
 
 
-def step_of(response: str) -> Steady:
+def step_of(response: str) -> SteadyMotion:
     n, p, q = map(int, response.split("-")) if "-" in response else (0, 0, 0)
     status = OrbitStatus.PERIODIC if n else OrbitStatus.APERIODIC
     none = np.zeros(0)
     symmetric = response == "1-1-1" if n else None
-    return Steady(status, n, p, q, symmetric, 0.0, 0.5, none, none, none, none, 0)
+    return SteadyMotion(status, n, p, q, symmetric, 0.0, 0.5, none, none, none, none, 0)

@@ -13,7 +13,7 @@ from designer.bifurcations import parameter_map
 from designer.board.bom_layouts import file_of
 from designer.centering import ngspice_check, operating_points
 from designer.cli import command_line
-from designer.dynamics.steady_state import Course
+from designer.dynamics.steady_state import TransientSettings
 from designer.folders import board_files
 from designer.folders.study_cache import CACHE
 from designer.jobs import bifurcation_request, trade_job
@@ -141,8 +141,8 @@ SAID: list[tuple[str, str, object]] = [
     ("design-search.md", r"again with (\d+), and around", operating_points.SOME),
     ("design-search.md", r"with (\d+) boards as long as", operating_points.MANY),
     ("design-search.md", r"about those of (\d+) boards", ngspice_check.LISTENED),
-    ("bifurcations.md", r"At each value (\d+) drive periods", Course().settle),
-    ("bifurcations.md", r"and (\d+) are shown \(`--keep`\)", Course().keep),
+    ("bifurcations.md", r"At each value (\d+) drive periods", TransientSettings().settle),
+    ("bifurcations.md", r"and (\d+) are shown \(`--keep`\)", TransientSettings().keep),
     ("bifurcations.md", r"from rest, (\d+) periods left out", parameter_map.COURSE.settle),
     ("bifurcations.md", r"left out and (\d+) looked at", parameter_map.COURSE.keep),
     ("bifurcations.md", r"deflections, (\d+) × ", bifurcation_request.BASIN_STEPS),
@@ -166,8 +166,8 @@ def test_a_number_in_the_docs_is_the_code_s(page: str, pattern: str, value: obje
 @pytest.mark.parametrize(
     ("option", "usual", "maps"),
     [
-        ("--periods", Course().settle, parameter_map.COURSE.settle),
-        ("--keep", Course().keep, parameter_map.COURSE.keep),
+        ("--periods", TransientSettings().settle, parameter_map.COURSE.settle),
+        ("--keep", TransientSettings().keep, parameter_map.COURSE.keep),
     ],
 )
 def test_the_help_of_bifurcation_has_its_defaults(option: str, usual: int, maps: int) -> None:

@@ -15,7 +15,7 @@ from designer.model.model_file import read_model_file
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.fitted_board import NORMAL, FittedBoard, board_behind, board_figures
 from designer.workbench.free_decay import recorded_decay
-from designer.workbench.naming import NamedMotion, named
+from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from tests.shared.paper_cases import synthesised
 from tests.shared.simulated_scope import SimulatedScope
@@ -31,7 +31,7 @@ def recorded(run: BoardRun, prediction: BoardPrediction, nets: Sequence[str]) ->
     scope = SimulatedScope(points=20_000, periods=8.0, channels=tuple(nets))
     at = np.arange(RECORDED * POINTS + 1) * run.period / POINTS
     record = scope.record(at, run.signals, run.period, np.random.default_rng(SEED))
-    return named(recorded_motion(record, prediction), prediction)
+    return identify_response(recorded_motion(record, prediction), prediction)
 
 
 def check_figures(board: FittedBoard, truth: Mapping[str, Array], sure: Sequence[str]) -> None:

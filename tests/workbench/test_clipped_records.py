@@ -10,7 +10,7 @@ import pytest
 from benchmarks.exact_records import drawn_records
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.force_balance import ForceBalance
-from designer.workbench.naming import NamedMotion, named
+from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
 from tests.shared.paper_cases import synthesised
@@ -27,7 +27,7 @@ def cut(number: int, net: str, share: float, sides: tuple[int, ...] = (1, -1)) -
     truth = stored(number)
     told = {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
     record = clipped_record(number, net, share, sides)
-    return named(recorded_motion(record, prediction(), told=told), prediction())
+    return identify_response(recorded_motion(record, prediction(), told=told), prediction())
 
 
 def clipped_record(number: int, net: str, share: float, sides: tuple[int, ...] = (1, -1)) -> Record:
@@ -76,7 +76,7 @@ def test_an_output_that_is_cut_off_unseen_does_not_shift_the_stops() -> None:
     the output moved the curve by four errors, and 1-8-6 was surely 1-8-5."""
     (truth,) = drawn_records(synthesised(), range(12, 13), 77)
     motion = recorded_motion(truth.record, prediction(), told=truth.told)
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert truth.clipped == "fv"
     assert truth.response in (name.response, *name.others)
     assert not name.sure

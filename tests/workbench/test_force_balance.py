@@ -15,7 +15,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.workbench.channel_roles import _recognised, recorded_motion
 from designer.workbench.force_balance import Balance, ForceBalance, _linear
-from designer.workbench.naming import named
+from designer.workbench.naming import identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
 from tests.shared.paper_cases import synthesised
@@ -98,7 +98,7 @@ def test_a_setting_that_is_in_no_file(number: int) -> None:
     it, and 3-5-5 whose laps were taken for drive periods."""
     truth = drawn(number)
     motion = recorded_motion(truth.record, prediction(), told=truth.told)
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert name.motion.frequency == pytest.approx(truth.frequency, rel=2e-4)
     assert name.motion.channels == {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
     assert (name.response, name.sure) == (truth.response, True)
@@ -109,7 +109,9 @@ def test_corners_without_noise_are_no_longer_period() -> None:
     taken for one of twice the period, then for none."""
     (truth,) = drawn_records(synthesised(), range(10, 11), 20261)
     assert truth.clean
-    name = named(recorded_motion(truth.record, prediction(), told=truth.told), prediction())
+    name = identify_response(
+        recorded_motion(truth.record, prediction(), told=truth.told), prediction()
+    )
     assert (name.response, name.sure) == (truth.response, True)
 
 
@@ -168,23 +170,25 @@ def test_without_what_tells_the_drive_nothing_is_sure() -> None:
     truth = drawn(46)
     assert truth.nets == ("fv",)
     motion = recorded_motion(truth.record, prediction(), told={"fv": "CH1"})
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert not name.sure
     assert "the drive frequency" in name.reason
     assert "--omega" in name.would_tell
     said = recorded_motion(
         truth.record, prediction(), told={"fv": "CH1"}, frequency=0.99 * truth.frequency
     )
-    name = named(said, prediction())
+    name = identify_response(said, prediction())
     assert (name.response, name.sure) == (truth.response, True)
 
 
 def test_one_channel_that_was_not_said_is_not_sure() -> None:
     truth = drawn(70)
     assert truth.nets == ("v1",)
-    open_ = named(recorded_motion(truth.record, prediction()), prediction())
+    open_ = identify_response(recorded_motion(truth.record, prediction()), prediction())
     assert not open_.sure
     assert "--channels v1=CH1" in open_.would_tell
-    said = named(recorded_motion(truth.record, prediction(), told={"v1": "CH1"}), prediction())
+    said = identify_response(
+        recorded_motion(truth.record, prediction(), told={"v1": "CH1"}), prediction()
+    )
     assert (said.response, said.sure) == (truth.response, True)
     assert said.motion.frequency == pytest.approx(truth.frequency, rel=2e-4)

@@ -10,7 +10,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.workbench.channel_roles import recorded_motion
-from designer.workbench.naming import NamedMotion, named
+from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
 from tests.shared.paper_cases import synthesised
@@ -24,7 +24,7 @@ def prediction() -> BoardPrediction:
 
 @cache
 def name_of(number: int) -> NamedMotion:
-    return named(recorded_motion(stored(number).record, prediction()), prediction())
+    return identify_response(recorded_motion(stored(number).record, prediction()), prediction())
 
 
 @pytest.mark.parametrize("number", range(COUNT))
@@ -68,7 +68,7 @@ def test_one_channel_is_enough_where_contacts_are_deep(nets: tuple[str, ...]) ->
     truth = stored(3)
     told = {net: f"CH{truth.nets.index(net) + 1}" for net in nets}
     motion = recorded_motion(truth.record, prediction(), frequency=truth.frequency, told=told)
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert name.response == truth.response
     assert not name.dead_zones
 
@@ -86,7 +86,7 @@ def test_a_sine_that_drifts_is_no_period() -> None:
         motion = recorded_motion(
             record, prediction(), frequency=truth.frequency, told={"v1": "CH1"}
         )
-        assert named(motion, prediction()).response == response
+        assert identify_response(motion, prediction()).response == response
 
 
 @pytest.mark.parametrize(("drift", "sure"), [(0.0, True), (1.5, False)])
@@ -99,7 +99,7 @@ def test_laps_that_drift_within_the_noise_are_not_sure(drift: float, sure: bool)
     volts = height * np.sin(2.0 * np.pi * frequency * time) + noise * rng.normal(size=len(time))
     record = Record(time, {"CH1": volts}, "made")
     motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert (name.response.split("-")[0], name.sure) == ("1", sure)
     assert sure or "laps" in name.reason
 
@@ -133,7 +133,9 @@ def test_steps_of_a_converter_are_no_longer_period(
     hundredth of the peak, is a longer period."""
     record = corners(points, periods, noise, subharmonic)
     told = {"v1": "CH1", "fv": "CH2"}
-    name = named(recorded_motion(record, prediction(), frequency=80.0, told=told), prediction())
+    name = identify_response(
+        recorded_motion(record, prediction(), frequency=80.0, told=told), prediction()
+    )
     assert name.response.split("-")[0] == n
     assert ("3 drive periods" in name.reason) == (noise < 1e-3)
     assert not (name.sure and noise < 1e-3)
@@ -152,7 +154,7 @@ def test_corners_between_few_samples_are_not_surely_aperiodic(n: int) -> None:
     record = Record(cycles / frequency, {"CH1": np.interp(cycles, *corner)}, "made")
     motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
     # What is doubtful of its drive is left out here.
-    name = named(replace(motion, doubt="", remedy=""), prediction())
+    name = identify_response(replace(motion, doubt="", remedy=""), prediction())
     assert (name.response, name.sure) == ("aperiodic", not n)
     if n:
         assert f"laps of {n} drive periods" in name.reason
@@ -168,7 +170,7 @@ def test_a_few_laps_of_three_periods_are_not_sure(laps: float, sure: bool) -> No
     volts = 7.0 * np.sin(angle) + np.sin(angle / 3.0) + 0.02 * rng.normal(size=len(time))
     record = Record(time, {"CH1": volts}, "made")
     motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
-    name = named(motion, prediction())
+    name = identify_response(motion, prediction())
     assert (name.response.split("-")[0], name.sure) == ("3", sure)
     assert sure or name.would_tell == "a record of 30 drive periods or more"
 

@@ -37,7 +37,7 @@ from designer.yields.layers import CHUNK, LocalRunner
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
-from designer.yields.tolerance_study import Stores, Work, tolerance
+from designer.yields.tolerance_study import Stores, StudyWork, tolerance
 from tests.folders.test_study_cache import MAP
 from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import without_starts
@@ -94,7 +94,7 @@ class Fixed:
 
 def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
     monkeypatch.setattr(layers, "samples_task", Fixed(lost))
-    work = Work(1, None, Stores(), LocalRunner(1), Progress(), "exact")
+    work = StudyWork(1, None, Stores(), LocalRunner(1), Progress(), "exact")
     checked: Any = (None, None)
     return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
 
@@ -144,7 +144,7 @@ def test_a_response_without_an_answer_does_not_drive_the_study(
     notes: list[str] = []
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
-    work = Work(1, None, Stores(), LocalRunner(1), said, "exact")
+    work = StudyWork(1, None, Stores(), LocalRunner(1), said, "exact")
     checked: Any = (None, None)
     study = work.grown(Study(checked, plan(200), (0, 1), {}, (), until=0.06))
     assert study.narrow is False
@@ -183,7 +183,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     spec = replace(p.questions[0].spec, expect=None)
     one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
     pool: Any = object()
-    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
     checked: Any = (None,)
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
     monkeypatch.setattr(layers, "samples_task", _first(Near(10**9)))
@@ -220,7 +220,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), rung)
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), rung)
     study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
@@ -254,7 +254,7 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
         for q in (p.questions[0], p.questions[0])
     )
     pool: Any = object()
-    work = Work(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, (), until=0.05)
     study = work.grown(study)
@@ -283,7 +283,7 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
     assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
 
-class Listener(Progress):
+class AgreementCheck(Progress):
     """Keeps what is said."""
 
     def __init__(self) -> None:
@@ -326,8 +326,8 @@ def test_only_runs_that_are_not_on_disk_are_announced(
         def rows(self, *_: Any) -> BlockStore[Any]:
             return store
 
-    progress, pool = Listener(), object()
-    work = Work(1, pool, Kept(), LocalRunner(1), progress, "auto")  # type: ignore[arg-type]
+    progress, pool = AgreementCheck(), object()
+    work = StudyWork(1, pool, Kept(), LocalRunner(1), progress, "auto")  # type: ignore[arg-type]
     checked: Any = (None, None)
     study = Study(checked, p, (0, 1), {}, tuple(answers))
     assert len(work._checks(study, asks)) == len(asks) == 120
@@ -353,7 +353,7 @@ def test_a_map_that_is_there_is_not_made_again(
             return pieces
 
     monkeypatch.setattr(tolerance_study, "yield_map", yield_map)
-    work = Work(1, None, Kept(), LocalRunner(1), Progress(), "exact")
+    work = StudyWork(1, None, Kept(), LocalRunner(1), Progress(), "exact")
     checked: Any = (SimpleNamespace(model=SimpleNamespace(b=0.25)),) * 2
     study = Study(checked, p, (0, 1), {}, ())
     with pytest.raises(KeyboardInterrupt):
@@ -463,7 +463,7 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
         return blame(*args, **options)
 
     monkeypatch.setattr(tolerance_study, "blame", counted)
-    monkeypatch.setattr(Work, "powered_up", lambda _, study: study)
+    monkeypatch.setattr(StudyWork, "powered_up", lambda _, study: study)
     assert entry.status([*_words(home, out), "--reached", "-q"]) == 0
     assert asked == []
     assert json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"] == known
