@@ -83,4 +83,4 @@ lock: ## resolve pyproject.toml anew into requirements/constraints.txt
 
 clean: ## remove the environment, caches and out/
 	@rm -rf $(VENV) out build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
-	@find designer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	@find designer tests benchmarks reports -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -59,6 +59,7 @@ class Layout:
     """The columns of a bill."""
 
     name: str
+    """Name of the layout."""
     separator: str
     """What stands between designators."""
     columns: tuple[LayoutColumn, ...]

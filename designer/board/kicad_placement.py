@@ -1,7 +1,7 @@
 """Where the components stand on the board: a block about each op-amp package.
 
 The parts of a section stand at its pins, decoupling at the supply pins. What comes in is left of
-the blocks, what goes out is right of them, coaxial jacks outermost. Millimetres, y downwards.
+the blocks, what goes out is right of them, coaxial jacks outermost.
 
 The parts of an op-amp package stand at its pins, each where its summing node grows least. They are
 placed one after another. Each tries every free place on a grid, either way round, and takes the one

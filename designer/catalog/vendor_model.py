@@ -5,7 +5,7 @@ A catalogue entry names a file beside it, the subcircuit in it and the order of 
     spice = { file = "part.lib", subckt = "PART", pins = ["inp", "inn", "vcc", "vee", "out"] }
 
 The file may hold ``.subckt .ends .model .param .func`` and element lines of the letters in
-``ELEMENTS``, and what `base.netlist_guard.check_netlist` allows of those; anything else is refused
+``ELEMENTS``, and what `netlist_guard.check_netlist` allows of those; anything else is refused
 with the number of its line. Comments are dropped. What stands outside a subcircuit is copied into
 each, and every subcircuit gets a prefix, so that nothing in the file can change or replace what
 else is in a deck.

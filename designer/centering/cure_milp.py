@@ -11,15 +11,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.linear_network.milp import SOLVER, chosen_row
-
-if TYPE_CHECKING:
-    pass
 
 SLACK = 1e-7
 """Of a demand's room: what the solver's tolerance may exceed it by."""

@@ -1,4 +1,4 @@
 """A local page on which sliders move the parameters of a model and the response follows at once.
 
-``explore`` serves it; ``ViewMaker`` computes what it shows, and needs no page.
+``server.serve`` serves it; ``ViewMaker`` computes what it shows, and needs no page.
 """

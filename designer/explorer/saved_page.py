@@ -1,4 +1,5 @@
-"""The page of one design as one file that needs no server and no network."""
+"""The page of one design as one file that needs no server and no network: its responses along ω and
+its yields, recorded."""
 
 from __future__ import annotations
 

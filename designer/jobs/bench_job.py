@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import is_design_folder
@@ -27,9 +27,6 @@ from designer.workbench.overlay import Overlay
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import RecordedMotion
 from designer.workbench.record_formats import read_record
-
-if TYPE_CHECKING:
-    pass
 
 PAGE, LIST = "bench.html", "boards.csv"
 LISTED = 20

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from designer.board.kicad_reader import BoardFile, check_belongs
 from designer.board.kicad_rules import board_rules
@@ -15,11 +14,6 @@ from designer.design_rules import on_board as rule_board, run_rules
 from designer.design_rules.kicad_program import kicad_version
 from designer.design_rules.rule_subject import RuleSubject
 from designer.model.model_file import errors_in
-
-if TYPE_CHECKING:
-    pass
-
-NAME = "rules.json"
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from designer.jobs import rung_choice
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.rung_choice import LEAST, SEARCH
-from designer.jobs.search_stage import RULES as RULES, searched_into
+from designer.jobs.search_stage import searched_into
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import RANDOM, SPICE_TIMEOUT, StudyHelp, study_of
 from designer.model.model_file import ModelFile

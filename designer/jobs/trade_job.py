@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
@@ -31,9 +31,6 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, need_responses
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts.verdict import StudyPlan
-
-if TYPE_CHECKING:
-    pass
 
 SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")

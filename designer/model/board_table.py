@@ -79,6 +79,7 @@ class PartArray:
     name: str
     """Its reference on the board."""
     bought: PartChoice
+    """The array that is bought."""
     parts: tuple[str, ...]
     """Names of the parts whose places its elements take."""
 

@@ -58,7 +58,9 @@ class Mass(FileTable):
     """A mass; it moves along one line."""
 
     name: Annotated[str, _name()]
+    """Its name."""
     mass: Annotated[float, physical("kg")]
+    """Its mass."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Spring(FileTable):
     between: Annotated[tuple[str, str], _between()]
     """What it joins."""
     stiffness: Annotated[float, physical("N/m")]
+    """Its stiffness."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class Damper(FileTable):
     between: Annotated[tuple[str, str], _between()]
     """What it joins."""
     damping: Annotated[float, physical("N s/m")]
+    """Its damping."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,7 @@ class Gap(FileTable):
     """A clearance: the gap that a mass has to a stop on one side or both."""
 
     name: Annotated[str, _name()]
+    """Its name."""
     between: Annotated[tuple[str, str], _between()]
     """What moves in it, and what carries the stops."""
     upper: Annotated[float | None, _signed("m", "a length, negative for a preloaded stop,")] = None
@@ -211,11 +216,15 @@ class Elements:
     """What a system is made of."""
 
     masses: tuple[Mass, ...]
+    """The masses."""
     springs: tuple[Spring, ...] = ()
+    """The springs."""
     dampers: tuple[Damper, ...] = ()
+    """The dampers."""
     gaps: tuple[Gap, ...] = ()
     """The clearances, in the order in which n-p-q names them."""
     forces: tuple[Force, ...] = ()
+    """The forces."""
     base: MovingBase | None = None
     """How the ground moves; None where it rests."""
 

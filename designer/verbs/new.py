@@ -55,8 +55,9 @@ def _files(path: Path) -> list[str]:
     """What was written: beside a commented file its schema."""
     from designer.model.template import SCHEMA, SECOND, TEXT
 
-    commented = path.read_text("utf-8") in (TEXT, SECOND)
-    return [str(path), *([str(path.with_name(SCHEMA))] if commented else [])]
+    schema = path.with_name(SCHEMA)
+    commented = path.read_text("utf-8") in (TEXT, SECOND) and schema.exists()
+    return [str(path), *([str(schema)] if commented else [])]
 
 
 def printed(path: Path) -> Mapping[str, Any]:

@@ -44,7 +44,7 @@ def run(
     """Do the whole job: parts, circuit, check in ngspice, yield, report.
 
     A ``ModelFile`` without ``out`` is worked on in memory. catalog : in memory, instead of the one
-    that is found. shown : is given the answer while the work goes on (``study_stage.Shown``).
+    that is found. shown : is given the answer while the work goes on.
 
     Raises
     ------

@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 from designer.base.defaults import cores
@@ -35,15 +34,16 @@ from designer.check.synthesis_result import Synthesis
 from designer.folders.design_files import load
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
-from designer.jobs import search_job
 from designer.jobs.options import Options
 from designer.jobs.search_job import search_into
+from designer.jobs.search_stage import RULES as SEARCH_RULES
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
 from designer.paper.report_files import README, make_report, write_files
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
+from designer.verbs.search import VERB
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import StudyPlan
 from designer.yields import study_identity
@@ -77,7 +77,7 @@ def report(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Make the report in the folder ``out``; finished cases that are there are not synthesis again.
+    """Make the report in the folder ``out``; finished cases that are there are not made again.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def report(
     jobs = cores() if jobs is None else jobs
     catalog, file = load_catalog(), read_model_file(model)
     options = Options(seed, jobs, samples, resume=True)
-    rules = [__version__, search_job.RULES, study_identity.RULES]
+    rules = [__version__, SEARCH_RULES, study_identity.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
     store = CaseStore(out, FILES, resume=True, place="out", note=progress.note)
     store.expect(dumps(settings, indent=None))
@@ -98,16 +98,8 @@ def report(
 
     def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
         place = out / name
-        outcome = search_into(
-            asked,
-            place,
-            options,
-            progress,
-            lambda o: (
-                f"designer search {quote(model.name)} --out {quote(name)} "
-                f"--samples {o.samples} --seed {o.seed}"
-            ),
-        )
+        command = partial(VERB.command, model=model, out=place)
+        outcome = search_into(asked, place, options, progress, command)
         row = _searched(_load(place, catalog), place, options, short, progress, tuned=tuned)
         return {**row, "confirmation": outcome.answer["confirmation"]}
 

@@ -73,7 +73,7 @@ def test_a_stage_whose_steps_are_slow_says_how_far_it_is(capsys: Captured) -> No
 
 
 def test_what_is_worked_on_reaches_who_is_watched() -> None:
-    class AgreementCheck(Progress):
+    class Listener(Progress):
         said: tuple[str, ...] = ()
 
         def doing(self, text: str) -> None:
@@ -82,7 +82,7 @@ def test_what_is_worked_on_reaches_who_is_watched() -> None:
             self.said = (*self.said, self._stage.detail)
 
     doing("nobody hears it")
-    with AgreementCheck() as listener:
+    with Listener() as listener:
         listener.stage("parts")
         with part("without swing"):
             doing("linear block")
@@ -109,14 +109,14 @@ def test_what_is_watched_is_looked_at_from_time_to_time(
     """Without a call from the work: it may sit in a solver."""
     heard = threading.Event()
 
-    class AgreementCheck(ProgressLines):
+    class Listener(ProgressLines):
         def _say(self, line: str) -> None:
             super()._say(line)
             heard.set()
 
     monkeypatch.setattr(progress, "BEAT", 0.01)
     monkeypatch.setattr(progress, "SILENCE", 0.0)
-    with AgreementCheck() as listener:
+    with Listener() as listener:
         listener.stage("cvxpy")
         heard.clear()
         assert heard.wait(60.0)

@@ -99,6 +99,15 @@ def test_a_recorded_command_is_read_as_it_was_meant(
         )
 
 
+@pytest.mark.parametrize("name", ["run", "tolerance", "search"])
+def test_what_decides_a_result_can_be_recorded(name: str) -> None:
+    """Every such option is a field of ``Options``, but for those of a cure, which has no report."""
+    decides = {parameter.name for parameter, word, _ in DECLARED[name].words() if word.decides}
+    assert decides - {"model", "out"} - set(vars(Options())) == (
+        {"yield_", "budget", "without"} if name == "search" else set()
+    )
+
+
 def test_no_path_of_this_machine_is_recorded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
