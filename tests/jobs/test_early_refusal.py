@@ -258,7 +258,7 @@ def test_a_search_chooses_among_the_cases_that_the_board_takes(
         catalogs.append(catalog)
         raise Stop
 
-    monkeypatch.setattr(design_search, "_Hunt", hunt)
+    monkeypatch.setattr(design_search, "_DesignSearch", hunt)
     with pytest.raises(Stop):
         design_search.search(model("", 'mounting = "tht"'), CATALOG, seed=1, jobs=1, windows=())
     assert [c.mounting for c in catalogs] == ["tht"]
