@@ -120,14 +120,14 @@ def _refuse(options: Mapping[str, object], expected: str) -> None:
 
 def show(result: JobOutcome | CureResult) -> None:
     """The tables, where the files are, and what may be done next."""
-    from designer.jobs.cure_job import CureResult
+    from designer.jobs.job_outcome import JobOutcome  # a search need not import the cure
 
-    if isinstance(result, CureResult):
+    if isinstance(result, JobOutcome):
+        design_written(result, result.answer, tables, next_steps.after_study)
+    else:
         from designer.centering import cure_table
 
         tell(cure_table.text(result.answer))
-    else:
-        design_written(result, result.answer, tables, next_steps.after_study)
 
 
 def tables(answer: Mapping[str, Any]) -> None:
