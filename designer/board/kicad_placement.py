@@ -98,9 +98,10 @@ class _Block:
         """Place a part where it costs least; of equal places the first."""
         best: tuple[float, PlacedComponent] | None = None
         at_node = bool(summing & set(part.component.nets.values()))
-        for angle, label in product((0, 180), BESIDE if at_node else ABOVE):
+        costs = {angle: self._cost(replace(part, angle=angle), summing) for angle in (0, 180)}
+        for angle, label in product(costs, BESIDE if at_node else ABOVE):
             way = replace(part, angle=angle, label=label)
-            cost = np.where(self._taken(way), np.inf, self._cost(way, summing)).round(6)
+            cost = np.where(self._taken(way), np.inf, costs[angle])
             row, column = np.unravel_index(int(np.argmin(cost)), cost.shape)
             if best is None or cost[row, column] < best[0]:
                 at = way.moved(float(self.grid[column]), float(self.grid[row]))
@@ -130,12 +131,13 @@ class _Block:
             ends = [] if net in PLANES else list(self._pads(net))
             if ends:
                 x, y = part.pad(number)
-                gaps = [
-                    np.hypot(self.grid[:, None] + y - b, self.grid[None, :] + x - a)
-                    for a, b in ends
-                ]
-                cost += (1.0 if net in summing else OTHER) * np.min(gaps, axis=0)
-        return cost
+                across = [(self.grid + x - a) ** 2 for a, _ in ends]
+                down = [(self.grid + y - b) ** 2 for _, b in ends]
+                gap = np.full(cost.shape, np.inf)
+                for squares in map(np.add.outer, down, across):
+                    np.minimum(gap, squares, out=gap)
+                cost += (1.0 if net in summing else OTHER) * np.sqrt(gap)
+        return cost.round(6)
 
     def _pads(self, net: str) -> Iterator[tuple[float, float]]:
         for spot in self.spots:
