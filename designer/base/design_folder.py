@@ -25,7 +25,6 @@ from designer.base.guarded_reading import decode
 from designer.base.input_differences import differences
 from designer.base.manifest import (
     MANIFEST as MANIFEST,
-    OF_DESIGN,
     Manifest,
     ManifestStage,
     StageName as StageName,
@@ -34,6 +33,7 @@ from designer.base.manifest import (
     file_hash as file_hash,
     grown,
     object_hash,
+    of_design,
     read_json as read_json,
     read_manifest,
 )
@@ -126,7 +126,7 @@ class Folder:
                     "another than in manifest.json, or no file",
                     "the file as it was written, or --overwrite to make it again",
                 )
-            if state != "same" or changed is not None or ("design" in todo and stage in OF_DESIGN):
+            if state != "same" or changed is not None or ("design" in todo and of_design(stage)):
                 todo.append(stage)
         listed = {} if self.manifest is None else self.manifest.files
         for stage in todo:
@@ -179,10 +179,9 @@ class Folder:
         with writing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
         if "design" in wanted:
-            for stage in OF_DESIGN:
-                manifest.stages.pop(stage, None)
+            manifest.stages = {n: s for n, s in manifest.stages.items() if not of_design(n)}
             manifest.files = {
-                n: ("replaced" if s in OF_DESIGN else s, d) for n, (s, d) in manifest.files.items()
+                n: ("replaced" if of_design(s) else s, d) for n, (s, d) in manifest.files.items()
             }
         for stage, (inputs, names) in wanted.items():
             manifest.files = {

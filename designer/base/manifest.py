@@ -16,13 +16,24 @@ from designer.base.version import __version__
 
 FORMAT = 1
 MANIFEST = "manifest.json"
-StageName = Literal[
+
+
+class OrderStage(str):
+    """The stage of what one fab is sent: ``fabrication/jlcpcb``."""
+
+    @classmethod
+    def of(cls, fab: str) -> OrderStage:
+        return cls(f"{ORDERS}/{fab}")
+
+
+ORDERS = "fabrication"
+"""Folder of what fabs are sent, one folder in it for each."""
+_Fixed = Literal[
     "search",
     "design",
     "kicad",
     "deck-ltspice",
     "deck-portable",
-    "fabrication",
     "study",
     "measured",
     "comparison",
@@ -34,14 +45,14 @@ StageName = Literal[
     "basins",
     "rules",
 ]
-STAGES: tuple[StageName, ...] = get_args(StageName)
+StageName = _Fixed | OrderStage
+STAGES: tuple[StageName, ...] = get_args(_Fixed)
 Stages = dict[StageName, tuple[dict[str, Any], list[str]]]
 """Stages as a folder is asked for them: inputs, and names of files, by name."""
 OF_DESIGN: tuple[StageName, ...] = (
     "kicad",
     "deck-ltspice",
     "deck-portable",
-    "fabrication",
     "study",
     "measured",
     "comparison",
@@ -51,6 +62,13 @@ OF_DESIGN: tuple[StageName, ...] = (
     "rules",
 )
 """Stages that depend on the design, and on it alone."""
+
+
+def of_design(stage: str) -> bool:
+    """Whether a stage depends on the design, and on it alone."""
+    return stage in OF_DESIGN or stage.startswith(f"{ORDERS}/")
+
+
 REPLACED = ("without ", "blame budget ")
 """How items of an input's list begin that may give way to another: what is not there may come, and
 a budget may grow."""
@@ -183,9 +201,11 @@ def read_manifest(path: Path) -> Manifest | None:
         raise InputError(file, "tool", value.get("tool"), '"designer": a manifest of this tool')
     entries, listed = (_object(value.get(field), file, field) for field in ("stages", "files"))
     stages: dict[str, ManifestStage] = {
-        name: _stage(entries[name], file, f"stages.{name}") for name in STAGES if name in entries
+        name: _stage(entries[name], file, f"stages.{name}")
+        for name in entries
+        if name in STAGES or name.startswith(f"{ORDERS}/")
     }
-    files = {}
+    files: dict[str, tuple[str, str | None]] = {}
     for name, entry in listed.items():
         field = f"files.{name}"
         entry = _object(entry, file, field)
@@ -193,7 +213,23 @@ def read_manifest(path: Path) -> Manifest | None:
         if not (isinstance(stage, str) and (digest is None or isinstance(digest, str))):
             raise InputError(file, field, entry, "a stage and a sha256")
         files[_inside(path, name)] = (stage, digest)
+    if ORDERS in entries:
+        stages |= _orders(_stage(entries[ORDERS], file, f"stages.{ORDERS}"))
+        files = {name: (_order_of(name, stage), digest) for name, (stage, digest) in files.items()}
     return Manifest(stages, files, _object(value.get("provenance", {}), file, "provenance"))
+
+
+def _orders(stage: ManifestStage) -> dict[str, ManifestStage]:
+    """A stage for each fab of one that an earlier version wrote for all of them."""
+    fabs = stage.inputs.get("fabs")
+    inputs = {key: value for key, value in stage.inputs.items() if key != "fabs"}
+    names = [name for name in fabs if isinstance(name, str)] if isinstance(fabs, list) else []
+    return {OrderStage.of(name): ManifestStage(dict(inputs), stage.complete) for name in names}
+
+
+def _order_of(file: str, stage: str) -> str:
+    parts = file.split("/")
+    return OrderStage.of(parts[1]) if stage == ORDERS and len(parts) > 2 else stage
 
 
 def _stage(value: object, file: Path, field: str) -> ManifestStage:

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.board.kicad_reader import TRACKS, BoardFile
+from designer.board.kicad_reader import TRACKS, BoardFile, drilled
 from designer.board.outline import LAYER
 from designer.board.sexpr import Expression, read
 
 SILK = ".SilkS"
 """How the names of the two layers of silk screen end."""
+SCREW = 2.5
+"""Least diameter of a hole that is taken for a screw's [mm]."""
 TEXTS = ("property", "fp_text", "gr_text")
 
 
@@ -50,6 +52,10 @@ class BoardFacts:
     """Number of vias."""
     holes: int
     """Number of holes in pads."""
+    screw_holes: int
+    """Bare holes that a screw of 2.5 mm goes through."""
+    bare_layers: tuple[str, ...]
+    """Inner layers without a track, a zone or a pad of their own, while another has a track."""
     surface_parts: int
     """Parts that are soldered on the surface."""
     through_parts: int
@@ -81,8 +87,8 @@ def facts_of(board: BoardFile) -> BoardFacts:
     tracks = [each.get("width").number() for kind in TRACKS for each in tree.all(kind)]
     vias = tree.all("via")
     pads = [pad for footprint in tree.all("footprint") for pad in footprint.all("pad")]
-    drilled = [(pad, hole) for pad in pads if (hole := _hole(pad)) is not None]
-    round_ = [x for _, (x, y) in drilled if x == y]
+    holes = [(pad, hole) for pad in pads if (hole := drilled(pad)) is not None]
+    round_ = [x for _, (x, y) in holes if x == y]
     sizes = [*(via.get("drill").number() for via in vias), *round_]
     letters = [font for text in _silk_texts(tree) for font in text.get("effects").all("font")]
     edge = board.outline.sides.reshape(-1, 2)
@@ -95,28 +101,40 @@ def facts_of(board: BoardFile) -> BoardFacts:
         finest_track=min(tracks, default=None),
         smallest_hole=min(sizes, default=None),
         largest_hole=max(sizes, default=None),
-        narrowest_slot=min((min(hole) for _, hole in drilled if hole[0] != hole[1]), default=None),
+        narrowest_slot=min((min(hole) for _, hole in holes if hole[0] != hole[1]), default=None),
         via_ring=min(
             ((via.get("size").number() - via.get("drill").number()) / 2.0 for via in vias),
             default=None,
         ),
-        pad_ring=min((_ring(pad, hole) for pad, hole in drilled if _plated(pad)), default=None),
+        pad_ring=min((_ring(pad, hole) for pad, hole in holes if _plated(pad)), default=None),
         silk_height=min((font.get("size").number(0) for font in letters), default=None),
         silk_stroke=min([*_letter_strokes(letters), *_silk_lines(tree)], default=None),
         vias=len(vias),
-        holes=len(drilled),
+        holes=len(holes),
+        screw_holes=sum(not _plated(pad) and min(hole) >= SCREW for pad, hole in holes),
+        bare_layers=_bare_layers(tree),
         surface_parts=_fitted(tree, "smd"),
         through_parts=_fitted(tree, "through_hole"),
     )
 
 
-def _hole(pad: Expression) -> tuple[float, float] | None:
-    """Width and height of a pad's hole [mm]; None on the surface. Only a slot states two."""
-    drill = pad.find("drill")
-    if drill is None or not drill.atoms:
-        return None
-    first, last = int(drill.text() == "oval"), len(drill.atoms) - 1
-    return drill.number(first), drill.number(max(first, last))
+def _bare_layers(tree: Expression) -> tuple[str, ...]:
+    laid = {each.get("layer").text() for kind in TRACKS for each in tree.all(kind)}
+    if not laid:
+        return ()
+    owners = [each for zone in tree.all("zone") for each in zone.children]
+    owners += [pad for footprint in tree.all("footprint") for pad in footprint.all("pad")]
+    used = laid | {
+        layer
+        for owner in (*owners, *tree.all("zone"))
+        for each in (*owner.all("layer"), *owner.all("layers"))
+        for layer in each.atoms
+    }
+    return tuple(
+        name
+        for layer in tree.get("layers").children
+        if (name := layer.text(0)).endswith(".Cu") and name not in {*used, "F.Cu", "B.Cu"}
+    )
 
 
 def _plated(pad: Expression) -> bool:

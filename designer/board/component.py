@@ -51,6 +51,8 @@ class Bought:
     """Another maker's part number, with the maker in front, or ""."""
     dielectric: str = ""
     """What it is made of, or ""."""
+    dc_bias: float | None = None
+    """Share of a capacitance that is lost at the rated voltage; None where not known."""
     note: str = ""
     """What a buyer has to know beside, or ""."""
 
@@ -338,6 +340,7 @@ def _ordered(sold: PartChoice) -> Bought:
         price_class=sold.price,
         grade=sold.family.grade,
         dielectric=sold.family.dielectric,
+        dc_bias=sold.family.dc_bias,
     )
 
 

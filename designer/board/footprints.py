@@ -36,6 +36,9 @@ class PadShape:
     """Whether it is drawn square, as pin 1 of a row of holes is."""
     plated: bool = True
     """Whether it has copper; False for a bare hole."""
+    lead: float = 0.0
+    """Largest diameter, or diagonal, of the lead that goes through its hole [mm]; 0 where it is not
+    known, and on the surface."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,12 @@ TERMINALS = {
 """Length of a chip's terminals by the length and width of its body, as chip makers state them."""
 SMALL_DIODES = {"123": (3.7, 0.45, 0.6, (2.7, 1.6)), "323": (2.5, 0.3, 0.35, (1.7, 1.25))}
 """SOD-123 and SOD-323: span over the leads, length of a foot, width of a lead, body."""
-LYING_DIODES = {"35_SOD27": ((4.0, 2.0), 1.6, 0.8), "41_SOD81": ((5.2, 2.7), 2.2, 1.1)}
-"""DO-35 and DO-41: length and width of the body, pad, hole. Leads of the DO-41 are 0.71 mm to
+LYING_DIODES = {
+    "35_SOD27": ((4.0, 2.0), 1.6, 0.8, 0.56),
+    "41_SOD81": ((5.2, 2.7), 2.2, 1.1, 0.86),
+}
+"""DO-35 and DO-41: length and width of the body, pad, hole, lead. Leads of the DO-35 are up to 0.56
+mm thick (JEDEC DO-204AH). Leads of the DO-41 are 0.71 mm to
 0.86 mm thick, its body is up to 5.21 mm by 2.72 mm (JEDEC DO-204AL)."""
 
 SQUARE_JACKS = {
@@ -124,6 +131,14 @@ SQUARE_JACKS = {
 """Upright jacks: from the middle to the legs on either axis, pad and hole of the inner conductor
 and of a leg, width of the body; of the plug, the nut of an SMA over its corners (8 mm across flats)
 and the ring of a BNC."""
+
+
+PIN, ROUND_LEAD = 0.91, 0.63
+"""Diagonal of a pin of 0.64 mm square; largest diameter of the leads of axial and radial parts, 0.6
+mm and 5 % [mm]."""
+DUAL_IN_LINE, TRANSISTOR = 0.67, 0.72
+"""Diagonals of leads [mm]: 0.56 mm by 0.36 mm (JEDEC MS-001); 0.533 mm by 0.483 mm (JEDEC
+TO-226)."""
 
 
 def _chip(name: str, code: str) -> FootprintShape | None:
@@ -164,7 +179,8 @@ def _small_outline(name: str, count: str, *sizes: str) -> FootprintShape:
 
 def _dual_in_line(name: str, count: str, row: str) -> FootprintShape:
     """Holes at 2.54 mm in two rows."""
-    pads = _two_rows(int(count), float(row) / 2.0, 2.54, (1.6, 1.6), drill=0.8)
+    x = float(row) / 2.0
+    pads = _two_rows(int(count), x, 2.54, (1.6, 1.6), drill=0.8, lead=DUAL_IN_LINE)
     return FootprintShape(name, pads, (6.35, 2.54 * int(count) / 2.0), mark=True)
 
 
@@ -176,8 +192,8 @@ def _lying(name: str, length: str, width: str, pitch: str) -> FootprintShape:
 def _lying_diode(name: str, case: str, pitch: str) -> FootprintShape | None:
     if case not in LYING_DIODES:
         return None
-    body, pad, drill = LYING_DIODES[case]
-    return _two_holes(name, float(pitch), body, mark=True, pad=pad, drill=drill)
+    body, pad, drill, lead = LYING_DIODES[case]
+    return _two_holes(name, float(pitch), body, mark=True, pad=pad, drill=drill, lead=lead)
 
 
 def _can(name: str, diameter: str, pitch: str) -> FootprintShape:
@@ -192,19 +208,25 @@ def _two_holes(
     mark: bool = False,
     pad: float = 1.6,
     drill: float = 0.8,
+    lead: float = ROUND_LEAD,
 ) -> FootprintShape:
-    return FootprintShape(name, _row(2, (pitch, 0.0), (pad, pad), drill, square=mark), body, mark)
+    pads = _row(2, (pitch, 0.0), (pad, pad), drill, square=mark, lead=lead)
+    return FootprintShape(name, pads, body, mark)
 
 
-def _transistor_outline(name: str) -> FootprintShape:
-    """TO-92 with its legs in a row at 1.27 mm; body 5.2 mm by 4.0 mm (JEDEC TO-226)."""
-    return FootprintShape(name, _row(3, (1.27, 0.0), (1.0, 1.5), 0.6), (5.2, 4.0), mark=True)
+def _transistor_outline(name: str, wide: str) -> FootprintShape:
+    """TO-92 with its legs in a row at 1.27 mm, or bent to 2.54 mm; body 5.2 mm by 4.0 mm (JEDEC
+    TO-226)."""
+    pitch, pad, drill = (2.54, (1.5, 1.5), 0.8) if wide else (1.27, (1.05, 1.5), 0.75)
+    pads = _row(3, (pitch, 0.0), pad, drill, lead=TRANSISTOR)
+    return FootprintShape(name, pads, (5.2, 4.0), mark=True)
 
 
 def _header(name: str, count: str, pitch: str) -> FootprintShape:
     """A column of holes for square pins of 0.64 mm."""
     pins, step = int(count), float(pitch)
-    return FootprintShape(name, _row(pins, (0.0, step), (1.7, 1.7), 1.0), (step, pins * step), True)
+    pads = _row(pins, (0.0, step), (1.7, 1.7), 1.0, lead=PIN)
+    return FootprintShape(name, pads, (step, pins * step), True)
 
 
 def _square_jack(name: str, case: str) -> FootprintShape | None:
@@ -233,8 +255,10 @@ def _mounting_hole(name: str, drill: str) -> FootprintShape:
 
 
 def _bourns_3296w(name: str) -> FootprintShape:
-    """Three pins in a row at 2.54 mm below a body of 9.53 mm by 4.83 mm (Bourns 3296)."""
-    return FootprintShape(name, _row(3, (-2.54, 0.0), (1.44, 1.44), 0.8), (9.53, 4.83), mark=True)
+    """Three pins of 0.51 mm in a row at 2.54 mm below a body of 9.53 mm by 4.83 mm (Bourns
+    3296)."""
+    pads = _row(3, (-2.54, 0.0), (1.44, 1.44), 0.8, lead=0.51)
+    return FootprintShape(name, pads, (9.53, 4.83), mark=True)
 
 
 def _bourns_3224w(name: str) -> FootprintShape:
@@ -261,6 +285,7 @@ def _row(
     size: tuple[float, float],
     drill: float,
     square: bool = True,
+    lead: float = 0.0,
 ) -> tuple[PadShape, ...]:
     """Holes in a row about the middle. square : whether pin 1 is drawn so."""
     middle = (count - 1) / 2.0
@@ -272,13 +297,19 @@ def _row(
             *size,
             drill,
             first=square and i == 0,
+            lead=lead,
         )
         for i in range(count)
     )
 
 
 def _two_rows(
-    count: int, x: float, pitch: float, size: tuple[float, float], drill: float = 0.0
+    count: int,
+    x: float,
+    pitch: float,
+    size: tuple[float, float],
+    drill: float = 0.0,
+    lead: float = 0.0,
 ) -> tuple[PadShape, ...]:
     """Down on the left, up on the right, as packages are counted."""
     half = count // 2
@@ -288,7 +319,8 @@ def _two_rows(
         left = i < half
         y = top + (i if left else count - 1 - i) * pitch
         first = drill > 0.0 and i == 0
-        out.append(PadShape(str(i + 1), -x if left else x, y, *size, drill=drill, first=first))
+        at = (-x if left else x, y)
+        out.append(PadShape(str(i + 1), *at, *size, drill=drill, first=first, lead=lead))
     return tuple(out)
 
 
@@ -310,7 +342,7 @@ _RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
         _lying,
     ),
     "CP_Radial_D5.0mm_P2.00mm": (rf"CP?_Radial_D{_N}mm_P{_N}mm", _can),
-    "TO-92_Inline": ("TO-92_Inline", _transistor_outline),
+    "TO-92_Inline": ("TO-92_Inline(_Wide|)", _transistor_outline),
     "PinHeader_1x03_P2.54mm_Vertical": (rf"PinHeader_1x(\d+)_P{_N}mm_Vertical", _header),
     "SMA_Wurth_60312002114503_Vertical": (r"((?:SMA|BNC)_\w+)_Vertical", _square_jack),
     "TestPoint_Pad_D1.5mm": (rf"TestPoint_Pad_D{_N}mm", _bare_pad),

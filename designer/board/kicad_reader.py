@@ -52,6 +52,10 @@ class PlacedPad:
     corners: tuple[Point, ...]
     """Corners of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
     a shape that is not read has none."""
+    hole: float
+    """Diameter of its hole, or width of its slot [mm]; 0 on the surface."""
+    bottom: bool
+    """Whether its copper is on the lower side alone."""
 
 
 @dataclass(frozen=True)
@@ -254,12 +258,24 @@ def _pad(item: Expression, origin: Point, turn: float) -> PlacedPad:
     at = item.get("at")
     place = turned((at.number(0), at.number(1)), origin, turn)
     net = item.find("net")
+    layers = {layer for each in item.all("layers") for layer in each.atoms}
     return PlacedPad(
         item.text(0),
         circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
         place,
         pad_corners(item, place, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
+        hole=min(drilled(item) or (0.0,)),
+        bottom="B.Cu" in layers and "F.Cu" not in layers,
     )
+
+
+def drilled(pad: Expression) -> tuple[float, float] | None:
+    """Width and height of a pad's hole [mm]; None on the surface. Only a slot states two."""
+    drill = pad.find("drill")
+    if drill is None or not drill.atoms:
+        return None
+    first, last = int(drill.text() == "oval"), len(drill.atoms) - 1
+    return drill.number(first), drill.number(max(first, last))
 
 
 def _unconnected(net: str) -> bool:

@@ -157,6 +157,24 @@ RULES: tuple[DesignRule, ...] = (
         least=True,
     ),
     _rule(
+        "bulk",
+        "Capacitance of a rail's bulk capacitors at its voltage, over that of all capacitors at "
+        "the op-amps' pins",
+        2, "",
+        f"{OWN}: the bulk refills what the op-amps take; a ceramic of X5R or X7R keeps a share of "
+        "its capacitance under DC that the catalogue states or assumes",
+        "take a larger bulk capacitor, or one of a higher voltage (board.bulk in the model file)",
+        least=True,
+    ),
+    _rule(
+        "reference-current",
+        "Least current through a shunt reference over what it needs to regulate",
+        1, "",
+        "the reference's data sheet",
+        "raise the supply, or take a smaller resistor before the reference",
+        least=True,
+    ),
+    _rule(
         "slew",
         "Fastest change of an output over the least guaranteed slew rate",
         0.2, "",
@@ -260,6 +278,16 @@ RULES: tuple[DesignRule, ...] = (
         board=True,
     ),
     _rule(
+        "pin-hole",
+        "Diameter of a pad's hole over that of the lead that goes through it, a square one's by "
+        "its diagonal",
+        0.08, "mm",
+        "the least that is left where a fab's hole is 0.08 mm too small, which JLCPCB's "
+        "capabilities allow; leads as JEDEC and the makers state them, where they are known",
+        "make the hole larger",
+        least=True, board=True,
+    ),
+    _rule(
         "unconnected",
         "Connections of nets that no copper makes yet",
         0, "",
@@ -325,6 +353,31 @@ RULES: tuple[DesignRule, ...] = (
         "check says nothing of what lies outside altogether",
         "move the component onto the board, or the edge outwards",
         least=True, board=True,
+    ),
+    _rule(
+        "mounting-holes",
+        "Bare holes of 2.5 mm and more, for screws",
+        4, "",
+        f"{OWN}: the exported board has one at each corner",
+        "put a mounting hole at each corner",
+        least=True, board=True,
+    ),
+    _rule(
+        "board-thickness",
+        "How far the thickness of the board is from that of the exported one, 1.6 mm",
+        0, "mm",
+        f"{OWN}: what is ordered is what was designed; jacks at the edge and headers are for 1.6 "
+        "mm",
+        "set the board's thickness in KiCad",
+        board=True,
+    ),
+    _rule(
+        "board-layers",
+        "Inner layers that nothing lies on, of a board with tracks",
+        0, "",
+        f"{OWN}: a layer that is ordered is used",
+        "take the layers away in KiCad's board setup, or route on them",
+        board=True,
     ),
     _rule(
         "fab-track",

@@ -386,6 +386,9 @@ class FamilyBase(FileTable):
     drift: Annotated[float | None, fraction("0.005 is 0.5 %", zero=True)] = None
     """Most that a value changes in the data sheet's endurance test, a fraction; None where not
     known."""
+    dc_bias: Annotated[float | None, fraction("0.8 is 80 %", zero=True)] = None
+    """Share of a capacitance that is lost at the rated voltage, in proportion below; None where not
+    known."""
     use: Annotated[Use, choice("signal", "supply", "array")] = "signal"
     """"supply" for families that no signal goes through, "array" for several parts of one value in
     one case; "signal" for all others."""

@@ -14,10 +14,12 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,13 @@ from designer.board.kicad_rules import CANARY, CustomRule, canary, project_rules
 from designer.board.sexpr import Expression, expression, expression_text, read
 from designer.catalog.fab import FabLimits
 from designer.design_rules.drc_specimen import canary_track, specimen
-from designer.design_rules.kicad_program import KicadFailed, call, last_words, needed_version
+from designer.design_rules.kicad_program import (
+    PROGRAM,
+    KicadFailed,
+    call,
+    last_words,
+    needed_version,
+)
 
 ASIDE = (-100.0, -100.0)
 """Where the canary's track lies [mm], from the board's uppermost, leftmost pad."""
@@ -111,15 +119,11 @@ def check(
     """
     version = needed_version()
     doing("KiCad's check of the board")
+    reported = _understood(tuple(rules), version, shutil.which(PROGRAM))
+    files = _beside(board, footprints, fab)
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
-        place = Path(scratch)
         text = rules_text([*rules, canary()])
-        broken = report(specimen(rules, breaking=True), text, place / "specimen")
-        reported = {v.rule for v in violations(broken, rules)}
-        reported |= {OPEN} if _unconnected(broken) else set()
-        reported |= {SHORT} if _shorts(broken) else set()
-        files = _beside(board, footprints, fab)
-        answer = report(_with_canary(board), text, place / "board", files)
+        answer = report(_with_canary(board), text, Path(scratch) / "board", files)
     if not any(_is_canary(v) for v in answer["violations"]):
         raise KicadFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
@@ -132,6 +136,19 @@ def check(
         Counter(str(each.get("type")) for each in _others(answer, rules, "warning", _aside(board))),
         tuple(map(_typed, answer[_PARITY])) if _SHEET in files else None,
     )
+
+
+@lru_cache(maxsize=8)  # one KiCad understands the same rules each time
+def _understood(rules: tuple[CustomRule, ...], version: str, program: str | None) -> frozenset[str]:
+    """Rules that KiCad reports on a board that breaks them all. version, program : of the KiCad
+    that is asked."""
+    with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
+        text = rules_text([*rules, canary()])
+        broken = report(specimen(rules, breaking=True), text, Path(scratch) / "specimen")
+    reported = {v.rule for v in violations(broken, rules)}
+    reported |= {OPEN} if _unconnected(broken) else set()
+    reported |= {SHORT} if _shorts(broken) else set()
+    return frozenset(reported)
 
 
 def _beside(

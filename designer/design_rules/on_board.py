@@ -14,9 +14,10 @@ import numpy as np
 
 from designer.base.natural_sort import natural_key
 from designer.base.views import View
-from designer.board.board_facts import facts_of
+from designer.board.board_facts import BoardFacts, facts_of
 from designer.board.component import Component
 from designer.board.footprints import footprint
+from designer.board.kicad_board import THICKNESS
 from designer.board.kicad_names import POWER, circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CustomRule
@@ -104,6 +105,8 @@ def on_board(
         try:
             if rule.id in READ:
                 out.append(judged(rule, READ[rule.id](board, components), override))
+            elif rule.id in MEASURED:
+                out.append(judged(rule, MEASURED[rule.id](facts), override))
             elif rule.id in on_fab.READ:
                 out.append(judged(rule, on_fab.READ[rule.id](facts, fab), override))
             elif isinstance(answer, str):
@@ -221,6 +224,35 @@ def schematic_parity(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Find
     yield Finding(len(answer.parity), more="; ".join(answer.parity[:MOST]))
 
 
+def mounting_holes(facts: BoardFacts) -> Iterator[Finding]:
+    """Holes that a screw goes through."""
+    yield Finding(facts.screw_holes, more=_READ)
+
+
+def thickness(facts: BoardFacts) -> Iterator[Finding]:
+    """How far the thickness is from the exported board's [mm]."""
+    more = f"{facts.thickness:g} mm; {_READ}"
+    yield Finding(abs(facts.thickness - THICKNESS), more=more)
+
+
+def bare_layers(facts: BoardFacts) -> Iterator[Finding]:
+    """Inner layers that nothing lies on, while another has a track.
+
+    Raises
+    ------
+    NotRun : nothing is routed yet.
+    """
+    if facts.finest_track is None:
+        raise NotRun("the board has no track yet")
+    yield Finding(len(facts.bare_layers), more=", ".join([*facts.bare_layers, _READ]))
+
+
+MEASURED: Mapping[str, Callable[[BoardFacts], Iterator[Finding]]] = {
+    "mounting-holes": mounting_holes,
+    "board-thickness": thickness,
+    "board-layers": bare_layers,
+}
+"""Rules on figures of the board."""
 REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Finding]]] = {
     OPEN: unconnected,
     SHORT: short_circuits,

@@ -56,11 +56,32 @@ def fitted(board: BoardFile, components: Sequence[Component]) -> Iterator[Findin
     yield from _count(_pairs(board, components), _other_mark)
 
 
+def pin_holes(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
+    """Hole of each pad over the lead that goes through it [mm], where that is known.
+
+    Raises
+    ------
+    NotRun : no part of the design goes through the board.
+    """
+    through = False
+    for component, there in _pairs(board, components):
+        leads = {pad.number: pad.lead for pad in footprint(component.footprint).pads if pad.lead}
+        for pad in there.pads:
+            if pad.hole and leads.get(pad.number):
+                through = True
+                room = pad.hole - leads[pad.number]
+                more = f"{pad.hole:.3g} mm for a lead of {leads[pad.number]:.3g} mm"
+                yield Finding(room, f"{there.reference}.{pad.number}", more=more)
+    if not through:
+        raise NotRun("no part goes through the board with leads that are known")
+
+
 READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]] = {
     "part-value": values,
     "part-number": numbers,
     "part-footprint": footprints,
     "part-fitted": fitted,
+    "pin-hole": pin_holes,
 }
 """By the rule's id."""
 

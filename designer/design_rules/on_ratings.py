@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from designer.catalog.design_rule import Finding, value_text
+from designer.catalog.design_rule import Finding, NotRun, value_text
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Diode
 from designer.circuit.noise_gains import conductance, stages
 from designer.design_rules.rule_subject import RuleSubject
@@ -110,6 +110,40 @@ def common_mode(s: RuleSubject) -> Iterator[Finding]:
             top, bottom = s.operating.high[net], s.operating.low[net]
             yield Finding(high - top.value, _at(section.name, top))
             yield Finding(-bottom.value - low, _at(section.name, bottom))
+
+
+def reference_current(s: RuleSubject) -> Iterator[Finding]:
+    """Least current of each shunt reference over what it needs."""
+    for reference in s.circuit.references:
+        if not reference.least:
+            raise NotRun(f"the catalogue has no least current of {reference.model}")
+        peak = s.operating.reference[reference.name]
+        more = f"{-1e6 * peak.value:.3g} µA of {1e6 * reference.least:.3g} µA"
+        yield Finding(-peak.value / reference.least, _at(reference.name, peak), more=more)
+
+
+def bulk(s: RuleSubject) -> Iterator[Finding]:
+    """Capacitance of each rail's bulk at its voltage, over that at the op-amps' pins.
+
+    Raises
+    ------
+    NotRun : the catalogue does not say what a ceramic keeps under DC.
+    """
+    for rail in (POSITIVE, NEGATIVE):
+        here = [
+            c
+            for c in s.components
+            if c.kind == "capacitor" and set(c.nets.values()) == {rail, GROUND}
+        ]
+        whole = [c for c in here if not c.near]
+        at_pins = sum(c.quantity or 0.0 for c in here if c.near)
+        if not whole or not at_pins:
+            raise NotRun(f"no capacitors from {rail} to ground, at the supply and at the op-amps")
+        kept = {c.reference: s.kept_under_dc(c) for c in whole}
+        total = sum((c.quantity or 0.0) * kept[c.reference] for c in whole)
+        shares = ", ".join(f"{name} keeps {100 * share:.0f} %" for name, share in kept.items())
+        more = f"{value_text(total, 'F')} at {s.circuit.supply:g} V ({shares}) over "
+        yield Finding(total / at_pins, rail, more=more + value_text(at_pins, "F"))
 
 
 def slew(s: RuleSubject) -> Iterator[Finding]:

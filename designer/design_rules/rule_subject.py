@@ -148,6 +148,22 @@ class RuleSubject:
         capacitors = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
         return {c.parts[0]: c.bought.dielectric for c in capacitors if c.bought is not None}
 
+    def kept_under_dc(self, capacitor: Component) -> float:
+        """Share of its capacitance that a capacitor keeps at the supply's voltage.
+
+        Raises
+        ------
+        NotRun : the catalogue does not say it of a ceramic that is not C0G, or states no voltage.
+        """
+        bought = capacitor.bought
+        assert bought is not None
+        rated = self.volts.get(capacitor.parts[0])
+        if bought.dc_bias is not None and rated is not None:
+            return 1.0 - bought.dc_bias * min(self.circuit.supply / rated, 1.0)
+        if "ceramic" in bought.dielectric and "C0G" not in bought.dielectric:
+            raise NotRun(f"the catalogue does not say what {bought.part_number} keeps under DC")
+        return 1.0
+
     def _rated(self, kind: str, unit: str) -> dict[str, float]:
         out = {}
         for component in self.components:

@@ -38,6 +38,8 @@ LOOKS: dict[str, Look] = {
     "power-stuck": on_ratings.power_stuck,
     "capacitor-voltage": on_ratings.capacitor_voltage,
     "common-mode": on_ratings.common_mode,
+    "bulk": on_ratings.bulk,
+    "reference-current": on_ratings.reference_current,
     "slew": on_ratings.slew,
     "gain-bandwidth": on_ratings.gain_bandwidth,
     "offset-force": on_precision.offset,

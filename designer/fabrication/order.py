@@ -18,11 +18,14 @@ from designer.base.seal import sha256
 from designer.board.board_facts import BoardFacts, facts_of
 from designer.board.bom import Line
 from designer.board.bom_layouts import Layout
+from designer.board.component import Component
 from designer.board.kicad_reader import BoardFile
 from designer.catalog.fab import Fab, FabLimits, Measure, PositionField
 from designer.catalog.stock_list import order_number
 from designer.fabrication.board_picture import Side, board_svg
-from designer.fabrication.kicad_plot import DATE, PartPosition, plot
+from designer.fabrication.kicad_plot import DATE, PartPosition, Plots, plot
+from designer.fabrication.order_check import OrderCheck, check_order
+from designer.fabrication.plotted_copper import plotted
 
 FINISH = "any; lead-free solder (HASL) is the usual one"
 """No footprint of ours needs a flat surface."""
@@ -34,12 +37,13 @@ def notes(
     fab: Fab,
     facts: BoardFacts,
     limits: FabLimits,
+    read_back: str,
     remarks: Sequence[str],
 ) -> str:
     """The page as Markdown.
 
-    title : of the model file. name : of the files. limits : what the fab makes. remarks : what is
-    to be looked at, a line each.
+    title : of the model file. name : of the files. limits : what the fab makes. read_back : what
+    the files said when they were read back. remarks : what is to be looked at, a line each.
     """
     parts = [
         "# Order",
@@ -48,6 +52,8 @@ def notes(
         "\n".join(_files(name)),
         "## Options of the board",
         "\n".join(_options(facts, limits)),
+        "## Checked as written",
+        read_back,
         "## Steps",
         "\n".join(f"{i}. {step}" for i, step in enumerate(fab.table.steps, start=1)),
         "## To be looked at" if remarks else "",
@@ -130,12 +136,25 @@ class BoardOrder:
     title: str
     """Title of the model file, as it is."""
     board: BoardFile
+    components: Sequence[Component]
+    """What the design has on the board, with the nets of the circuit."""
     bought: Sequence[Line]
     """Its bill."""
     not_checked: Sequence[str]
     """Rules that were not run, with the reason of each."""
     accepted: Sequence[str] = ()
     """Rules that fail and are accepted, with what was found."""
+
+
+class FaultyOrder(Exception):
+    """The files of an order are not as the circuit and the bill have it.
+
+    faults : a line for each difference.
+    """
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = tuple(faults)
 
 
 def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) -> dict[str, bytes]:
@@ -146,8 +165,10 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) 
     Raises
     ------
     KicadFailed : kicad-cli gives no files.
+    FaultyOrder : its files are not as the circuit and the bill have it.
     """
     plots = plot(order.board, order.name, fab.table.protel_names)
+    checked = _read_back(plots, order)
     placed = {part.reference for part in plots.positions}
     files = {
         **{f"{GERBERS}/{name}": content for name, content in plots.gerbers.items()},
@@ -164,7 +185,8 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) 
         *(f"Not checked: {rule}" for rule in order.not_checked),
         *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
     ]
-    text = notes(order.title, order.name, fab, facts_of(order.board), limits, remarks)
+    facts = facts_of(order.board)
+    text = notes(order.title, order.name, fab, facts, limits, checked.words, remarks)
     files[NOTES] = text.encode("utf-8")
     files[f"{order.name}-bom.html"] = bom_page(order.title, order.board, order.bought).encode(
         "utf-8"
@@ -175,6 +197,17 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) 
         f"{sha256(content)}  {name}\n" for name, content in sorted(files.items())
     ).encode("ascii")
     return files
+
+
+def _read_back(plots: Plots, order: BoardOrder) -> OrderCheck:
+    try:
+        files = plotted(plots.gerbers)
+    except ValueError as why:
+        raise FaultyOrder((str(why),)) from None
+    checked = check_order(files, plots.positions, order.board, order.components, order.bought)
+    if checked.faults:
+        raise FaultyOrder(checked.faults)
+    return checked
 
 
 def _unnumbered(bought: Sequence[Line], distributor: str | None) -> Iterator[str]:

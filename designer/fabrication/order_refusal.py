@@ -40,6 +40,12 @@ def refusals(outcomes: Sequence[RuleOutcome], accepted: Sequence[str] = ()) -> t
     )
 
 
+def read_back(faults: Sequence[str]) -> tuple[str, ...]:
+    """A line for each fault that an order's files had when they were read back."""
+    do = "fill the zones anew, mend the board, and run export --fab again"
+    return tuple(f"order-files: {fault}; {do}" for fault in faults)
+
+
 def accepted_failures(outcomes: Sequence[RuleOutcome], accepted: Sequence[str]) -> tuple[str, ...]:
     """A line for each rule that fails and is accepted."""
     return tuple(

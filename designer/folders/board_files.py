@@ -49,11 +49,16 @@ def bills(synthesis: Synthesis) -> dict[str, str]:
     return _bills(synthesis, components(circuit, synthesis.catalog, choice), choice)
 
 
+def listed(synthesis: Synthesis) -> tuple[Component, ...]:
+    """Everything of the board and the bill; raises as ``texts`` does."""
+    circuit, choice = board_circuit(synthesis)
+    return components(circuit, synthesis.catalog, choice)
+
+
 def bought(synthesis: Synthesis, stock: Sequence[StockRow] = ()) -> tuple[Line, ...]:
     """The lines of the bill; raises as ``texts`` does. stock : a list before the catalogue's."""
-    circuit, choice = board_circuit(synthesis)
-    parts = to_buy(components(circuit, synthesis.catalog, choice), choice)
-    return bill(parts, (*stock, *synthesis.catalog.stock))
+    _, choice = board_circuit(synthesis)
+    return bill(to_buy(listed(synthesis), choice), (*stock, *synthesis.catalog.stock))
 
 
 def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:

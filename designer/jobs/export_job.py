@@ -1,20 +1,21 @@
 """The KiCad project of a design, decks, or what a fab is sent.
 
-All are stages of the design folder: a stage for each deck, so that one may come later, and one for
-the orders to all fabs, which grows.
+All are stages of the design folder: one for each deck and for each order, so that one may come
+later and another stays.
 """
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN, Folder
+from designer.base.design_folder import DESIGN
 from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
-from designer.base.manifest import StageName, Stages
+from designer.base.manifest import ORDERS, OrderStage, StageName, Stages
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
@@ -28,11 +29,12 @@ from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules.kicad_program import KicadFailed, needed_version
-from designer.fabrication.order import BoardOrder, order_files
+from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
 from designer.fabrication.order_refusal import (
     accepted_failures,
     check_accepted,
     not_checked,
+    read_back,
     refusals,
 )
 from designer.folders import board_files, kicad_files
@@ -50,9 +52,6 @@ DECK_STAGES: Mapping[Dialect, StageName] = {
     "ltspice": "deck-ltspice",
     "portable": "deck-portable",
 }
-ORDER_STAGE: StageName = "fabrication"
-ORDERS = "fabrication"
-"""Folder of what fabs are sent, one folder in it for each."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +189,8 @@ def export_orders(
 ) -> ExportResult:
     """Write what fabs are sent into a design folder, which is made where there is none.
 
-    An order that the rules forbid is refused: nothing is written, and the answer says why.
+    An order that the rules forbid, or whose files do not make the circuit, is refused: nothing is
+    written, and the answer says why.
     """
     try:
         version = needed_version()
@@ -206,29 +206,46 @@ def export_orders(
     inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
     inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
     inputs["accepted"] = ", ".join(sorted(asked.accepted))
-    inputs["fabs"] = _fabs_with_earlier(folder, inputs, names)
     # What stands in the way is known before any work.
-    wanted: Stages = {ORDER_STAGE: (inputs, [])}
-    if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
+    wanted: Stages = {OrderStage.of(name): (dict(inputs), []) for name in names}
+    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
+    if not todo:
         return _ordered(runner, names, True)
+    makers = [name for name in names if OrderStage.of(name) in todo]
     progress.stage("design rules")
-    outcomes = checked(synthesis, board, inputs["fabs"]).outcomes
+    outcomes = checked(synthesis, board, makers).outcomes
     if reasons := refusals(outcomes, asked.accepted):
-        answer = _result(runner, [], False).answer
-        refused = {**answer, "fabs": list(names), "refused": list(reasons)}
-        return ExportResult(refused, folder.path, False)
-    progress.stage("Gerbers, holes, positions")
-    name = project_name(modelfile.title)
-    bought = board_files.bought(synthesis, stock)
-    accepted = accepted_failures(outcomes, asked.accepted)
-    order = BoardOrder(name, modelfile.title, board, bought, not_checked(outcomes), accepted)
-    files = _order_texts(order, fabs(inputs["fabs"], runner.catalog.folders), runner)
-    stages: Stages = {ORDER_STAGE: (inputs, list(files))}
+        return _refused(runner, names, reasons)
+    progress.stage("Gerbers, holes, positions, read back")
+    order = BoardOrder(
+        name=project_name(modelfile.title),
+        title=modelfile.title,
+        board=board,
+        components=board_files.listed(synthesis),
+        bought=board_files.bought(synthesis, stock),
+        not_checked=not_checked(outcomes),
+        accepted=accepted_failures(outcomes, asked.accepted),
+    )
+    try:
+        files = {
+            OrderStage.of(fab.name): _order_texts(order, fab, runner)
+            for fab in fabs(makers, runner.catalog.folders)
+        }
+    except FaultyOrder as why:
+        return _refused(runner, names, read_back(why.faults))
+    stages: Stages = {stage: (dict(inputs), list(texts)) for stage, texts in files.items()}
     folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     with folder.working(stages, design_provenance(synthesis)):
-        for path, content in files.items():
+        for path, content in ChainMap(*files.values()).items():
             folder.write(path, content)
     return _ordered(runner, names, False)
+
+
+def _refused(runner: StageRunner, names: Sequence[str], reasons: Sequence[str]) -> ExportResult:
+    """The answer of an order that is not written."""
+    answer = _result(runner, [], False).answer
+    refused = {**answer, "fabs": list(names), "refused": list(reasons)}
+    return ExportResult(refused, runner.folder.path, False)
 
 
 def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardFile:
@@ -240,28 +257,15 @@ def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardF
     return read_board(own if file is None else file)
 
 
-def _fabs_with_earlier(
-    folder: Folder, inputs: Mapping[str, Any], names: Sequence[str]
-) -> list[str]:
-    """These fabs, with those that the same board stands there for already."""
-    stages = {} if folder.manifest is None else folder.manifest.stages
-    there = dict(stages[ORDER_STAGE].inputs) if ORDER_STAGE in stages else {}
-    earlier = there.pop("fabs", [])
-    return sorted({*names, *(earlier if there == inputs else [])})
-
-
-def _order_texts(order: BoardOrder, wanted: Sequence[Fab], runner: StageRunner) -> dict[str, bytes]:
-    """Every file of the orders, by its name inside the design folder."""
-    files: dict[str, bytes] = {}
-    for fab in wanted:
-        (layout,) = layouts([fab.table.bom], runner.catalog.folders)
-        try:
-            limits = fab_limits([fab.name], runner.catalog.folders)
-            content = order_files(order, fab, layout, limits)
-        except KicadFailed as why:
-            raise EnvironmentMissing(str(why)) from None
-        files |= {f"{ORDERS}/{fab.name}/{name}": text for name, text in content.items()}
-    return files
+def _order_texts(order: BoardOrder, fab: Fab, runner: StageRunner) -> dict[str, bytes]:
+    """Every file of an order, by its name inside the design folder."""
+    (layout,) = layouts([fab.table.bom], runner.catalog.folders)
+    try:
+        limits = fab_limits([fab.name], runner.catalog.folders)
+        content = order_files(order, fab, layout, limits)
+    except KicadFailed as why:
+        raise EnvironmentMissing(str(why)) from None
+    return {f"{ORDERS}/{fab.name}/{name}": text for name, text in content.items()}
 
 
 def _ordered(runner: StageRunner, names: Sequence[str], reused: bool) -> ExportResult:

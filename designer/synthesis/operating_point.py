@@ -13,7 +13,7 @@ output is asked to follow; a real op-amp crosses at its own pace.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from designer.base.second_process import Ask
 from designer.catalog.design_rules import BY_ID
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.feedback_loops import feedback_share
-from designer.circuit.netlist import GROUND, Circuit
+from designer.circuit.netlist import GROUND, Circuit, Reference
 from designer.circuit.nodal import Solution
 from designer.circuit.reduction import Reduction
 from designer.dynamics.piecewise_linear import ModeKey
@@ -64,6 +64,8 @@ class Operating:
     """Power of each resistor, the mean over a run [W]."""
     source: dict[str, Peak] = field(default_factory=dict)
     """Largest current out of each section's output [A]."""
+    reference: dict[str, Peak] = field(default_factory=dict)
+    """Least current through each shunt reference, as its negative [A]."""
     runs: list[str] = field(default_factory=list)
     """Names of the runs."""
     left_out: dict[str, str] = field(default_factory=dict)
@@ -153,6 +155,9 @@ def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str, *, speed:
     for c in circuit.capacitors:
         volts = at[c.plus] - at[c.minus]
         _raise_peaks(out.across, [(c.name, Peak(float(np.abs(volts).max()), run))])
+    for reference in circuit.references:
+        out_of = _into(reference, circuit, at)
+        _raise_peaks(out.reference, [(reference.name, Peak(float(-out_of.min()), run))])
     sections = circuit.sections
     current = _values(sampled, lambda s: np.array([s.output[a.name] for a in sections]))
     for i, section in enumerate(sections):
@@ -162,6 +167,20 @@ def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str, *, speed:
     slope = _rates(sampled, lambda s: np.array([s.voltage[a.output] for a in sections]), circuit)
     for i, section in enumerate(sections):
         _raise_peaks(out.slew, [(section.name, Peak(float(np.abs(slope[:, i]).max()), run))])
+
+
+def _into(reference: Reference, circuit: Circuit, at: Mapping[str, Array]) -> Array:
+    """Current from cathode to anode of a reference [A], where resistors alone join the net that it
+    holds. at : voltages of the nets."""
+    held, sign = (
+        (reference.anode, -1.0) if reference.cathode == GROUND else (reference.cathode, 1.0)
+    )
+    total = np.zeros_like(at[held])
+    for r in circuit.resistors:
+        if held in (r.a, r.b):
+            other = r.b if r.a == held else r.a
+            total += (at[other] - at[held]) / r.value
+    return sign * total
 
 
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:

@@ -31,7 +31,8 @@ def looked(folder: Path, item: str = "", text: str | None = None) -> dict[str, R
     whole = drawn() if text is None else text
     board = board_of(whole.rstrip()[:-1] + item + ")", folder)
     found = on_board.on_board(board, base().components, custom(), {}, "not asked", generic())
-    return {id_: outcome for id_, outcome in by_id(found).items() if id_ in on_fab.READ}
+    own = {*on_fab.READ, *on_board.MEASURED}
+    return {id_: outcome for id_, outcome in by_id(found).items() if id_ in own}
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,8 @@ def test_thickness_and_layers_are_those_of_the_file(tmp_path: Path) -> None:
 
 def test_a_board_without_tracks_has_none_to_judge(tmp_path: Path) -> None:
     found = looked(tmp_path)
-    assert {name for name, one in found.items() if one.status == NOT_RUN} == {"fab-track"}
+    not_run = {name for name, one in found.items() if one.status == NOT_RUN}
+    assert not_run == {"fab-track", "board-layers"}
     assert {one.status for one in found.values()} == {NOT_RUN, PASS}
     assert "no slot" in found["fab-slot"].found
 
@@ -100,3 +102,29 @@ def test_of_several_fabs_the_narrowest_limit_holds(tmp_path: Path) -> None:
         with pytest.raises(InputError) as error:
             fab_limits(["own"], folders)
         assert field in str(error.value)
+
+
+def test_a_board_of_another_thickness_than_the_design_s_is_caught(tmp_path: Path) -> None:
+    for millimetres, status in ((0.8, FAIL), (1.6, PASS)):
+        text = drawn().replace("(thickness 1.6)", f"(thickness {millimetres})")
+        assert looked(tmp_path, text=text)["board-thickness"].status == status
+
+
+def test_a_layer_that_nothing_lies_on_is_caught(tmp_path: Path) -> None:
+    """A pad through the board is on every layer, and is no copper of a layer's own."""
+    inner = drawn().replace('(0 "F.Cu" signal)', '(0 "F.Cu" signal) (4 "In1.Cu" signal)')
+    both = TRACK.format(0.3) + TRACK.format(0.3).replace("F.Cu", "B.Cu")
+    found = looked(tmp_path, both, inner)["board-layers"]
+    assert found.status == FAIL
+    assert "In1.Cu" in found.found
+    third = both + TRACK.format(0.3).replace("F.Cu", "In1.Cu")
+    assert looked(tmp_path, third, inner)["board-layers"].status == PASS
+
+
+def test_a_missing_hole_for_a_screw_is_caught(tmp_path: Path) -> None:
+    assert looked(tmp_path)["mounting-holes"].status == PASS
+    small = drawn().replace("(drill 3.2)", "(drill 2.4)", 1)
+    assert small != drawn()
+    found = looked(tmp_path, text=small)["mounting-holes"]
+    assert found.status == FAIL
+    assert found.value == 3

@@ -51,11 +51,14 @@ BY_KICAD = (
 BY_REPORT = ("unconnected", "short-circuit", "kicad-errors", "schematic-parity")
 """Rules that KiCad's check says by itself: the pairs stand in
 tests/design_rules/test_rules_copper.py and tests/design_rules/test_kicad_errors.py."""
-OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted")
+OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted", "pin-hole")
 """Rules on the parts: the pairs stand in tests/design_rules/test_rules_parts.py."""
+OF_FIGURES = ("mounting-holes", "board-thickness", "board-layers")
+"""Rules on figures of the board: the pairs stand in tests/design_rules/test_on_fab.py."""
 BY_FAB = tuple(on_fab.READ)
 """Rules by what a fab makes: the pairs stand in tests/design_rules/test_on_fab.py."""
-BY_READING = ("decoupling-distance", "summing-span", "board-outline", *OF_PARTS, *BY_FAB)
+ON_PLACES = ("decoupling-distance", "summing-span", "board-outline")
+BY_READING = (*ON_PLACES, *OF_PARTS, *OF_FIGURES, *BY_FAB)
 NOTHING: Mapping[str, int] = {}
 
 
@@ -602,7 +605,7 @@ def test_without_kicad_only_what_is_read_is_run(
         assert of_board[id_].status == NOT_RUN
         assert "not installed" in of_board[id_].found
     not_read = {id_ for id_ in BY_READING if of_board[id_].status != PASS}
-    assert not_read == {"fab-track"}  # the board has no track yet
+    assert not_read == {"fab-track", "board-layers"}  # the board has no track yet
 
 
 def program(folder: Path, script: str) -> None:

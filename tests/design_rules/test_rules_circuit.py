@@ -16,13 +16,14 @@ from designer.catalog.fields import Figure
 from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
+from designer.circuit.nodal import NodalEquations
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
 from designer.synthesis import output_loads
-from designer.synthesis.operating_point import operating, stuck
+from designer.synthesis.operating_point import _into, operating, stuck
 from designer.synthesis.output_loads import Run
 from designer.synthesis.side_conditions import guaranteed_swing
 from designer.synthesis.static_shifts import Statics, forces, leftovers, thermal
@@ -79,7 +80,8 @@ def test_every_rule_can_look_at_every_kind_of_design(kind: Kind, sides: Sides, f
     circuit = stage(kind, sides, bought({"R12": values["R6"], **values}), f20=f20)
     subject = subject_of(circuit, model(sides, f20), ANY + UNTRIMMED)
     found = {o.rule.id: o for o in run_rules.on_circuit(subject, {})}
-    assert {i: o.found for i, o in found.items() if o.status == NOT_RUN} == {}
+    without = set() if circuit.references else {"reference-current"}
+    assert {i for i, o in found.items() if o.status == NOT_RUN} == without
     nets = ("drivers", "floating-input", "single-pin", "references", "supply-pins", "decoupling")
     assert {found[id_].status for id_ in (*nets, "feedback")} == {PASS}
     # The thresholds of the saturating stages here are 0.06 V and 0.6 V: they drown in offsets.
@@ -481,3 +483,18 @@ def test_a_net_s_drivers_are_counted_with_the_rails() -> None:
     short = rule_cases.rewired({("U1", "1"): "vcc"})
     found = list(on_nets.drivers(short))
     assert max(found, key=lambda f: f.value).where == "vcc"
+
+
+def test_the_current_of_a_reference_is_that_of_the_nodal_equations() -> None:
+    """There it is an unknown of its own; the rule adds up what resistors bring to its net."""
+    circuit = base().circuit
+    equations = NodalEquations(circuit, nominal_board(circuit))
+    y = np.linalg.solve(*equations.of(circuit.open))
+    first = len(circuit.nets) + sum(
+        map(len, (circuit.capacitors, circuit.sections, circuit.diodes))
+    )
+    inputs = np.random.default_rng(1).normal(size=(5, y.shape[1]))
+    at = {net: inputs @ y[i] for i, net in enumerate(circuit.nets)} | {GROUND: np.zeros(5)}
+    for i, reference in enumerate(circuit.references):
+        assert _into(reference, circuit, at) == pytest.approx(inputs @ y[first + i], rel=1e-6)
+    assert circuit.references

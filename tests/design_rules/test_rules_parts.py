@@ -195,3 +195,16 @@ def test_many_differences_are_counted_and_the_first_are_named(tmp_path: Path) ->
     assert smd - already > 5
     assert found.value == smd - already
     assert found.found.endswith(f"and {smd - already - 5} more")
+
+
+def test_a_hole_that_a_square_pin_does_not_go_through_is_caught(tmp_path: Path) -> None:
+    """A pin of 0.64 mm has a diagonal of 0.91 mm, and a hole comes out up to 0.08 mm too small."""
+    as_exported = looked(drawn(), tmp_path)["pin-hole"]
+    assert as_exported.status == PASS
+    narrow = changed("J1", lambda t: t.replace("(drill 1)", "(drill 0.98)", 1))
+    found = looked(narrow, tmp_path)["pin-hole"]
+    assert found.status == FAIL
+    assert found.where == "J1.1"
+    assert found.value == pytest.approx(0.98 - 0.91)
+    just = changed("J1", lambda t: t.replace("(drill 1)", "(drill 0.99)", 1))
+    assert looked(just, tmp_path)["pin-hole"].status == PASS

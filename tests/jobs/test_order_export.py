@@ -26,6 +26,21 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "design"
 
 
+@pytest.fixture(scope="module")
+def routed(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with its board routed."""
+    folder = tmp_path_factory.mktemp("routed") / "design"
+    shutil.copytree(made, folder)
+    assert designer("export", folder, "--routed").returncode == 0
+    return folder
+
+
+@pytest.fixture
+def own(routed: Path, tmp_path: Path) -> Path:
+    """A copy of it that is a test's own."""
+    return Path(shutil.copytree(routed, tmp_path / "design"))
+
+
 def finished(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every rule pass, as on a routed board, but for one that nobody can check here."""
     outcomes = tuple(
@@ -51,51 +66,76 @@ def test_an_unrouted_board_is_not_ordered(made: Path) -> None:
 
 
 @pytest.mark.kicad
-def test_orders_are_written_once_and_grow_by_a_fab(
-    made: Path, monkeypatch: pytest.MonkeyPatch
+def test_orders_are_written_once_each_in_a_stage_of_its_own(
+    own: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     finished(monkeypatch)
-    done = ordered(made, "--fab", "jlcpcb")
+    done = ordered(own, "--fab", "jlcpcb")
     assert done.returncode == 0, done.stderr
     first = json.loads(done.stdout)["files"]
     names = {name.removeprefix("fabrication/jlcpcb/") for name in first}
     assert names >= {"README.md", "SHA256SUMS", "linear-pair-gerbers.zip", "linear-pair-bom.csv",
                      "linear-pair-positions.csv", "gerbers/linear-pair-F_Cu.gtl"}  # fmt: skip
-    before = snapshot(made)
+    assert "without an open or a short" in (own / "fabrication/jlcpcb/README.md").read_text()
+    before = snapshot(own)
     monkeypatch.setattr(export_job, "checked", None)  # nothing is checked or plotted again
-    assert json.loads(ordered(made, "--fab", "jlcpcb").stdout)["files"] == first
-    assert snapshot(made) == before
+    assert json.loads(ordered(own, "--fab", "jlcpcb").stdout)["files"] == first
+    assert snapshot(own) == before
     finished(monkeypatch)
-    done = ordered(made, "--fab", "generic")
+    done = ordered(own, "--fab", "generic")
     assert done.returncode == 0, done.stderr
     assert all(n.startswith("fabrication/generic/") for n in json.loads(done.stdout)["files"])
-    manifest = json.loads((made / "manifest.json").read_text())
-    assert manifest["stages"]["fabrication"]["inputs"]["fabs"] == ["generic", "jlcpcb"]
-    listed = {n for n, f in manifest["files"].items() if f["stage"] == "fabrication"}
-    assert listed == {
-        str(p.relative_to(made)) for p in (made / "fabrication").rglob("*") if p.is_file()
+    manifest = json.loads((own / "manifest.json").read_text())
+    stages = {name: f["stage"] for name, f in manifest["files"].items() if "fabrication" in name}
+    assert stages == {
+        str(p.relative_to(own)): f"fabrication/{p.relative_to(own).parts[1]}"
+        for p in (own / "fabrication").rglob("*")
+        if p.is_file()
     }
-    assert {n: c for n, c in snapshot(made).items() if "jlcpcb/" in n} == {
+    assert {n: c for n, c in snapshot(own).items() if "jlcpcb/" in n} == {
         n: c for n, c in before.items() if "jlcpcb/" in n
     }
 
 
 @pytest.mark.kicad
-def test_another_board_is_ordered_with_overwrite_alone(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_another_board_is_ordered_with_overwrite_alone_and_other_orders_stay(
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     finished(monkeypatch)
-    assert ordered(made, "--fab", "jlcpcb", "--fab", "generic").returncode == 0
-    own = made / "kicad" / "linear-pair.kicad_pcb"
+    assert ordered(own, "--fab", "jlcpcb", "--fab", "generic").returncode == 0
+    kept = {n: c for n, c in snapshot(own).items() if "jlcpcb/" in n}
+    assert kept
     moved = tmp_path / "mine.kicad_pcb"
-    moved.write_bytes(own.read_bytes() + b"\n")
-    done = ordered(made, "--fab", "generic", "--board", moved)
+    moved.write_bytes((own / "kicad" / "linear-pair.kicad_pcb").read_bytes() + b"\n")
+    done = ordered(own, "--fab", "generic", "--board", moved)
     assert done.returncode == 2
     assert "--overwrite" in done.stderr
-    done = ordered(made, "--fab", "generic", "--board", moved, "--overwrite")
+    done = ordered(own, "--fab", "generic", "--board", moved, "--overwrite")
     assert done.returncode == 0, done.stderr
-    assert not (made / "fabrication" / "jlcpcb").exists(), "an order of another board"
-    assert (made / "fabrication" / "generic" / "README.md").is_file()
+    assert {n: c for n, c in snapshot(own).items() if "jlcpcb/" in n} == kept
+    assert (own / "fabrication" / "generic" / "README.md").is_file()
+
+
+@pytest.mark.kicad
+def test_orders_in_the_one_stage_of_earlier_versions_are_read_as_one_each(
+    own: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Version 1 of the folder had one stage for all orders, with the names of the fabs."""
+    finished(monkeypatch)
+    first = json.loads(ordered(own, "--fab", "jlcpcb", "--fab", "generic").stdout)
+    file = own / "manifest.json"
+    manifest = json.loads(file.read_text())
+    entries = [manifest["stages"].pop(f"fabrication/{name}") for name in ("generic", "jlcpcb")]
+    assert entries[0]["inputs"] == entries[1]["inputs"]
+    inputs = {**entries[0]["inputs"], "fabs": ["generic", "jlcpcb"]}
+    manifest["stages"]["fabrication"] = {**entries[0], "inputs": inputs}
+    for each in manifest["files"].values():
+        each["stage"] = each["stage"].partition("/")[0]
+    file.write_text(json.dumps(manifest))
+    monkeypatch.setattr(export_job, "checked", None)
+    again = ordered(own, "--fab", "jlcpcb", "--fab", "generic")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout) == first
 
 
 def test_without_kicad_nothing_begins(
@@ -132,18 +172,14 @@ def test_wrong_options_are_named(made: Path, options: list[str], told: str) -> N
 
 @pytest.mark.kicad
 @pytest.mark.slow
-def test_a_routed_board_is_ordered_under_its_own_rules(made: Path, tmp_path: Path) -> None:
+def test_a_routed_board_is_ordered_under_its_own_rules(own: Path) -> None:
     """Offsets disturb this system more than its rule allows: refused until that is accepted."""
-    folder = tmp_path / "design"
-    shutil.copytree(made, folder)
-    shutil.rmtree(folder / "fabrication", ignore_errors=True)
-    assert designer("export", folder, "--routed", "--overwrite").returncode == 0
-    # The folder may have an order of the board as it was before.
-    refused = ordered(folder, "--fab", "jlcpcb", "--overwrite")
+    folder = own
+    refused = ordered(folder, "--fab", "jlcpcb")
     assert refused.returncode == 1, refused.stderr
     (reason,) = json.loads(refused.stdout)["refused"]
     assert reason.startswith("offset-force: ")
-    done = ordered(folder, "--fab", "jlcpcb", "--accept", "offset-force", "--overwrite")
+    done = ordered(folder, "--fab", "jlcpcb", "--accept", "offset-force")
     assert done.returncode == 0, done.stderr
     place = folder / "fabrication" / "jlcpcb"
     assert "Accepted, though the rule fails: offset-force" in (place / "README.md").read_text()
@@ -155,25 +191,25 @@ def test_a_routed_board_is_ordered_under_its_own_rules(made: Path, tmp_path: Pat
 @pytest.mark.kicad
 @pytest.mark.parametrize("edge", ["no edge", "an edge that is not closed"])
 def test_a_board_without_an_edge_is_refused(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edge: str
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edge: str
 ) -> None:
     """Nobody can mill it, whatever the rules are told to accept; nothing is written."""
     finished(monkeypatch)
-    (path,) = (made / "kicad").glob("*.kicad_pcb")
+    (path,) = (own / "kicad").glob("*.kicad_pcb")
     board = read(path.read_text("utf-8"))
     inner = [each for each in board.items if not (isinstance(each, Expression) and on_edge(each))]
     if edge != "no edge":
         inner.append(expression("gr_line", start=(0, 0), end=(9, 9), layer="Edge.Cuts"))
     bare = tmp_path / "bare.kicad_pcb"
     bare.write_text(expression_text(Expression(tuple(inner))), encoding="utf-8")
-    before = snapshot(made)
+    before = snapshot(own)
     words = ("--fab", "generic", "--board", bare, "--overwrite", "--accept", "board-outline")
-    done = ordered(made, *words)
+    done = ordered(own, *words)
     assert done.returncode == 2
     assert done.stdout == ""
     assert "bare.kicad_pcb: Edge.Cuts" in done.stderr
     assert edge in done.stderr
-    assert snapshot(made) == before
+    assert snapshot(own) == before
 
 
 def on_edge(item: Expression) -> bool:

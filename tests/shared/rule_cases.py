@@ -21,7 +21,14 @@ from designer.catalog.fields import Figure
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
-from designer.circuit.netlist import GROUND, Capacitor, Circuit, Resistor, Section
+from designer.circuit.netlist import (
+    GROUND,
+    Capacitor,
+    Circuit,
+    Reference,
+    Resistor,
+    Section,
+)
 from designer.design_rules import run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.model.find_responses import find
@@ -181,6 +188,17 @@ def _farads(reference: str, farads: float) -> RuleSubject:
     return with_components(lambda c: replace(c, quantity=farads) if c.reference == reference else c)
 
 
+def _needing(times: float) -> RuleSubject:
+    """The same with references that need so many times the current that they do."""
+    circuit = base().circuit
+    parts = tuple(
+        replace(p, least=times * p.least) if isinstance(p, Reference) else p for p in circuit.parts
+    )
+    changed = with_circuit(replace(circuit, parts=parts))
+    changed.__dict__.update({n: v for n, v in vars(base()).items() if n in OF_THE_CIRCUIT})
+    return changed
+
+
 def _on_v1(ohms: float) -> RuleSubject:
     """A resistor from v1 to ground, so that what v1 carries is this load in all [Ω]."""
     carried = next(
@@ -315,6 +333,15 @@ PAIRS: dict[str, tuple[Look, Look]] = {
     "common-mode": (
         lambda: look("common-mode", _common_mode(0.999)),
         lambda: look("common-mode", _common_mode(1.001)),
+    ),
+    "bulk": (
+        # At 15 V of 25 V the bulk keeps 52 %, over three packages' 100 nF at a rail.
+        lambda: look("bulk", _farads("C901", 1.999 * 300e-9 / 0.52)),
+        lambda: look("bulk", _farads("C901", 2.001 * 300e-9 / 0.52)),
+    ),
+    "reference-current": (
+        lambda: look("reference-current", _needing(1.001 * value("reference-current"))),
+        lambda: look("reference-current", _needing(0.999 * value("reference-current"))),
     ),
     "slew": (
         lambda: look("slew", with_figure("slew", min=8e6 * value("slew") / 0.201)),
