@@ -1,6 +1,6 @@
 """A KiCad board as the rules read it: what stands where, what is on which net, what is routed.
 
-A board file is foreign input: what is not as KiCad 9 writes it is refused with its place.
+A board file is foreign input: what is not as KiCad 9 or 10 writes it is refused with its place.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from designer.base.guarded_reading import read_bytes, reading
 from designer.base.natural_sort import natural_key
 from designer.base.views import View
 from designer.board.component import Component
-from designer.board.kicad_names import BOARD_VERSION, circuit_net
+from designer.board.kicad_names import circuit_net
+from designer.board.net_codes import with_codes
 from designer.board.outline import Outline, circle, pen_path, read_outline
 from designer.board.sexpr import Expression, read
 
-OLDEST, NEWEST = 20221018, BOARD_VERSION
-"""Versions of board files that are read: KiCad 7 to 9."""
+OLDEST, NEWEST = 20221018, 20260206
+"""Versions of board files that are read: KiCad 7 to 10."""
 LARGEST = 30_000_000
 """Bytes of a board file; one of 60 parts, routed and with its pours, has 830,000."""
 MOST_LAID, MOST_CORNERS = 20_000, 3000
@@ -36,7 +37,7 @@ EXCLUDED = {"exclude_from_pos_files": "the position file", "exclude_from_bom": "
 """KiCad's marks of a footprint that a file leaves out, and that file."""
 PART_NUMBER = "MPN"
 """The field that has a part's number, on the sheet and on the board."""
-EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
+EXPECTED = "a board of KiCad 7 to 10 (.kicad_pcb)"
 Point = tuple[float, float]
 
 
@@ -127,19 +128,20 @@ def read_board(path: Path) -> BoardFile:
 
     Raises
     ------
-    InputError : it cannot be read, is cut off, is no board, or is newer than KiCad 9.
+    InputError : it cannot be read, is cut off, is no board, or is newer than KiCad 10.
     """
     content = read_bytes(path, f"{EXPECTED}, up to {LARGEST} bytes", "--board", LARGEST)
     with reading(path, EXPECTED, "--board"):
         text = content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     with reading(path, EXPECTED):
-        return _board(read(text, path), text, path)
+        tree = read(text, path)
+        if tree.name != "kicad_pcb":
+            raise InputError(path, "--board", f"({tree.name[:40]} …)", EXPECTED)
+        _check_version(tree)
+        return _board(with_codes(tree), text, path)
 
 
 def _board(board: Expression, text: str, path: Path) -> BoardFile:
-    if board.name != "kicad_pcb":
-        raise InputError(path, "--board", f"({board.name[:40]} …)", EXPECTED)
-    _check_version(board)
     _check_size(board)
     names = {net.text(0): net.text(1) for net in board.all("net")}
     return BoardFile(
@@ -204,7 +206,7 @@ def _check_version(board: Expression) -> None:
         raise board.get("version").error(text, "the number of a file version")
     version, file = int(text), board.source.file
     if version > NEWEST:
-        expected = f"at most {NEWEST}, KiCad 9: this board is from a newer one"
+        expected = f"at most {NEWEST}, KiCad 10: this board is from a newer one"
         raise InputError(file, "version", text, expected)
     if version < OLDEST:
         expected = f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"

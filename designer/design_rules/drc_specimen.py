@@ -61,7 +61,7 @@ def specimen(rules: Sequence[CustomRule], *, breaking: bool) -> str:
 
 def canary_track(x: float, y: float) -> Expression:
     """A short thin track on no net, for a place where nothing else is."""
-    return _segment((x, y), (x + 1.0, y), CANARY_WIDTH, 0)
+    return _segment((x, y), (x + 1.0, y), CANARY_WIDTH, None)
 
 
 def _size(rule: CustomRule, breaking: bool) -> float:
@@ -108,7 +108,7 @@ def _short(at: Point, nets: list[str]) -> Iterator[Expression]:
     yield _segment((x, y), (x + 5.0 * PAD, y), TRACK, nets.index(_B))
 
 
-def _segment(start: Point, end: Point, width: float, net: int) -> Expression:
+def _segment(start: Point, end: Point, width: float, net: int | None) -> Expression:
     return expression(
         "segment",
         start=start,

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 PROGRAM = "kicad-cli"
-MISSING = "kicad-cli is not installed (KiCad 9)"
+MISSING = "kicad-cli is not installed (KiCad 9 or newer)"
 NEEDED = 9
 """KiCad's major version: older ones write another report and lack options."""
 PATIENCE = 600.0

@@ -11,6 +11,7 @@ from pathlib import Path
 from designer.base.arrays import Array
 from designer.board.kicad_names import circuit_net, identifier
 from designer.board.kicad_rules import CustomRule
+from designer.board.net_codes import names_nets, with_codes, without_codes
 from designer.board.sexpr import Expression, expression, expression_text, lists, read, word
 from designer.circuit.netlist import Circuit
 from designer.routing.board_copper import (
@@ -66,7 +67,8 @@ def route_board(
     InputError : the board has no closed edge, is too large, or has a pad of a shape that is not
         read.
     """
-    board = read(text, file)
+    whole = read(text, file)
+    board = with_codes(whole)
     board = Expression(tuple(item for item in board.items if not _ours(item)), board.source)
     copper = read_copper(board)
     kinds = net_kinds(rules)
@@ -86,7 +88,7 @@ def route_board(
         routed, pours, _ = _poured(board, items, kinds, of)
     poured = Expression((*routed.items, *pours), board.source)
     return RoutedBoard(
-        expression_text(poured),
+        expression_text(without_codes(poured) if names_nets(whole) else poured),
         {circuit_net(copper.nets[net]): count for net, count in sorted(routes.open.items())},
         lengths,
         sum(item.name == "via" for item in items),

@@ -23,6 +23,7 @@ from designer.base.version import __version__
 from designer.board.kicad_reader import TRACKS, BoardFile, PlacedPad
 from designer.board.kicad_rules import CustomRule
 from designer.board.net_classes import DEFAULT, VIA
+from designer.board.net_codes import names_nets, with_codes, without_codes
 from designer.board.sexpr import (
     Expression,
     expression,
@@ -89,7 +90,7 @@ def design_text(board: BoardFile, name: str, circuit: Circuit, rules: Sequence[C
     InputError : the board has no closed edge, several separate ones, or a pad of a shape that is
         not read.
     """
-    source = read(board.text, board.path)
+    source = with_codes(read(board.text, board.path))
     copper = read_copper(source)
     if (outlines := len(shapely.get_parts(copper.area))) != 1:
         raise source.error(f"{outlines} separate outlines", "one, which Specctra's format has")
@@ -123,7 +124,8 @@ def with_session(text: str, session: Path) -> str:
     ------
     InputError : no session, or one of another board: it has nets or layers that this has not.
     """
-    board = read(text)
+    whole = read(text)
+    board = with_codes(whole)
     numbers = {net.text(1): int(net.number(0)) for net in board.all("net")}
     content = read_bytes(session, f"{EXPECTED}, up to {LARGEST} bytes", "--session", LARGEST)
     with reading(session, EXPECTED, "--session"):
@@ -134,7 +136,8 @@ def with_session(text: str, session: Path) -> str:
         items = list(_routed(routes.get("routes"), numbers))
     gone = (*TRACKS, "via")
     rest = [i for i in board.items if not (isinstance(i, Expression) and i.name in gone)]
-    return expression_text(Expression((*rest, *items), board.source))
+    routed = Expression((*rest, *items), board.source)
+    return expression_text(without_codes(routed) if names_nets(whole) else routed)
 
 
 def _pins(board: BoardFile, source: Expression, names: Sequence[str]) -> Iterator[_Pin]:

@@ -57,7 +57,7 @@ def rules(
     *,
     board: Annotated[
         Path | str | None,
-        option("--board", "FILE", "Its board, a .kicad_pcb of KiCad 7 to 9.", Path),
+        option("--board", "FILE", "Its board, a .kicad_pcb of KiCad 7 to 10.", Path),
     ] = None,
     fab: Annotated[
         Sequence[str],

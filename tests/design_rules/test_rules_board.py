@@ -207,7 +207,7 @@ def test_a_mounting_hole_may_be_there_besides(tmp_path: Path) -> None:
 
 
 def test_a_newer_board_and_an_older_one_are_refused(tmp_path: Path) -> None:
-    said = refused(drawn().replace("(version 20241229)", "(version 20260206)"), tmp_path)
+    said = refused(drawn().replace("(version 20241229)", "(version 20260901)"), tmp_path)
     assert said.field == "version"
     assert "from a newer one" in str(said)
     said = refused(drawn().replace("(version 20241229)", "(version 20171130)"), tmp_path)
