@@ -1,4 +1,4 @@
-"""Routing: wire length, vias, time and open items of eleven boards, and what KiCad says of them.
+"""Routing: wire length, vias, time and open items of boards, and what KiCad and their files say.
 
 Designs are made from model files, so boards are those of today's catalogue. Seconds are CPU time of
 this process for the routing alone, pours included.
@@ -29,6 +29,10 @@ from designer.catalog.design_rule import FAIL, NOT_RUN
 from designer.catalog.fab import fab_limits
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board
+from designer.fabrication import kicad_plot
+from designer.fabrication.order_check import check_order
+from designer.fabrication.plotted_copper import plotted
+from designer.folders import board_files
 from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
 from designer.model.model_file import parse_model_file
@@ -81,7 +85,13 @@ BOARDS: dict[str, tuple[Callable[[], str], int]] = {
     "backlash": (lambda: example("backlash"), 2),
     "hammer-base": (lambda: example("hammer-base"), 2),
     "paper, four layers": (lambda: example("paper"), 4),
-}
+    **{
+        name: (lambda name=name: example(name), 2)  # type: ignore[misc]
+        for name in (
+            "three-masses", "duffing-gap", "preloaded", "rig", "shaw-holmes", "aberdeen", "spread",
+        )
+    },
+}  # fmt: skip
 """Model file and copper layers of each board."""
 
 
@@ -107,6 +117,8 @@ class Row:
     """Connections that stay open."""
     failed: tuple[str, ...] | None
     """Rules on boards that fail or are not run; None without KiCad."""
+    faults: tuple[str, ...] | None
+    """What its plotted files say that the circuit does not; None without KiCad."""
 
 
 def measure(name: str, text: str, layers: int, folder: Path) -> tuple[Row, str]:
@@ -135,8 +147,18 @@ def measure(name: str, text: str, layers: int, folder: Path) -> tuple[Row, str]:
         seconds,
         sum(routed.open.values()),
         failed,
+        None if failed is None else read_back(made, folder / "b.kicad_pcb"),
     )
     return row, routed.text
+
+
+def read_back(made: Synthesis, path: Path) -> tuple[str, ...]:
+    """Faults of the files that would be ordered."""
+    board = read_board(path)
+    plots = kicad_plot.plot(board, "board", protel_names=True)
+    listed, bought = board_files.listed(made), board_files.bought(made)
+    files = plotted(plots.gerbers)
+    return check_order(files, plots.positions, board, listed, bought).faults
 
 
 def broken(made: Synthesis, routed: RoutedBoard, folder: Path) -> tuple[str, ...] | None:
@@ -160,15 +182,16 @@ def report(rows: Sequence[Row], seconds: float) -> str:
             row.board, str(row.parts), f"{row.area:.0f}", f"{row.length:.0f}",
             f"{row.summing:.1f}", str(row.vias), f"{row.seconds:.1f}", str(row.open),
             "not asked" if row.failed is None else ", ".join(row.failed) or "all pass",
+            "not asked" if row.faults is None else "; ".join(row.faults) or "as the circuit",
         ]
         for row in rows
     ]  # fmt: skip
     header = [
         "board", "parts", "cm²", "track, mm", "longest summing node, mm", "vias", "CPU s", "open",
-        "rules on the board (KiCad 9)",
+        "rules on the board (KiCad 9)", "plotted files, read back",
     ]  # fmt: skip
     lines = [
-        "# Routing of eleven boards",
+        f"# Routing of {len(rows)} boards",
         "",
         "Made by `python -m benchmarks routing`; the data are in `routing.json`.",
         "",
@@ -177,7 +200,7 @@ def report(rows: Sequence[Row], seconds: float) -> str:
         f"- Took {seconds:.0f} s, the designs included.",
         "",
         "Each board is that of a design from a file of `examples/`, or of the paper's model with",
-        "the one change that its name says; the last one is the paper's on four layers. Each was",
+        "the one change that its name says. Each was",
         "routed twice, to the same bytes; seconds are CPU time of one core for the second time,",
         "pours included. About half of the vias only join the pours.",
         "",

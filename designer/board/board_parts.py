@@ -220,7 +220,10 @@ def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
         if choice.spec.test_points:
             yield TestPoint(f"TP{i}", out, f"probe of {net}")
     if choice.spec.test_points:
-        yield TestPoint(f"TP{len(behind) + 1}", GROUND, "ground of the probes")
+        grounds = [(GROUND, "ground of the probes"), (GROUND, "ground of the probes, again")]
+        rails = [(POSITIVE, "positive rail"), (NEGATIVE, "negative rail")]
+        for number, (net, role) in enumerate((*grounds, *rails), start=len(behind) + 1):
+            yield TestPoint(f"TP{number}", net, role)
     if series := _series(choice):
         for number, (net, out) in enumerate(zip(probed_nets(circuit), behind, strict=True), 3):
             yield Connector(f"J{number}", (out, GROUND), f"output {net}", series)

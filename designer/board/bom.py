@@ -29,6 +29,7 @@ COLUMNS = (
     "price_class",
     "grade",
     "substitute",
+    "assumed",
 )
 KINDS = (
     "resistor",
@@ -71,6 +72,8 @@ class Line:
     """Tolerance, as text."""
     substitute: str = ""
     """Another maker's part number, with the maker in front, or ""."""
+    assumed: str = ""
+    """Figures of the catalogue that no data sheet was compared with, in words."""
     stock: tuple[StockRow, ...] = ()
     """As what distributors sell it, by their lists, in the order of these."""
 
@@ -121,6 +124,7 @@ def _line(alike: Sequence[Component], stock: Sequence[StockRow]) -> Line:
         price_class=bought.price_class,
         grade="" if bought.grade is None else f"{bought.grade:.3g}",
         substitute=bought.substitute,
+        assumed="; ".join(bought.assumed),
         stock=tuple(row for row in stock if row.fits(*part)),
     )
 

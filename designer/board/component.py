@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from designer.base.natural_sort import natural_key
@@ -53,6 +53,8 @@ class Bought:
     """What it is made of, or ""."""
     dc_bias: float | None = None
     """Share of a capacitance that is lost at the rated voltage; None where not known."""
+    assumed: tuple[str, ...] = ()
+    """Figures of the catalogue that no data sheet was compared with, in words."""
     note: str = ""
     """What a buyer has to know beside, or ""."""
 
@@ -266,9 +268,10 @@ class _Lister:
 
     def connector(self, part: Connector) -> Component:
         ways = len(part.ways)
-        sold = self.catalog.header(ways)
+        sold = self.catalog.header(ways, keyed=part.role == SUPPLY)
         bought = Bought(sold.manufacturer, sold.number(ways), rated(sold.rating), sold.price)
-        value, words = f"{ways} ways", f"pin header, {ways} ways"
+        value = f"{ways} ways"
+        words = f"{'keyed ' if sold.keyed else ''}pin header, {ways} ways"
         return self.component(part, "connector", value, sold.place(ways), bought, description=words)
 
     def jack(self, part: Connector) -> Component:
@@ -341,7 +344,13 @@ def _ordered(sold: PartChoice) -> Bought:
         grade=sold.family.grade,
         dielectric=sold.family.dielectric,
         dc_bias=sold.family.dc_bias,
+        assumed=_figures(sold.family.assumed),
     )
+
+
+def _figures(assumed: Sequence[str]) -> tuple[str, ...]:
+    """What is assumed of a part itself: every price is a class."""
+    return tuple(words for words in assumed if not words.startswith("price class"))
 
 
 def _better(grade: float, wanted: float) -> str:

@@ -36,6 +36,9 @@ class PadShape:
     """Whether it is drawn square, as pin 1 of a row of holes is."""
     plated: bool = True
     """Whether it has copper; False for a bare hole."""
+    margin: float = 0.0
+    """How far the mask's opening, which holds no other copper, reaches beyond it [mm]; 0 for as
+    far as the board's own."""
     lead: float = 0.0
     """Largest diameter, or diagonal, of the lead that goes through its hole [mm]; 0 where it is not
     known, and on the surface."""
@@ -71,6 +74,11 @@ class FootprintShape:
     def two_rows(self) -> bool:
         """Whether it is a case with pins on both sides and a notch between them, at pin 1."""
         return len(self.pads) >= 8 and len({pad.x for pad in self.pads}) == 2
+
+    @property
+    def across(self) -> bool:
+        """Whether its pads are one row from left to right."""
+        return len({p.y for p in self.pads}) == 1 < len({p.x for p in self.pads})
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -229,6 +237,14 @@ def _header(name: str, count: str, pitch: str) -> FootprintShape:
     return FootprintShape(name, pads, (step, pins * step), True)
 
 
+def _locked_header(name: str, count: str, pitch: str) -> FootprintShape:
+    """A row of holes for square pins of 0.64 mm, with a lock along it (Molex KK 254, as KiCad has
+    it)."""
+    pins, step = int(count), float(pitch)
+    pads = _row(pins, (step, 0.0), (1.74, 2.19), 1.19, lead=PIN)
+    return FootprintShape(name, pads, (step * pins, 5.8), True)
+
+
 def _square_jack(name: str, case: str) -> FootprintShape | None:
     """The inner conductor in the middle of four legs, which are one pin."""
     if case not in SQUARE_JACKS:
@@ -245,6 +261,14 @@ def _square_jack(name: str, case: str) -> FootprintShape | None:
 def _bare_pad(name: str, diameter: str) -> FootprintShape:
     size = float(diameter)
     return FootprintShape(name, (PadShape("1", 0, 0, size, size),), (0.0, 0.0), soldered=False)
+
+
+def _fiducial(name: str, copper: str, opening: str) -> FootprintShape:
+    """A round mark for the assembler's camera: bare copper, free of copper and mask around it."""
+    size, free = float(copper), float(opening)
+    margin = (free - size) / 2.0
+    pad = PadShape("", 0.0, 0.0, size, size, margin=margin)
+    return FootprintShape(name, (pad,), (free, free), soldered=False)
 
 
 def _mounting_hole(name: str, drill: str) -> FootprintShape:
@@ -344,8 +368,13 @@ _RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
     "CP_Radial_D5.0mm_P2.00mm": (rf"CP?_Radial_D{_N}mm_P{_N}mm", _can),
     "TO-92_Inline": ("TO-92_Inline(_Wide|)", _transistor_outline),
     "PinHeader_1x03_P2.54mm_Vertical": (rf"PinHeader_1x(\d+)_P{_N}mm_Vertical", _header),
+    "Molex_KK-254_AE-6410-03A_1x03_P2.54mm_Vertical": (
+        rf"Molex_KK-254_AE-6410-\d+A_1x(\d+)_P{_N}mm_Vertical",
+        _locked_header,
+    ),
     "SMA_Wurth_60312002114503_Vertical": (r"((?:SMA|BNC)_\w+)_Vertical", _square_jack),
     "TestPoint_Pad_D1.5mm": (rf"TestPoint_Pad_D{_N}mm", _bare_pad),
+    "Fiducial_1mm_Mask2mm": (rf"Fiducial_{_N}mm_Mask{_N}mm", _fiducial),
     "MountingHole_3.2mm_M3": (rf"MountingHole_{_N}mm_M\d+", _mounting_hole),
     "Potentiometer_Bourns_3296W_Vertical": ("Potentiometer_Bourns_3296W_Vertical", _bourns_3296w),
     "Potentiometer_Bourns_3224W_Vertical": ("Potentiometer_Bourns_3224W_Vertical", _bourns_3224w),

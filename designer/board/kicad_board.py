@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
 from designer.base.seal import sha256
@@ -45,6 +46,9 @@ LAYERS = (
 """KiCad 9's numbers of the layers of a board with two sides."""
 THICKNESS = 1.6
 """Of the board [mm]."""
+LINE, LINES, SHORTEST = 1.7, 4, 12
+"""From one line of the title to the next [mm]; how many there is room for; letters of one that are
+written however narrow the board is."""
 
 
 def board(
@@ -97,7 +101,7 @@ def board(
                 nets=nets,
                 names={},
             )
-            for hole in placement.holes
+            for hole in (*placement.holes, *placement.fiducials)
         ),
         *_texts(project, f"{safe_text(title)}  {revision(entries)}", placement),
         expression(
@@ -127,28 +131,47 @@ def revision(entries: Sequence[Entry]) -> str:
 def _texts(project: str, title: str, placement: Placement) -> Iterator[Expression]:
     """The title between the lower screws, and what stands at connectors."""
     box = placement.outline
-    most = int((box.width - 4.0 * SCREW) / LETTER)
-    at = 0.5 * (box.left + box.right), box.bottom - SCREW
-    shown = title if len(title) <= most else f"{title[: most - 11].rstrip()} … {title[-8:]}"
-    yield _text(shown, at, (project, "title"))
+    lines = title_lines(title, placement)
+    middle = 0.5 * (box.left + box.right)
+    for number, line in enumerate(lines):
+        down = (number - (len(lines) - 1) / 2.0) * LINE
+        yield _text(line, (middle, box.bottom - SCREW + down), (project, "title", str(number)))
     for spot in placement.spots:
-        right = spot.courtyard.right + 0.1
+        right, below = spot.courtyard.right + 0.1, spot.courtyard.bottom + 0.1
         for label, pad in zip(spot.pin_labels, spot.footprint.pads, strict=False):
-            name = spot.component.reference
-            place = right, spot.pad(pad.number)[1]
-            yield _text(label, place, (project, name, pad.number), justify="left")
+            x, y = spot.pad(pad.number)
+            ids = project, spot.component.reference, pad.number
+            if spot.footprint.across:
+                yield _text(label, (x, below), ids, justify="right", angle=90)
+            else:
+                yield _text(label, (right, y), ids, justify="left")
         if spot.caption:
-            below = spot.x, spot.courtyard.bottom + 0.25 + TEXT / 2.0
-            yield _text(spot.caption, below, (project, spot.component.reference, "caption"))
+            under = spot.x, spot.courtyard.bottom + 0.25 + TEXT / 2.0
+            yield _text(spot.caption, under, (project, spot.component.reference, "caption"))
+
+
+def title_lines(title: str, placement: Placement) -> list[str]:
+    """The title in as many lines as stand between the lower screws and marks; what is longer than
+    ``LINES`` of them ends in the revision."""
+    most = int((placement.outline.width - 2.0 * placement.beside_title) / LETTER)
+    lines = textwrap.wrap(title, max(most, SHORTEST))
+    if len(lines) > LINES:
+        kept, (*_, revised) = lines[: LINES - 1], title.split()
+        lines = [*kept[:-1], f"{kept[-1][: most - 2].rstrip()} …", revised]
+    return lines
 
 
 def _text(
-    text: str, at: tuple[float, float], ids: tuple[str, ...], justify: str | None = None
+    text: str,
+    at: tuple[float, float],
+    ids: tuple[str, ...],
+    justify: str | None = None,
+    angle: int = 0,
 ) -> Expression:
     return expression(
         "gr_text",
         text,
-        at=(*at, 0),
+        at=(*at, angle),
         layer="F.SilkS",
         uuid=identifier("text", *ids),
         effects={

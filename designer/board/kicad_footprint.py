@@ -308,6 +308,8 @@ def _pad(
         layers=tuple(layers),
         remove_unused_layers=False if hole and pad.plated else None,
         roundrect_rratio=ROUND if form == "roundrect" else None,
+        solder_mask_margin=pad.margin or None,
+        clearance=pad.margin or None,
         net=(nets[net], net) if nets is not None and net else None,
         pinfunction=pin.name if pin is not None and placed else None,
         pintype=pin.electrical if pin is not None and placed else None,

@@ -179,6 +179,8 @@ BAND = 8.0
 SCREW = 4.0
 """From the middle of a mounting hole to both edges [mm]."""
 MOUNTING_HOLE = "MountingHole:MountingHole_3.2mm_M3"
+MARK, FIDUCIAL = 14.0, "Fiducial:Fiducial_1mm_Mask2mm"
+"""From the middle of a mark for the assembler's camera to the side [mm], and its footprint."""
 APART = 2.0
 """Least room between jacks, so that the name below one is not read with the next [mm]."""
 PER_COLUMN = 12
@@ -201,7 +203,9 @@ class Placement:
         """Mounting holes, one at each corner; they are on no sheet and no bill."""
         box = self.outline
         return tuple(
-            PlacedComponent(_hole(f"H{number}"), footprint(MOUNTING_HOLE), x, y, label=label)
+            PlacedComponent(
+                _bare(f"H{number}", MOUNTING_HOLE), footprint(MOUNTING_HOLE), x, y, label=label
+            )
             for number, (y, (x, label)) in enumerate(
                 product(
                     (box.top + SCREW, box.bottom - SCREW),
@@ -210,6 +214,26 @@ class Placement:
                 start=1,
             )
         )
+
+    @property
+    def fiducials(self) -> tuple[PlacedComponent, ...]:
+        """Marks for the assembler's camera beside three of the holes, where a part is soldered on
+        the surface; they are on no sheet and no bill."""
+        on_surface = any(s.footprint.soldered and not s.footprint.through_hole for s in self.spots)
+        box = self.outline
+        if not on_surface or box.width < 3.0 * MARK:
+            return ()
+        top, bottom = box.top + SCREW, box.bottom - SCREW
+        left, right = box.left + MARK, box.right - MARK
+        return tuple(
+            PlacedComponent(_bare(f"FID{number}", FIDUCIAL), footprint(FIDUCIAL), x, y)
+            for number, (x, y) in enumerate(((left, top), (right, top), (left, bottom)), start=1)
+        )
+
+    @property
+    def beside_title(self) -> float:
+        """Room left and right of the title, for screws and marks [mm]."""
+        return MARK + 2.0 if self.fiducials else 2.0 * SCREW
 
 
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
@@ -224,7 +248,7 @@ def _placement(circuit: Circuit, components: tuple[Component, ...]) -> Placement
             c,
             footprint(c.footprint),
             pin_labels=_names_of_pins(c, circuit) if c.kind == "connector" else (),
-            caption=_names_of_pins(c, circuit)[0] if c.kind == "jack" else "",
+            caption=_names_of_pins(c, circuit)[0] if c.kind in ("jack", "test point") else "",
         )
         for c in components
     }
@@ -284,18 +308,20 @@ def _ends(left: float, right: float) -> tuple[tuple[float, Label], tuple[float, 
     return (left, "right"), (right, "left")
 
 
-def _hole(reference: str) -> Component:
+def _bare(reference: str, place: str) -> Component:
+    """What is on the board alone: a hole or a mark."""
+    words = "mounting hole" if place == MOUNTING_HOLE else "fiducial"
     return Component(
         reference=reference,
-        kind="mounting hole",
-        value="M3",
+        kind=words,
+        value="M3" if place == MOUNTING_HOLE else "fiducial",
         quantity=None,
-        footprint=MOUNTING_HOLE,
+        footprint=place,
         pins=(),
-        role="mounting hole",
+        role=words,
         stage=SUPPLY,
         views=View.BOARD,
-        description="mounting hole",
+        description=words,
         bought=None,
     )
 

@@ -36,7 +36,8 @@ class PlacedComponent:
     label: Label = "above"
     """Where its reference stands, as it is seen."""
     pin_labels: tuple[str, ...] = ()
-    """What stands right of its pads, in their order; nothing of most."""
+    """What stands right of its pads, in their order, or upright below those of a row across;
+    nothing of most."""
     caption: str = ""
     """What stands below it; nothing of most."""
 
@@ -64,15 +65,20 @@ class PlacedComponent:
         box, half = self.courtyard, LETTER * len(self.component.reference) / 2.0
         x, y = self.label_at
         below = LETTER * len(self.caption) / 2.0
+        labels = LETTER * max(map(len, self.pin_labels), default=0)
+        across = self.footprint.across
         return PlacedBox(
             min(box.left, self.x + x - half, self.x - below),
             min(box.top, self.y + y - TEXT / 2.0 - 0.15),
             max(
-                box.right + LETTER * max(map(len, self.pin_labels), default=0),
+                box.right + labels * (not across),
                 self.x + x + half,
                 self.x + below,
             ),
-            max(box.bottom + (0.25 + TEXT) * bool(self.caption), self.y + y + TEXT / 2.0),
+            max(
+                box.bottom + (0.25 + TEXT) * bool(self.caption) + labels * across,
+                self.y + y + TEXT / 2.0,
+            ),
         )
 
     def pad(self, number: str) -> tuple[float, float]:

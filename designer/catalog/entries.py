@@ -310,6 +310,8 @@ class Header(BoardEntry):
         str, fields.with_ways('a KiCad footprint with "{ways}" or "{ways:02}" in it')
     ]
     """KiCad's; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
+    keyed: Annotated[bool, flag()] = False
+    """Whether its plug goes in one way alone: the supply's is such a one."""
     assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
     """What could not be compared with a data sheet, in words."""
 

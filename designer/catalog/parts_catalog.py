@@ -251,11 +251,15 @@ class Catalog:
         values = ", ".join(format_quantity(entry.value, "Ω") for entry in self.trimmers)
         raise InputError(None, "trimmer", format_quantity(value, "Ω"), f"one of {values}")
 
-    def header(self, ways: int) -> Header:
-        """The first pin header of so many ways; InputError where there is none."""
-        for entry in self.headers:
-            if entry.ways[0] <= ways <= entry.ways[1]:
-                return entry
+    def header(self, ways: int, keyed: bool = False) -> Header:
+        """The first pin header of so many ways; InputError where there is none.
+
+        keyed : take one whose plug goes in one way alone, where there is one.
+        """
+        for wanted in (keyed, not keyed):
+            for entry in self.headers:
+                if entry.keyed is wanted and entry.ways[0] <= ways <= entry.ways[1]:
+                    return entry
         most = max((entry.ways[1] for entry in self.headers), default=0)
         raise InputError(None, "header", ways, f"a number of ways up to {most}")
 

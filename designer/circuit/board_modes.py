@@ -30,6 +30,11 @@ def first_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
     return tuple(key for key in circuit.working if moved(key) <= 1)
 
 
+SINGULAR, ON_A_GUARD = 1e-12, 1e-9
+"""Determinant of scaled rates below which a mode has no rest point; volts past a guard that are
+rounding."""
+
+
 @dataclass(frozen=True)
 class _SolvedMode:
     """A mode of N boards: (N, n, n + 2) rates of the states, the ways out, (N,) where it exists."""
@@ -217,6 +222,36 @@ def at_rest(boards: Boards, clearance: int = 0) -> tuple[Array, Mapping[int, Arr
             side = equations.sides(way.target)[clearance]
             stops[side] = row[..., n + 1] - side * way.row[..., n + 1]
     return np.where(mode.good, moved, np.nan), stops
+
+
+def resting_voltages(boards: Boards, nets: Sequence[str]) -> Array:
+    """(N, nets) voltages [V] at which each board rests with the generator off, in whichever working
+    mode that is; nan for a board without a rest point in any of them."""
+    circuit = boards.circuit
+    equations, n = _equations(boards), len(circuit.states)
+    out = np.full((len(boards), len(nets)), np.nan)
+    left = np.ones(len(boards), dtype=bool)
+    for key in dict.fromkeys([circuit.rest, circuit.open, *circuit.working]):
+        if not left.any():
+            break
+        mode = _solved(equations, key)
+        regular = mode.good & (np.abs(np.linalg.det(_scaled(mode.rates[..., :n]))) > SINGULAR)
+        A = np.where(regular[:, None, None], mode.rates[..., :n], np.eye(n))
+        x = np.linalg.solve(A, -mode.rates[..., n + 1][..., None])[..., 0]
+        holds = left & regular
+        for way in mode.exits:
+            holds &= (way.row[..., :n] * x).sum(axis=-1) + way.row[..., n + 1] <= ON_A_GUARD
+        rows = np.stack([mode.voltage[net] for net in nets], axis=1)
+        volts = np.einsum("bkn,bn->bk", rows[..., :n], x) + rows[..., n + 1]
+        out[holds] = volts[holds]
+        left &= ~holds
+    return out
+
+
+def _scaled(A: Array) -> Array:
+    """Matrices with rows of length 1, so that a determinant says how near to singular they are."""
+    lengths = np.linalg.norm(A, axis=-1, keepdims=True)
+    return np.asarray(np.divide(A, lengths, out=np.zeros_like(A), where=lengths > 0.0))
 
 
 def _displacement(circuit: Circuit, still: _SolvedMode, clearance: int) -> Array:

@@ -23,7 +23,7 @@ from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
-from designer.synthesis.operating_point import Operating, operating, stuck
+from designer.synthesis.operating_point import Operating, operating, stuck, together
 from designer.synthesis.output_loads import Run
 from designer.synthesis.static_shifts import Shifts, forces, least_drive
 
@@ -88,6 +88,16 @@ class RuleSubject:
         return output_loads.runs([r.omega for r in self.model_responses], drives, orbits)
 
     @cached_property
+    def each_run(self) -> dict[str, Operating]:
+        """Of each wanted response, and of each start from rest, by its name.
+
+        Raises
+        ------
+        NotRun : there is no response to go by.
+        """
+        return {run.name: operating(self.reduction, [run], {}) for run in self._runs[0]}
+
+    @cached_property
     def operating(self) -> Operating:
         """Over the wanted responses and their starts from rest.
 
@@ -95,8 +105,9 @@ class RuleSubject:
         ------
         NotRun : there is no orbit to go by.
         """
-        runs, left_out = self._runs
-        return _complete(operating(self.reduction, runs, left_out), "at")
+        found = together(list(self.each_run.values()))
+        found.left_out |= self._runs[1]
+        return _complete(found, "at")
 
     @cached_property
     def stuck(self) -> Operating:

@@ -229,10 +229,11 @@ def _text(item: Expression, text: str, view: _View, origin: Point, turn: float) 
     x, y = turned((at.number(0), at.number(1)), origin, turn)
     size = 1.0 if effects is None else effects.get("font").get("size").number()
     angle = at.number(2) if len(at.atoms) > 2 else 0.0
+    turn = -(angle % 180.0) or 0.0  # it is never upside down
     mirror = "" if view.side == "top" else " scale(-1 1)"
     anchor = {"left": "start", "right": "end"}.get(_justified(effects), "middle")
     return Markup(
-        f'<text transform="translate({_n(x)} {_n(y)}){mirror} rotate({_n(-angle % 180.0 or 0.0)})" '
+        f'<text transform="translate({_n(x)} {_n(y)}){mirror} rotate({_n(turn)})" '
         f'font-size="{_n(1.3 * size)}" fill="{PRINT}" text-anchor="{anchor}" '
         f'dominant-baseline="central">{escape(text)}</text>'
     )

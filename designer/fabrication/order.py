@@ -181,6 +181,7 @@ def order_files(order: BoardOrder, fab: Fab, layout: Layout, limits: FabLimits) 
     remarks = [
         *by_hand[: bool(wired)],
         *_unnumbered(order.bought, fab.table.distributor),
+        *_assumed(order.bought),
         *(f"Accepted, though the rule fails: {rule}" for rule in order.accepted),
         *(f"Not checked: {rule}" for rule in order.not_checked),
         *(f"Assumed: {assumption}" for assumption in fab.table.assumed),
@@ -208,6 +209,16 @@ def _read_back(plots: Plots, order: BoardOrder) -> OrderCheck:
     if checked.faults:
         raise FaultyOrder(checked.faults)
     return checked
+
+
+def _assumed(bought: Sequence[Line]) -> Iterator[str]:
+    """A line for what the catalogue assumes of parts, those alike together."""
+    alike: dict[str, list[str]] = {}
+    for one in bought:
+        alike.setdefault(one.assumed, []).append(one.part_number)
+    for assumed, numbers in alike.items():
+        if assumed:
+            yield f"Assumed of {', '.join(numbers)}: {assumed}"
 
 
 def _unnumbered(bought: Sequence[Line], distributor: str | None) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from designer.base.errors import InputError
 from designer.base.progress import doing
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit
@@ -12,6 +13,8 @@ from designer.board.bom_layouts import file_of, layouts
 from designer.board.component import Component, components, pin_numbers, to_buy
 from designer.catalog.stock_list import StockRow
 from designer.check.synthesis_result import Synthesis
+from designer.design_rules.rule_subject import RuleSubject
+from designer.fabrication.bench_sheet import bench_sheet
 from designer.fabrication.board_cost import cost_markdown, cost_or_none
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
@@ -35,12 +38,20 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     doing("bill of materials")
     circuit, choice = board_circuit(synthesis)
     parts = components(circuit, synthesis.catalog, choice)
+    return {NOTES: notes(synthesis), **_bills(synthesis, parts, choice)}
+
+
+def notes(synthesis: Synthesis, subject: RuleSubject | InputError | None = None) -> str:
+    """The text of ``board.md``; raises as ``texts`` does. subject : what the circuit does, for the
+    sheet at the bench; without it the sheet is left out."""
+    circuit, choice = board_circuit(synthesis)
+    parts = components(circuit, synthesis.catalog, choice)
     cost = cost_or_none(synthesis)
-    notes = board_notes.markdown(synthesis, circuit, choice, parts)
-    return {
-        NOTES: notes if cost is None else f"{notes}\n{cost_markdown(cost)}",
-        **_bills(synthesis, parts, choice),
-    }
+    sections = [board_notes.markdown(synthesis, circuit, choice, parts)]
+    sheet = bench_sheet(subject) if isinstance(subject, RuleSubject) else None
+    sections += [] if sheet is None else [sheet.markdown]
+    sections += [] if cost is None else [cost_markdown(cost)]
+    return "\n".join(section for section in sections if section)
 
 
 def bills(synthesis: Synthesis) -> dict[str, str]:

@@ -25,10 +25,11 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
+from designer.design_rules.rule_subject import RuleSubject
 from designer.fabrication.board_cost import cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes
-from designer.folders.design_findings import findings
+from designer.folders.design_findings import findings, subject_of
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
 from designer.linear_network.milp import SOLVER
@@ -79,7 +80,9 @@ def write_last(
     """Write the rest of the stage: the drawing, how to start each response, and ``design.json``.
     other : as of ``find_recipes``. drawing : waits for it."""
     design, responses = synthesis.design, synthesis.model_responses
-    document = dumps(answer(synthesis, other))
+    subject = subject_of(synthesis, other)
+    document = dumps(answer(synthesis, subject))
+    folder.write(board_files.NOTES, board_files.notes(synthesis, subject))
     for name, content in drawing().items():
         folder.write(name, content)
     recipes = start_recipes(synthesis, jobs, other)
@@ -95,10 +98,10 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
             folder.rewrite(name, text)
 
 
-def answer(synthesis: Synthesis, other: Ask | None = None) -> dict[str, Any]:
-    """The JSON object of ``design.json``. other : as of ``findings``."""
+def answer(synthesis: Synthesis, subject: RuleSubject | InputError | None = None) -> dict[str, Any]:
+    """The JSON object of ``design.json``. subject : as of ``findings``; None for it to be made."""
     doing("design rules of the circuit")
-    found = findings(synthesis, other)
+    found = findings(synthesis, subject_of(synthesis) if subject is None else subject)
     cost = cost_or_none(synthesis)
     document = synthesis_json(
         synthesis.modelfile,

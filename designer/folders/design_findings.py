@@ -25,19 +25,26 @@ FINDINGS = {"warnings", "failed_rules"}
 """The keys."""
 
 
-def findings(synthesis: Synthesis, other: Ask | None = None) -> dict[str, Any]:
-    """``warnings`` and ``failed_rules`` by the keys of docs/contract.md. other : as of
-    ``RuleSubject``.
+def subject_of(synthesis: Synthesis, other: Ask | None = None) -> RuleSubject | InputError:
+    """What the rules look at, or why no board can be made of the design. other : as of
+    ``RuleSubject``."""
+    try:
+        return RuleSubject.of(synthesis, other)
+    except InputError as error:
+        return error
+
+
+def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[str, Any]:
+    """``warnings`` and ``failed_rules`` by the keys of docs/contract.md. subject : ``subject_of``
+    the design.
 
     A design without responses, or one that no board can be made of, has no rule that fails for
     want of something to look at; the latter is a warning.
     """
     warnings = [*_error(synthesis), *_responses(synthesis)]
     failed: list[RuleOutcome] = []
-    try:
-        subject = RuleSubject.of(synthesis, other)
-    except InputError as error:
-        warnings.append(f"The design rules were not looked at: {error}")
+    if isinstance(subject, InputError):
+        warnings.append(f"The design rules were not looked at: {subject}")
     else:
         limits = synthesis.modelfile.rules
         known = synthesis.outcomes

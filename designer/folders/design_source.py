@@ -16,7 +16,7 @@ from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files
 from designer.folders.design_files import load
-from designer.folders.design_findings import FINDINGS, findings
+from designer.folders.design_findings import FINDINGS, findings, subject_of
 from designer.folders.model_source import design_inputs_of, source
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile
@@ -49,7 +49,7 @@ def design_answer(folder: Folder) -> dict[str, Any]:
 @lru_cache(maxsize=4)
 def _findings(path: Path, _hash: str) -> dict[str, Any]:
     """Of a design that was written without them; a run asks more than once."""
-    found: dict[str, Any] = plain(findings(read_design(path)))
+    found: dict[str, Any] = plain(findings(design := read_design(path), subject_of(design)))
     return found
 
 

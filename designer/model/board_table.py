@@ -59,7 +59,7 @@ class BoardSpec(FileTable):
     """Whether diodes protect the driven summing nodes."""
     reverse_protection: Annotated[
         str, text(".*", 'the name of a supply diode of the catalogue, such as "1N5819", or ""')
-    ] = ""
+    ] = "1N5819"
     """The diode between each pin of the supply and its rail, by its name in the catalogue; "" for
     none."""
     connectors: Annotated[Connectors, choice("pins", "sma", "bnc")] = "pins"

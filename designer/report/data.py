@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from designer.base.errors import InputError
 from designer.base.si_unit import prefixed
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
@@ -18,7 +19,9 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.nominal import Trace
+from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.orbit import OrbitStatus
+from designer.fabrication.bench_sheet import BenchSheet, bench_sheet
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Mechanical, SiScales
@@ -142,6 +145,16 @@ class ReportData:
     def board_cost(self) -> CostEstimate | None:
         """What the boards cost, estimated; None where there can be no board."""
         return cost_or_none(self.result)
+
+    @cached_property
+    def bench(self) -> BenchSheet | None:
+        """What to expect at the test points; None where there can be no board, or it has none."""
+        result = self.result
+        made = Synthesis(result.modelfile, result.catalog, result.model_responses, result.design)
+        try:
+            return bench_sheet(RuleSubject.of(made))
+        except InputError:
+            return None
 
     @cached_property
     def board(self) -> tuple[Circuit, Numbers]:

@@ -25,6 +25,7 @@ from designer.base.page import (
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
+from designer.fabrication.bench_sheet import NOTE, BenchSheet
 from designer.fabrication.board_cost import CostEstimate, cost_words
 from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch, system_sketch
@@ -333,6 +334,7 @@ def _parts(data: ReportData) -> PageSection:
     blocks: list[Block] = [
         _parts_note(data),
         PageSection("To buy", [design_tables.bom_table(data.bom)]),
+        *_bench(data.bench),
         *_cost(data.board_cost),
         Columns(
             (
@@ -342,6 +344,14 @@ def _parts(data: ReportData) -> PageSection:
         ),
     ]
     return PageSection("Parts", blocks, "parts")
+
+
+def _bench(sheet: BenchSheet | None) -> list[PageSection]:
+    """What to expect of a new board at its test points; nothing where that is not known."""
+    if sheet is None:
+        return []
+    rows = table(sheet.head, sheet.rows, ())
+    return [PageSection("At the bench", [sheet.before, rows, SmallPrint(NOTE)])]
 
 
 def _cost(estimate: CostEstimate | None) -> list[PageSection]:

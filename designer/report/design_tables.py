@@ -42,6 +42,7 @@ _BOM = {
     "quantity": "qty", "designators": "designators", "value": "value",
     "part_number": "part number", "manufacturer": "manufacturer", "footprint": "footprint",
     "rating": "rating", "grade": "grade", "price_class": "price class",
+    "assumed": "assumed",
 }  # fmt: skip
 
 _CONDITIONS = {

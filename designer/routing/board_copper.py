@@ -173,6 +173,9 @@ def _pads(footprint: Expression, inner: Sequence[str]) -> Iterator[Copper]:
         net = pad.find("net")
         number = NO_NET if net is None else int(net.number(0))
         names, shape = pad.get("layers").atoms, _pad_shape(pad, place, angle)
+        own_room = pad.find("clearance")
+        if own_room is not None and number == NO_NET:  # a mark that nothing comes near
+            shape = grown(shape, own_room.number())
         if pad.text(1) == "np_thru_hole":
             bare = grown(shape, SCREW_ROOM)
             yield Copper(bare, NO_NET, (True, True), inner=frozenset(inner))

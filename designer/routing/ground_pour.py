@@ -17,19 +17,10 @@ from shapely import Geometry
 
 from designer.base.arrays import Array
 from designer.routing.board_copper import BoardCopper, Copper, Point, grown
-from designer.routing.routing_grid import EDGE
+from designer.routing.routing_grid import BRIDGE, EDGE, OVERLAP, RELIEF, THINNEST
 
-THINNEST = 0.25
-"""Least width of the pour [mm]."""
-RELIEF = 0.3
-"""Gap round a pad of ground [mm]."""
-BRIDGE = 0.4
-"""Width of a thermal bridge [mm]."""
 BRIDGES = 2
 """Least number of bridges of a pad; with fewer its track alone joins it."""
-OVERLAP = 0.25
-"""How far a bridge reaches past the gap [mm], to the middle of its round end: more than half its
-width and the slack, so that the end lies in the pour."""
 SLACK = 0.01
 """More than each gap [mm]: corners of circles lie on them, chords inside."""
 

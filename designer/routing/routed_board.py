@@ -24,9 +24,6 @@ from designer.routing.board_copper import (
     zone_layers,
 )
 from designer.routing.ground_pour import (
-    BRIDGE,
-    RELIEF,
-    THINNEST,
     Pour,
     floating_vias,
     ground_pour,
@@ -34,7 +31,7 @@ from designer.routing.ground_pour import (
 )
 from designer.routing.net_kinds import GROUND_KIND, NetKind, kinds_of_nets, net_kinds
 from designer.routing.router import find_routes
-from designer.routing.routing_grid import Nodes, RoutingGrid
+from designer.routing.routing_grid import BRIDGE, RELIEF, THINNEST, Nodes, RoutingGrid
 
 POUR = "designer pour"
 """Name of a zone that was made here."""

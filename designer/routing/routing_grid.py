@@ -16,7 +16,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.routing.board_copper import NO_NET, BoardCopper, Copper
 from designer.routing.kernel_router import FREE, NOBODY, Grid, SearchSpace
-from designer.routing.net_kinds import VIA_RADIUS, NetKind
+from designer.routing.net_kinds import GROUND_KIND, VIA_RADIUS, NetKind
 
 STEP = 0.125
 """Between places [mm]."""
@@ -26,6 +26,17 @@ MARGIN = 0.015
 """Added to clearances [mm]: two tracks come as much nearer between the places of the grid."""
 EDGE = 0.5
 """Between copper and the board's edge [mm]: KiCad's own least."""
+THINNEST = 0.25
+"""Least width of a pour [mm]."""
+RELIEF = 0.3
+"""Gap of a pour round a pad of ground [mm]."""
+BRIDGE = 0.4
+"""Width of a thermal bridge of a pour [mm]."""
+OVERLAP = 0.25
+"""How far a bridge reaches past the gap [mm], to the middle of its round end: more than half its
+width and the slack, so that the end lies in the pour."""
+BRIDGED = RELIEF + OVERLAP + 0.5 * BRIDGE + 0.01
+"""From a pad to the far end of its bridges [mm], and a slack."""
 BESIDE_PAD = 0.1
 """Between a via and a pad of its own net [mm]: solder does not run into it."""
 Nodes = NDArray[np.int32]
@@ -77,10 +88,19 @@ class RoutingGrid:
             for place in places
         ]
 
-    def block(self, pieces: Sequence[Copper], kinds: Sequence[NetKind], of: Sequence[int]) -> None:
-        """Give the surroundings of each piece to its net. of : index of the kind of each piece."""
+    def block(
+        self,
+        pieces: Sequence[Copper],
+        kinds: Sequence[NetKind],
+        of: Sequence[int],
+        *,
+        planes: bool = False,
+    ) -> None:
+        """Give the surroundings of each piece to its net. of : index of the kind of each piece.
+        planes : of ground lie between the sides: no via stands in the way of a pad's bridges."""
         owner, via_owner = self.arrays.owner, self.arrays.via_owner
         farthest = max(k.half for k in kinds) + VIA_RADIUS + max(k.clearance for k in kinds)
+        farthest += BRIDGED * planes
         for piece, kind in zip(pieces, of, strict=True):
             rows, columns, x, y = self._around(shapely.buffer(piece.shape, farthest + MARGIN))
             flat = rows * self.arrays.width + columns
@@ -91,7 +111,10 @@ class RoutingGrid:
                 for layer in (0, 1):
                     if piece.layers[layer]:
                         _give(owner[index], near + layer * self.arrays.places, piece.net)
-                _give(via_owner[index], flat[gap < VIA_RADIUS + apart], piece.net)
+                bridged = planes and piece.relief and piece.through
+                bridged = bridged and kinds[kind].name == GROUND_KIND
+                room = VIA_RADIUS + apart + BRIDGED * bridged
+                _give(via_owner[index], flat[gap < room], piece.net)
                 if piece.pad:
                     via_owner[index, flat[gap < VIA_RADIUS + BESIDE_PAD]] = NOBODY
 
@@ -133,7 +156,8 @@ def routing_grid(
         history=np.zeros(2 * places, dtype=np.int32),
     )
     grid = RoutingGrid((float(left), float(top)), arrays, _work(places), _reaches(kinds))
-    grid.block(copper.pieces, kinds, [of.get(p.net, 0) for p in copper.pieces])
+    own = [of.get(p.net, 0) for p in copper.pieces]
+    grid.block(copper.pieces, kinds, own, planes=bool(copper.planes))
     x, y = np.meshgrid(left + STEP * np.arange(width), top + STEP * np.arange(height))
     points = shapely.points(x.ravel(), y.ravel())
     room = shapely.distance(copper.edge, points)

@@ -208,6 +208,10 @@ def _alone(cell: SheetCell, item: Item, x: int, y: int) -> None:
             down = (away[0], away[1] + (2 if POWER.get(net) != "VCC" else 0))
             cell.wire(at, away, down)
             cell.end(net, down, f"{item.reference}_{pin.number}", left=False)
+        elif small and POWER.get(net) == "VCC":  # its symbol points up, into the pad's
+            away = (at[0] + 8, at[1])
+            cell.wire(at, away)
+            cell.end(net, away, f"{item.reference}_{pin.number}", left=False)
         elif small or not net:
             cell.pin_end(placed, pin.number, at)
         else:

@@ -235,6 +235,8 @@ def board_cells(
     outside = [*(circuit.supply_inputs or (POSITIVE, NEGATIVE))]
     outside.insert(1, GROUND)
     supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in outside]
+    behind = [n for n in (POSITIVE, NEGATIVE) if n not in outside and n in pads]
+    supply += [f"{rail}: {', '.join(pads[rail])}" for rail in behind]
     supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
     for package in circuit.packages:
         pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})

@@ -207,7 +207,9 @@ def files(project: Project) -> dict[str, str]:
     listed = entries(circuit, project.components, project.run, models)
     sheet = layout(circuit, listed, kicad_sim.directives(circuit, project.run))
     placed = place(circuit, [c for e in listed if e.placed and (c := e.component) is not None])
-    cases = {s.footprint.name: s.footprint for s in (*placed.spots, *placed.holes)}
+    cases = {
+        s.footprint.name: s.footprint for s in (*placed.spots, *placed.holes, *placed.fiducials)
+    }
     drawn = schematic(name, project.title, listed, sheet, project.date)
     pads = board(name, project.title, listed, placed, project.date)
     out = {

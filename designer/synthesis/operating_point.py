@@ -110,9 +110,14 @@ def stuck(circuit: Circuit, run: Run, other: Ask | None = None) -> Operating:
     theirs = other(_all_stuck, circuit, run, away) if other is not None else dict
     points = _all_stuck(circuit, run, [name for name in names if name not in away])
     points |= theirs()
+    return together([each for name in names for each in points[name]])
+
+
+def together(points: Sequence[Operating]) -> Operating:
+    """What is met over all of these."""
     out = Operating()
-    for point in (each for name in names for each in points[name]):
-        for kind in ("high", "low", "across", "power", "source"):
+    for point in points:
+        for kind in ("high", "low", "slew", "across", "power", "source", "reference"):
             _raise_peaks(getattr(out, kind), getattr(point, kind).items())
         out.runs += point.runs
         out.left_out |= point.left_out

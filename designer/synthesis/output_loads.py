@@ -28,6 +28,8 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.model.find_responses import ModelResponse
 
+FROM_REST = " from rest"
+"""How the name of a run ends that begins at rest."""
 REST = 20
 """Drive periods from rest that count, as in ``find_responses.peaks``."""
 UNSETTLED = 200
@@ -124,7 +126,7 @@ def runs(
             continue
         periods = orbit.n if orbit.status in COUNTED else UNSETTLED
         out.append(Run(name, drive, orbit.start, periods))
-        out.append(Run(f"{name} from rest", drive, np.zeros(states), REST))
+        out.append(Run(f"{name}{FROM_REST}", drive, np.zeros(states), REST))
     return out, left_out
 
 

@@ -36,6 +36,9 @@ def placement_drawing(placement: Placement) -> Figure:
     for hole in placement.holes:
         (pad,) = hole.footprint.pads
         axes.add_patch(Circle((hole.x, hole.y), 0.5 * pad.drill, fc=HOLE, lw=0.0))
+    for mark in placement.fiducials:
+        (pad,) = mark.footprint.pads
+        axes.add_patch(Circle((mark.x, mark.y), 0.5 * pad.width, fc=COPPER, lw=0.0))
     return figure
 
 

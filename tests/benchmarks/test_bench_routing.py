@@ -14,10 +14,20 @@ def test_every_board_has_a_model_file_of_its_own() -> None:
 
 
 def test_the_report_has_a_row_and_a_picture_of_each_board() -> None:
-    row = bench_routing.Row("a board", 40, 36.4, 561.04, 14.25, 74, 2.31, 1, ("unconnected",))
+    row = bench_routing.Row("a board", 40, 36.4, 561.04, 14.25, 74, 2.31, 1, ("unconnected",), ())
     text = bench_routing.report([row], 12.0)
     cells = [cell.strip() for cell in text.split("| a board ")[1].splitlines()[0].split("|")]
-    assert cells[1:-1] == ["40", "36", "561", "14.2", "74", "2.3", "1", "unconnected"]
+    assert cells[1:-1] == [
+        "40",
+        "36",
+        "561",
+        "14.2",
+        "74",
+        "2.3",
+        "1",
+        "unconnected",
+        "as the circuit",
+    ]
     board = next(t for n, t in case_files("one mass").items() if n.endswith(".kicad_pcb"))
     (panel, *_) = bench_routing.plot([(row, board)]).axes
     assert panel.get_title() == "a board\n561 mm, 74 vias, 2.3 s"

@@ -25,9 +25,25 @@ from designer.board.board_parts import (
 from designer.board.component import Component, components, joined
 from designer.catalog.diode_curve import card
 from designer.catalog.entries import mounting_of
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.board_parts_only import (
+    Connector,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
+)
 from designer.circuit.board_values import nominal_board
-from designer.circuit.netlist import GROUND, Circuit, Diode, Fitting, Generator, Resistor, Section
+from designer.circuit.netlist import (
+    GROUND,
+    NEGATIVE,
+    POSITIVE,
+    Circuit,
+    Diode,
+    Fitting,
+    Generator,
+    Resistor,
+    Section,
+)
 from designer.circuit.reduction import Reduction
 from designer.circuit.stage_title import stage_names
 from designer.model.board_table import BoardChoice, BoardSpec, Trim
@@ -129,7 +145,8 @@ def test_outputs_are_shown_through_a_resistor_and_summing_nodes_are_not(circuit:
     nodes = {s.inverting for s in circuit.sections}
     probed = {p.net for p in of(board, TestPoint)}  # type: ignore[union-attr]
     assert not probed & nodes
-    assert probed == {f"{net}_out" for net in probed_nets(circuit)} | {GROUND}
+    power = {GROUND, POSITIVE, NEGATIVE}
+    assert probed == {f"{net}_out" for net in probed_nets(circuit)} | power
     for net in probed_nets(circuit):
         references = {reference for reference, _ in nets[f"{net}_out"]}
         assert len([r for r in references if r.startswith("R")]) == 1
@@ -252,7 +269,7 @@ def test_stages_of_parts() -> None:
         "inverter 4": "U1D R106 R107",
         "dead zone": "U3A U3B U3C U3D R200 R201 R202 R203 R204 R205 R206 R207 R208 R209 R210",
         "interface": "J2 J3 R901 R902 R903 R904 R905 TP1 TP2 TP3 TP4 TP5 RV901",
-        "supply": "J1 C901 C902 C903 C904 C905 C906 C907 C908 TP6",
+        "supply": "J1 C901 C902 C903 C904 C905 C906 C907 C908 D911 D912 TP6 TP7 TP8 TP9",
     }
     assert {stage: sorted(n for n in names if names[n] == stage) for stage in wanted} == {
         stage: sorted(parts.split()) for stage, parts in wanted.items()
@@ -267,7 +284,10 @@ def test_what_a_board_leaves_out() -> None:
     spec = BoardSpec(test_points=False, input_protection=False, dc_trim="none")
     board = fitted(CIRCUITS["paper"], replace(CHOICE, spec=spec), CATALOG)
     kinds = {type(p) for p in board.fittings}
-    assert kinds == {SupplyCapacitor, Connector, Resistor}
+    assert kinds == {SupplyCapacitor, SupplyDiode, Connector, Resistor}
+    bare = replace(spec, reverse_protection="")
+    board = fitted(CIRCUITS["paper"], replace(CHOICE, spec=bare), CATALOG)
+    assert {type(p) for p in board.fittings} == {SupplyCapacitor, Connector, Resistor}
     assert not of(board, Trimmer)
     again = fitted(board, CHOICE, CATALOG)
     assert again == fitted(CIRCUITS["paper"], CHOICE, CATALOG)

@@ -62,7 +62,7 @@ def test_lists_in_a_catalogue_folder_are_read_and_hashed(tmp_path: Path) -> None
     stock.mkdir()
     (stock / "mine.csv").write_text(HEAD + BY_NUMBER, encoding="utf-8")
     with_list = load_catalog(tmp_path)
-    assert [row.number for row in with_list.stock] == ["C1"]
+    assert next(row.number for row in with_list.stock) == "C1"  # before the shipped ones
     (stock / "mine.csv").write_text(HEAD + BY_NUMBER.replace("C1", "C2"), encoding="utf-8")
     assert load_catalog(tmp_path).hash != with_list.hash
 

@@ -156,7 +156,7 @@ def test_the_exported_board_is_of_its_design(tmp_path: Path) -> None:
     assert not board.routed
     listed = {c.reference: c for c in base().components}
     holes = {footprint.reference for footprint in board.footprints} - listed.keys()
-    assert holes == {"H1", "H2", "H3", "H4"}
+    assert holes == {"H1", "H2", "H3", "H4", "FID1", "FID2", "FID3"}
     for footprint in (each for each in board.footprints if each.reference not in holes):
         there = {p.number: p.net for p in footprint.pads if p.net}
         assert there == {n: net for n, net in listed[footprint.reference].nets.items() if net}

@@ -201,10 +201,10 @@ def test_a_hole_that_a_square_pin_does_not_go_through_is_caught(tmp_path: Path) 
     """A pin of 0.64 mm has a diagonal of 0.91 mm, and a hole comes out up to 0.08 mm too small."""
     as_exported = looked(drawn(), tmp_path)["pin-hole"]
     assert as_exported.status == PASS
-    narrow = changed("J1", lambda t: t.replace("(drill 1)", "(drill 0.98)", 1))
+    narrow = changed("J2", lambda t: t.replace("(drill 1)", "(drill 0.98)", 1))
     found = looked(narrow, tmp_path)["pin-hole"]
     assert found.status == FAIL
-    assert found.where == "J1.1"
+    assert found.where == "J2.1"
     assert found.value == pytest.approx(0.98 - 0.91)
-    just = changed("J1", lambda t: t.replace("(drill 1)", "(drill 0.99)", 1))
+    just = changed("J2", lambda t: t.replace("(drill 1)", "(drill 0.99)", 1))
     assert looked(just, tmp_path)["pin-hole"].status == PASS

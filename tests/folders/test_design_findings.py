@@ -14,7 +14,7 @@ from designer.base.plain_json import plain
 from designer.catalog.design_rule import FAIL
 from designer.cli import entry
 from designer.folders import design_files
-from designer.folders.design_findings import findings
+from designer.folders.design_findings import findings, subject_of as look_at
 from designer.folders.design_source import design_answer
 from designer.jobs import rules_job
 from designer.model.model_file import parse_model_file
@@ -29,13 +29,13 @@ LOW_SWING = '[rules.swing]\nlimit = "1 V"\nreason = "a test"\n'
 
 
 def test_a_design_that_keeps_everything_has_no_finding() -> None:
-    assert findings(base().synthesis) == {"warnings": [], "failed_rules": []}
+    assert findings(base().synthesis, base()) == {"warnings": [], "failed_rules": []}
 
 
 def test_the_rules_that_fail_are_those_of_the_verb() -> None:
     """No circuit for this model stays below a volt."""
     made = replace(base().synthesis, modelfile=parse_model_file(TEXT + LOW_SWING))
-    found = findings(made)
+    found = findings(made, look_at(made))
     assert [rule["id"] for rule in found["failed_rules"]] == ["swing"]
     checked = [o.as_dict() for o in rules_job.checked(made).outcomes if o.status == FAIL]
     assert plain(found["failed_rules"]) == plain(checked)
@@ -47,7 +47,7 @@ def test_a_stop_without_force_is_a_large_error_and_another_response() -> None:
     values = bought(rectifier())
     values["R50"] *= 1000.0
     wrong = subject_of(stage("rectifier", "both", values), PAPER, TEXT).synthesis
-    error, response, *_ = findings(wrong)["warnings"]
+    error, response, *_ = findings(wrong, look_at(wrong))["warnings"]
     assert error.startswith("The largest coefficient error is ")
     assert "stop" in error
     assert "above 1 %" in error

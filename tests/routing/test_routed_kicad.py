@@ -15,6 +15,10 @@ from designer.board.kicad_reader import read_board
 from designer.board.kicad_rules import CustomRule, board_rules
 from designer.catalog.design_rule import PASS
 from designer.design_rules import on_board
+from designer.fabrication.kicad_plot import plot
+from designer.fabrication.order_check import check_order
+from designer.fabrication.plotted_copper import plotted
+from designer.folders import board_files
 from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
 from designer.routing.board_layers import with_layers
@@ -59,6 +63,13 @@ def test_nothing_is_found_on_the_board_of_another_system(name: str, tmp_path: Pa
     own = {key.removeprefix("kicad/"): text for key, text in {**files, board: routed.text}.items()}
     folder = written(own, tmp_path / "project")
     place = folder / board.removeprefix("kicad/")
+    plots = plot(read_board(place), "board", protel_names=True)
+    listed, bought = board_files.listed(design), board_files.bought(design)
+    ordered = check_order(
+        plotted(plots.gerbers), plots.positions, read_board(place), listed, bought
+    )
+    assert ordered.faults == ()
+    assert ordered.pads > 100
     nothing_is_found(place, components(circuit, design.catalog, choice), rules)
     sheet = place.with_suffix(".kicad_sch").name
     kicad(folder, "sch", "erc", "--severity-all", "--format", "json", "-o", "erc.json", sheet)

@@ -212,7 +212,7 @@ def test_ids_are_given_once_and_references_lead_to_their_symbols(name: str) -> N
     owner = {s.get("uuid").text(0): prop(s, "Reference") for s in sheet.all("symbol")}
     for part in board.all("footprint"):
         if "board_only" in part.get("attr").atoms:
-            assert prop(part, "Reference") in {"H1", "H2", "H3", "H4"}
+            assert prop(part, "Reference") in {"H1", "H2", "H3", "H4", "FID1", "FID2", "FID3"}
         else:
             assert owner[part.get("path").text(0).lstrip("/")] == prop(part, "Reference")
 
