@@ -176,8 +176,8 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
     missing = sorted(wanted.keys() - there.keys(), key=natural_key)
     foreign = sorted((n for n in there.keys() - wanted.keys() if there[n].wired), key=natural_key)
     if missing or foreign:
-        differences = [f"without {_few(missing)}"] if missing else []
-        differences += [f"with {_few(foreign)}"] if foreign else []
+        differences = [f"without {few(missing)}"] if missing else []
+        differences += [f"with {few(foreign)}"] if foreign else []
         raise InputError(
             board.path,
             "footprints",
@@ -192,10 +192,11 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
                 on = pads.get(number, "no such pad") or "no net"
                 differ.append(f"{reference}.{number} on {on}, not on {net or 'no net'}")
     if differ:
-        raise InputError(board.path, "nets", _few(differ, "; "), "the nets of this design")
+        raise InputError(board.path, "nets", few(differ, "; "), "the nets of this design")
 
 
-def _few(words: Sequence[str], between: str = ", ") -> str:
+def few(words: Sequence[str], between: str = ", ") -> str:
+    """The first words, and how many more there are."""
     more = len(words) - SHOWN
     return between.join(words[:SHOWN]) + (f" and {more} more" if more > 0 else "")
 

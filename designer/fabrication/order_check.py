@@ -25,7 +25,7 @@ from designer.board.bom import Line
 from designer.board.component import Component, joined
 from designer.board.footprints import footprint
 from designer.board.kicad_names import LIBRARY
-from designer.board.kicad_reader import BoardFile, PlacedFootprint, PlacedPad, turned
+from designer.board.kicad_reader import BoardFile, PlacedFootprint, PlacedPad, few, turned
 from designer.fabrication.kicad_plot import PartPosition
 from designer.fabrication.plotted_copper import Plotted
 
@@ -33,8 +33,6 @@ NEAR = 0.005
 """Copper that is nearer than this [mm] to a hole, and a pad's place to its copper, touch."""
 PLACED = 0.02
 """How far a pad may be from where the position file's part has it [mm]."""
-SHOWN = 6
-"""Pads that a line lists."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +174,7 @@ def _nets(copper: _Copper, listed: Sequence[Component]) -> Iterator[str]:
 
 
 def _some(pads: Sequence[str]) -> str:
-    ordered = sorted(set(pads), key=natural_key)
-    more = f" and {len(ordered) - SHOWN} more" if len(ordered) > SHOWN else ""
-    return ", ".join(ordered[:SHOWN]) + more
+    return few(sorted(set(pads), key=natural_key))
 
 
 def _openings(files: Plotted, copper: _Copper, listed: Sequence[Component]) -> Iterator[str]:
@@ -251,7 +247,8 @@ def _off(part: PartPosition, there: PlacedFootprint, component: Component) -> fl
     origin, turn = (part.at[0], -part.at[1]), math.radians(part.degrees)
     off: list[tuple[float, float]] = []
     for pad in shape.pads:
-        seen = turned((-pad.x if part.bottom else pad.x, pad.y), origin, turn)
+        # KiCad turns a footprint over its horizontal axis, and states the angle seen from above.
+        seen = turned((pad.x, -pad.y if part.bottom else pad.y), origin, turn)
         near = [p.at for p in there.pads if p.number == pad.number]
         if near and pad.number:
             at = min(near, key=lambda p: math.dist(p, seen))

@@ -19,6 +19,7 @@ from gerbonara import graphic_primitives as gp
 from gerbonara.excellon import ExcellonFile
 from gerbonara.rs274x import GerberFile
 from gerbonara.utils import MM
+from shapely.affinity import rotate
 from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
@@ -132,16 +133,10 @@ def _shape(drawn: Any) -> BaseGeometry:
     if isinstance(drawn, gp.Rectangle):
         wide, high = drawn.w / 2.0, drawn.h / 2.0
         upright = box(drawn.x - wide, drawn.y - high, drawn.x + wide, drawn.y + high)
-        return _turned(upright, drawn.rotation)
+        return rotate(upright, drawn.rotation, "center", use_radians=True)
     if isinstance(drawn, gp.ArcPoly):
         return Polygon(_outline(drawn)).buffer(0)
     raise TypeError(f"a {type(drawn).__name__}")
-
-
-def _turned(shape: BaseGeometry, angle: float) -> BaseGeometry:
-    from shapely.affinity import rotate
-
-    return shape if angle == 0.0 else rotate(shape, angle, "center", use_radians=True)
 
 
 def _path(drawn: Any) -> BaseGeometry:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -27,11 +27,14 @@ from designer.board.kicad_rules import CustomRule, board_rules
 from designer.board.sexpr import Expression, expression_text, read
 from designer.catalog.fab import fab_limits, fabs
 from designer.design_rules import on_board
+from designer.fabrication.kicad_plot import plot
 from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
+from designer.fabrication.order_check import _places
 from designer.fabrication.order_refusal import refusals
 from designer.folders import board_files, design_files
 from designer.model.model_file import read_model_file
 from tests.jobs.test_kicad_export import designer
+from tests.shared.kicad_python import asked_of_pcbnew
 from tests.shared.stages import CATALOG
 
 pytestmark = [pytest.mark.kicad, pytest.mark.slow]
@@ -173,16 +176,6 @@ def more(*texts: str) -> Change:
     return lambda tree: with_children(tree, [*tree.children, *map(read, texts)])
 
 
-def footprint(reference: str, change: Change) -> Change:
-    """A change of the footprint of one part."""
-
-    def ours(child: Expression) -> bool:
-        names = (p.text(1) for p in child.all("property") if p.text(0) == "Reference")
-        return child.name == "footprint" and reference in names
-
-    return each(ours, inside(change))
-
-
 def part(reference: str, change: Callable[[Expression], list[Expression]]) -> Change:
     """The footprint of one part gives way to others."""
 
@@ -191,6 +184,11 @@ def part(reference: str, change: Callable[[Expression], list[Expression]]) -> Ch
         return child.name == "footprint" and reference in names
 
     return each(ours, change)
+
+
+def footprint(reference: str, change: Change) -> Change:
+    """A change of the footprint of one part."""
+    return part(reference, inside(change))
 
 
 def pad(reference: str, number: str, change: Change) -> Change:
@@ -513,3 +511,31 @@ def test_the_plotted_files_show_it_without_kicad_s_check(
     change, _ = FAULTS[fault]
     found = read_back(tmp_path, finished, expression_text(change(_tree(finished.text))))
     assert any(ON_THE_FILES[fault] in line for line in found), found
+
+
+MOVE = """
+import pcbnew, sys
+board = pcbnew.LoadBoard(sys.argv[1])
+for name, degrees, over in (("R1", 0, 1), ("U1", 0, 1), ("D200", 90, 1), ("VR1", 37, 1),
+                            ("R2", 33, 0), ("VR2", 90, 0)):
+    part = board.FindFootprintByReference(name)
+    part.SetOrientationDegrees(part.GetOrientationDegrees() + degrees)
+    if over:
+        part.Flip(part.GetPosition(), pcbnew.FLIP_DIRECTION_LEFT_RIGHT)
+pcbnew.SaveBoard(sys.argv[2], board)
+"""
+
+
+def test_parts_that_kicad_has_turned_and_flipped_stand_on_their_pads(
+    finished: Finished, tmp_path: Path
+) -> None:
+    """By KiCad's own position file, on either side and at any angle; one turned there does not."""
+    before, after = tmp_path / "before.kicad_pcb", tmp_path / "after.kicad_pcb"
+    before.write_text(finished.text, encoding="utf-8")
+    asked_of_pcbnew(MOVE, tmp_path, before, after)
+    board = read_board(after)
+    positions = plot(board, "board", protel_names=True).positions
+    assert sum(one.bottom for one in positions) == 4
+    assert list(_places(positions, board, finished.components)) == []
+    half = [replace(one, degrees=one.degrees + 180.0) for one in positions]
+    assert len(list(_places(half, board, finished.components))) == len(positions)
