@@ -251,7 +251,7 @@ def attempt(
     values |= inverters
     sized = all_stages.size(_question(order, limits), values)
     if isinstance(sized, str):
-        return Shortfall(sized, True)
+        return Shortfall(sized, False)  # of this linear block; another may have room for the stages
     return _driven(order, limits, linear, sized, values, thrifty)
 
 
@@ -269,7 +269,7 @@ def completed(
         own = {name: nearest(order.resistors, value) for name, value in stages.values.items()}
         whole = all_stages.with_levels(_question(order, limits), values, own)
         if isinstance(whole, str):
-            return Shortfall(whole, True)
+            return Shortfall(whole, False)
         stages = replace(stages, values=whole)
     return _driven(order, limits, linear, stages, values, thrifty=False)
 
@@ -338,7 +338,7 @@ def _inverters(
             if not equal & set(group):
                 continue
             if len(given) > 1:
-                return Shortfall("matched parts", True)
+                return Shortfall("matched parts", False)
             for value in given:
                 out |= dict.fromkeys(sorted(equal), value)
     return out
@@ -354,7 +354,7 @@ def _drive(
         return {}
     equal = equal_parts(names, order.spec.matched, values)
     if equal is None:
-        return Shortfall("matched parts", True)
+        return Shortfall("matched parts", False)
     volts = _volts_per_ohm(order, limits, values)
     roots = [equal.of(name) for name in names]
     lists = {

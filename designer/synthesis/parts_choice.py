@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NoReturn
@@ -57,9 +57,9 @@ BOUND_STEPS = 4_000_000
 """Steps of the tree of choices that looks for a lower bound."""
 LOOK = 400_000
 """Steps of the engine in which a circuit has to settle on a wanted response."""
-BESIDE, BESIDE_TREE = 10, 2
-"""Linear blocks that are tried beside the first: where joins find them, and where a tree of choices
-does, which is slower by far."""
+BESIDE, BESIDE_TREE, BESIDE_PAIRS = 10, 2, 1
+"""Linear blocks that are tried beside the first: where joins find them; where a tree of choices
+does, or any resistor may be a pair, both slower by far."""
 EMPTY = 1e-9
 """Relative: so far below a bound there is no choice, where at the bound there may be one."""
 RULED = frozenset({"swing", "load", "bandwidth"})
@@ -255,27 +255,53 @@ class _Search:
 
     def with_composites(self, best: _Verified, design: Design) -> Design:
         """The design with resistors of two parts where that lowers its error; or as it was."""
-        spec = self.order.spec
-        better = composites.improve(self.order, best.attempt)
-        if better is None or (
-            spec.most_values is not None
-            and better.distinct_values(spec.preferred) > spec.most_values
-        ):
-            return design
-        improved = verified(self.order, better, self.responses, spec.active_conditions)
-        if not all(check.holds for check in improved.checks):
-            return design
-        exact = improved.errors.max_error <= EXACT
-        certificate = Certificate(
-            "optimal" if exact else "bound",
-            0.0,
-            "no error is below 0, and one up to 1e-6 counts as none"
-            if exact
-            else "composites near the best single parts; no lower bound but 0",
-        )
-        least = improved.errors.max_error - EXACT
-        binding = {name: cost for name, cost in design.binding.items() if cost < least}
-        return replace(improved, certificate=certificate, binding=binding)
+        spec, costs = self.order.spec, design.binding
+        for made in self._in_pairs(best):
+            if isinstance(made, Shortfall) or _error(made) >= design.errors.max_error - EXACT:
+                continue
+            most = spec.most_values
+            if most is not None and made.distinct_values(spec.preferred) > most:
+                continue
+            improved = verified(self.order, made, self.responses, spec.active_conditions)
+            if not all(check.holds for check in improved.checks):
+                continue
+            least = improved.errors.max_error - EXACT
+            certificate = Certificate(
+                "optimal" if least <= 0.0 else "bound",
+                0.0,
+                "no error is below 0, and one up to 1e-6 counts as none"
+                if least <= 0.0
+                else "composites near the best single parts; no lower bound but 0",
+            )
+            binding = {name: cost for name, cost in costs.items() if cost < least}
+            design = replace(improved, certificate=certificate, binding=binding)
+            if least <= 0.0:
+                break
+        return design
+
+    def _in_pairs(self, best: _Verified) -> Iterator[Attempt | Shortfall]:
+        """Attempts with resistors of two parts, what takes least to find first: of the best linear
+        block, of that beside it which is best without them, and of others beside it."""
+        spec, order, first = self.order.spec, self.order, best.attempt
+        alone = partial(attempt, order, best.limits)
+
+        def paired(made: Attempt | Shortfall) -> Attempt | Shortfall:
+            return (isinstance(made, Attempt) and composites.improve(order, made)) or made
+
+        yield paired(first)
+        if spec.most_values is not None or self.by_scales:
+            return
+        linear = first.linear
+        beside = best_beside(order, best.limits, linear, first, alone)
+        yield beside
+        best_pair = paired(beside)
+        yield best_pair
+        most = BESIDE_PAIRS if spec.composites is True else BESIDE
+
+        def make(other: LinearBlock) -> Attempt | Shortfall:
+            return paired(alone(other))
+
+        yield best_beside(order, best.limits, linear, best_pair, make, most)
 
     def refuse(self, missed: _Missed) -> NoReturn:
         """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees
@@ -289,8 +315,9 @@ class _Search:
         free = FREES.get(missed.short.what, "a wider choice of parts")
         if guilty:
             free += "; or circuit.side_conditions without " + " or ".join(guilty)
-        whole = self.by_joins or missed.short.whole
-        searched = "" if whole else " was found within the search's count of steps"
+        # Conditions that were made narrower on the way shut out choices that the file allows.
+        whole = missed.short.whole and not missed.broken
+        searched = "" if whole else " within the search's count of steps"
         raise Unreachable(
             None, "circuit", f"no choice of parts{searched}; what binds: {what}", free
         )
@@ -447,10 +474,11 @@ class _Search:
             if isinstance(linear, Shortfall):
                 return linear
             made = attempt(self.order, within, linear, thrifty=number > 0)
-            if most is None and spec.composites:
-                return made  # two parts cure the dead zone's error where it stands
+            if most is None and spec.composites and isinstance(made, Attempt):
+                return made  # two parts may cure the dead zone's error where it stands
             if most is None:
-                return best_beside(self.order, within, linear, made)
+                make = partial(attempt, self.order, within)
+                return best_beside(self.order, within, linear, made, make)
             if isinstance(made, Shortfall):
                 # With few values left the dead zone may fail for any reason.
                 if number == 0 and made.what != "distinct values":
@@ -570,7 +598,12 @@ def ways_to_less_error(spec: CircuitSpec) -> list[str]:
 
 
 def best_beside(
-    order: Order, within: ConditionLimits, linear: LinearBlock, first: Attempt | Shortfall
+    order: Order,
+    within: ConditionLimits,
+    linear: LinearBlock,
+    first: Attempt | Shortfall,
+    make: Callable[[LinearBlock], Attempt | Shortfall],
+    most: int = BESIDE,
 ) -> Attempt | Shortfall:
     """The attempt of least error among linear blocks as good as ``linear``.
 
@@ -579,11 +612,12 @@ def best_beside(
     that counts, others of the least error are tried, one for each interval of R4 that is left.
 
     first : the attempt with ``linear`` itself, which stands unless another is better by more than
-    what counts.
+    what counts. make : an attempt with another linear block. most : of them.
     """
     best = first
     left = deque(_beside(linear, (0.0, float("inf")), order.stiffness))
-    most = BESIDE if Targets.of(order.model).fully_coupled_pair else BESIDE_TREE
+    if not Targets.of(order.model).fully_coupled_pair:
+        most = min(most, BESIDE_TREE)
     for number in range(most):
         if (
             not left
@@ -597,7 +631,7 @@ def best_beside(
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue
             left.extend(_beside(other, between, order.stiffness))
-            made = attempt(order, within, other)
+            made = make(other)
         if isinstance(made, Attempt) and _error(made) < _error(best) - EXACT:
             best = made
     return best

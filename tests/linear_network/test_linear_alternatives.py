@@ -55,7 +55,7 @@ def test_the_best_of_those_tried_is_taken() -> None:
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
     first = attempt(wanted, within, block)
-    best = best_beside(wanted, within, block, first)
+    best = best_beside(wanted, within, block, first, partial(attempt, wanted, within))
     assert isinstance(first, Attempt)
     assert isinstance(best, Attempt)
     assert best.errors.max_error <= first.errors.max_error

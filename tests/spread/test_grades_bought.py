@@ -363,7 +363,7 @@ def test_a_value_that_only_other_cases_have_names_their_family() -> None:
         CATALOG.mounted("tht").part("resistor", 4.7e6, 0.01)
     assert "Yageo RC0603FR-07" in caught.value.expected
     with pytest.raises(Unreachable, match="no surface-mounted form") as caught:
-        CATALOG.mounted("smd").values("capacitor", ["E12"], 15e-9, 50e-9, 0.01)
+        CATALOG.mounted("smd").values("capacitor", ["E12"], 50e-9, 95e-9, 0.01)
     assert "Vishay MKP1837" in caught.value.expected
 
 

@@ -654,7 +654,7 @@ def test_a_deleted_folder_is_said_at_the_next_block(
 
 @pytest.mark.slow
 def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) -> None:
-    """All layers, killed six times at random moments, resumed; beside one that nobody disturbed."""
+    """All layers, killed at three random moments, resumed; beside one that nobody disturbed."""
     more = ["--rung", "auto", "--tuned", "--reached", "--map", "grade", "--jobs", "1"]
     whole, out = tmp_path / "whole" / "out", tmp_path / "killed" / "out"
     began = time.monotonic()
@@ -662,7 +662,7 @@ def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) 
     took = time.monotonic() - began
     chance = random.Random(11)
     kills = 0
-    for _ in range(6):
+    for _ in range(3):
         process = _process(home, out, *more, "--resume")
         try:
             process.wait(chance.uniform(0.1, 0.5) * took)
