@@ -305,6 +305,8 @@ def figures(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "systems": len(rows),
         "below_1_percent": len(solved),
+        "parts_within_20_s": sum(seconds <= SOON for seconds in first),
+        "parts_within_60_s": sum(seconds <= LATE for seconds in first),
         "within_20_s": sum(row["cpu"] <= SOON for row in solved),
         "within_60_s": sum(row["cpu"] <= LATE for row in solved),
         "above_1_percent": sum(row["outcome"] == INEXACT for row in rows),
@@ -335,7 +337,14 @@ def _shape_rows(rows: Sequence[Row]) -> Iterator[list[str]]:
 
 def _counts(rows: Sequence[Row]) -> list[str]:
     f = figures(rows)
-    keys = ("systems", "below_1_percent", "within_20_s", "within_60_s", "above_1_percent")
+    keys = (
+        "systems",
+        "below_1_percent",
+        "parts_within_20_s",
+        "within_20_s",
+        "within_60_s",
+        "above_1_percent",
+    )
     more = ("refused", "wrongly_refused", "no_answer", "failed")
     shown = f"{f['nominal_shows_it']} of {f['nominal_asked']}"
     return [str(f[k]) for k in (*keys, *more)] + [shown, f"{f['yield_95']} of {f['yield_asked']}"]
@@ -372,10 +381,18 @@ def why(rows: Sequence[Row]) -> Iterator[str]:
 def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     """README.md."""
     f = figures(rows)
-    header = ["what", "systems", "below 1 %", "within 20 s", "within 60 s", "above 1 %", "refused"]
-    header += ["wrongly", "no answer", "failed", "nominal shows it", "yield ≥ 95 %"]
+    header = ["what", "systems", "below 1 %", "parts ≤ 20 s", "all ≤ 20 s", "all ≤ 60 s"]
+    header += [
+        "above 1 %",
+        "refused",
+        "wrongly",
+        "no answer",
+        "failed",
+        "nominal shows it",
+        "yield ≥ 95 %",
+    ]
     columns = ["number", "masses, clearances", "what", "outcome", "error", "certificate", "gap"]
-    columns += ["CPU s", "wall s", "first parts s", "model → nominal", "yield", "other search"]
+    columns += ["CPU s", "wall s", "parts s", "model → nominal", "yield", "other search"]
     worst = Counter(row["worst"] for row in rows if row["outcome"] == INEXACT)
     lines = [
         "# Strangers' systems: who gets a circuit, how good, how soon, and who does not",
@@ -392,8 +409,11 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         "",
         filled(
             f"Of {f['systems']} systems {f['below_1_percent']} get a circuit whose largest "
-            f"coefficient error is below 1 %, {f['within_20_s']} of them within {SOON:g} s and "
-            f"{f['within_60_s']} within {LATE:g} s; {f['above_1_percent']} get one above 1 %, "
+            f"coefficient error is below 1 %: their parts stand within {SOON:g} s for "
+            f"{f['parts_within_20_s']} of them and within {LATE:g} s for "
+            f"{f['parts_within_60_s']}; with files, design rules and start recipes all is done "
+            f"within {SOON:g} s of CPU time for {f['within_20_s']} and within {LATE:g} s for "
+            f"{f['within_60_s']}. {f['above_1_percent']} get one above 1 %, "
             f"{f['refused']} are refused, {f['no_answer']} have no answer after {seconds:g} s. "
             f"{f['wrongly_refused']} of the refused and unanswered have parts that keep every side "
             "condition with an error below 1 %: another search found them. "
@@ -403,10 +423,11 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         ),
         "",
         filled(
-            "Seconds are CPU seconds of the whole verb `synthesise`, start-up and start recipes "
+            "*All* is CPU time of the whole verb `synthesise`, start-up and start recipes "
             "included, with all compiled code there: the machine was shared, and wall time says "
-            "more of its load. *First parts* is wall time until the line on standard error that "
-            "says that parts stand. *Gap* is the error less its proved lower bound. *Wrongly* "
+            "more of its load. *Parts* is wall time until the line on standard error that "
+            "says that parts stand, start-up included; they do not change after it. "
+            "*Gap* is the error less its proved lower bound. *Wrongly* "
             "counts refused or unanswered systems for which the other search (`stranger_parts`: "
             "random scales inside the side conditions, values rounded to the series, the finished "
             "circuit reduced and checked) has parts."

@@ -22,13 +22,17 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar, Token
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from designer.base.printed import printable, tell
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID
 
+Show = Callable[[Mapping[str, Any]], None]
+"""Takes an answer while the work goes on: of a design once its parts stand, of a study once the
+yields of the exact circuit stand, where ngspice is asked after that, and once all yields stand,
+where blame or maps take time after that."""
 LOG = logging.getLogger("designer")
 EVERY = 20.0
 """s between two lines about the steps of a stage."""

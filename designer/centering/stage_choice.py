@@ -1,8 +1,9 @@
-"""Which stage makes the clearance, where the model file states none.
+"""Which stage makes the clearance, where the model file states none; whether a stated one is worse.
 
 Both are designed, and a few boards of each are asked what they show. The stage whose boards keep
 the responses is taken; where the boards cannot tell the two apart, one that fails no design rule of
-the circuit, then the smaller one.
+the circuit, then the smaller one. Of a stated stage whose boards lose a response it is said how
+many boards of the other one keep it, if those are more.
 """
 
 from __future__ import annotations
@@ -75,11 +76,8 @@ class StageForecast:
     def better_than(self, other: StageForecast) -> bool:
         """Whether it is to be taken: by what its boards keep, if that differs by more than chance;
         else by the rules, the error and the number of parts."""
-        if self.kept is not None and other.kept is not None:
-            one, two = self.kept / BOARDS, other.kept / BOARDS
-            chance = math.sqrt((one * (1.0 - one) + two * (1.0 - two)) / BOARDS)
-            if abs(one - two) > 2.0 * chance:
-                return one > two
+        if self.kept is not None and other.kept is not None and _differ(self.kept, other.kept):
+            return self.kept > other.kept
         return self._rank < other._rank
 
     @property
@@ -104,11 +102,8 @@ def synthesise(
         choice where neither can be.
     """
     catalog = load_catalog() if catalog is None else catalog
-    clearances = modelfile.model.second_order().clearances
-    able: list[DeadZone] = [
-        kind for kind in get_args(DeadZone) if stage_refusal(clearances, kind) is None
-    ]
-    if modelfile.circuit.dead_zone is not None or not clearances or len(able) < 2:
+    able = _able(modelfile)
+    if modelfile.circuit.dead_zone is not None or len(able) < 2:
         return synthesis_result.synthesise(modelfile, catalog, all_found=all_found, jobs=jobs)
     began = time.perf_counter()
     forecasts: list[StageForecast] = []
@@ -137,8 +132,55 @@ def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:
     return replace(first.synthesis, stage_reason=f"{first.words}; {beside}")
 
 
-def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
-    """What a few boards of a design show, and which rules its circuit fails."""
+def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> str:
+    """What is said of a stage that the model file states while boards of the other one keep the
+    responses more often, by more than chance; empty otherwise.
+
+    synthesis : the design with the stated stage.
+    """
+    stated, able = modelfile.circuit.dead_zone, _able(modelfile)
+    if stated is None or len(able) < 2:
+        return ""
+    kept = boards_that_keep(synthesis, jobs)
+    if kept is None or kept == BOARDS:
+        return ""
+    (kind,) = (each for each in able if each != stated)
+    with part(f"with the {kind} stage"):
+        try:
+            other = synthesis_result.synthesise(
+                with_stage(modelfile, kind), load_catalog(), jobs=jobs, told=False
+            )
+            others = boards_that_keep(other, jobs)
+        except (InputError, Unreachable):
+            return ""
+    if others is None or others <= kept or not _differ(kept, others):
+        return ""
+    parts, error = len(other.design.circuit.values), other.design.errors.max_error
+    return (
+        f"The file states the {stated} stage, and the other one keeps the responses more often. "
+        f"Of the response that is lost most, {kept} of {BOARDS} boards keep it; with the {kind} "
+        f"stage {others} of {BOARDS} (largest error {100 * error:.2g} %, {parts} parts). "
+        f'circuit.dead_zone = "{kind}" takes that one.'
+    )
+
+
+def _able(modelfile: ModelFile) -> list[DeadZone]:
+    """The stages that make the clearances of a model; none where it has none."""
+    clearances = modelfile.model.second_order().clearances
+    kinds: tuple[DeadZone, ...] = get_args(DeadZone) if clearances else ()
+    return [kind for kind in kinds if stage_refusal(clearances, kind) is None]
+
+
+def _differ(one: int, two: int) -> bool:
+    """Whether two counts of ``BOARDS`` differ by more than chance."""
+    shares = one / BOARDS, two / BOARDS
+    chance = math.sqrt(sum(share * (1.0 - share) for share in shares) / BOARDS)
+    return abs(shares[0] - shares[1]) > 2.0 * chance
+
+
+def boards_that_keep(synthesis: Synthesis, jobs: int = 1) -> int | None:
+    """Of ``BOARDS`` boards of a design, those that keep the response that the fewest keep; None
+    without a response that the model shows with a period."""
     doing("boards of the stage")
     design = synthesis.design
     checked = [
@@ -161,6 +203,12 @@ def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
             answers = settled(sample, cases, jobs, brief=True)
             counts.append(sum(verdict is Verdict.OK for _, verdict, _ in answers))
         kept = min(counts)
+    return kept
+
+
+def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:
+    """What a few boards of a design show, and which rules its circuit fails."""
+    kept = boards_that_keep(synthesis, jobs)
     try:
         outcomes = run_rules.on_circuit(RuleSubject.of(synthesis), synthesis.modelfile.rules)
     except InputError:  # no board can be made of it, which its own checks say

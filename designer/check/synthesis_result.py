@@ -38,6 +38,8 @@ class Synthesis:
     """Wall time [s]."""
     stage_reason: str = ""
     """Why the circuit has its dead-zone stage, where the model file states none."""
+    better_stage: str = ""
+    """What is said of a stated stage that is the worse one; empty where it is not."""
     outcomes: tuple[RuleOutcome, ...] | None = None
     """What the design rules of its circuit say, where they were judged already."""
 
@@ -63,11 +65,13 @@ def synthesise(
     *,
     all_found: bool = False,
     jobs: int = 1,
+    told: bool = True,
 ) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
 
     all_found : whether there have to be all of them before a part is chosen; one that is not there
     has the swing of what was found instead otherwise. jobs : threads; no part depends on it.
+    told : whether who watches hears that parts stand.
 
     Raises
     ------
@@ -87,7 +91,8 @@ def synthesise(
         held = peaks(modelfile.model, responses)
         with seeking("parts"):
             design = parts_choice.synthesise(*choice, held, responses, jobs=jobs)
-        note(stands(design, time.perf_counter() - began))
+        if told:
+            note(stands(design, time.perf_counter() - began))
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
 

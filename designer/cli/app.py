@@ -17,9 +17,9 @@ import typer.core
 
 from designer.base.errors import DesignerError, InputError, ResponseNotFound
 from designer.base.printed import printable
-from designer.base.progress import Progress, progress_for
+from designer.base.progress import Progress, Show, progress_for
 from designer.base.version import __version__
-from designer.verbs.declared import GROUPS, Show, Verb, Word
+from designer.verbs.declared import GROUPS, Verb, Word
 
 VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules bench "
@@ -153,12 +153,13 @@ def _plain(value: Any) -> Any:
 
 
 def _early(verb: Verb, progress: Progress, *, tables: bool) -> Show:
-    """What shows an answer while the work goes on: in one way, and then in another."""
+    """What shows an answer while the work goes on: the parts, then a study in one way, and from
+    then on in another."""
     first, later = verb.early or (None, None)
     ways = itertools.chain([first], itertools.repeat(later))
 
     def show(answer: Mapping[str, Any]) -> None:
-        way = next(ways)
+        way = next(ways) if "samples" in answer else verb.parts
         if tables and way is not None:
             with progress.aside():
                 way(answer)

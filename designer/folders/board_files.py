@@ -15,7 +15,7 @@ from designer.catalog.stock_list import StockRow
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules.rule_subject import RuleSubject
 from designer.fabrication.bench_sheet import bench_sheet
-from designer.fabrication.board_cost import cost_markdown, cost_or_none
+from designer.fabrication.board_cost import CostEstimate, cost_markdown
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
 
@@ -28,7 +28,7 @@ def names(modelfile: ModelFile) -> list[str]:
 
 
 def texts(synthesis: Synthesis) -> dict[str, str]:
-    """The content of all but the drawing, by name.
+    """The content of all but the notes and the drawing, by name.
 
     Raises
     ------
@@ -36,17 +36,16 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
     Unreachable : a value that cannot be bought.
     """
     doing("bill of materials")
-    circuit, choice = board_circuit(synthesis)
-    parts = components(circuit, synthesis.catalog, choice)
-    return {NOTES: notes(synthesis), **_bills(synthesis, parts, choice)}
+    return bills(synthesis)
 
 
-def notes(synthesis: Synthesis, subject: RuleSubject | InputError | None = None) -> str:
+def notes(
+    synthesis: Synthesis, subject: RuleSubject | InputError, cost: CostEstimate | None
+) -> str:
     """The text of ``board.md``; raises as ``texts`` does. subject : what the circuit does, for the
-    sheet at the bench; without it the sheet is left out."""
+    sheet at the bench. cost : of the boards, where they can be placed."""
     circuit, choice = board_circuit(synthesis)
     parts = components(circuit, synthesis.catalog, choice)
-    cost = cost_or_none(synthesis)
     sections = [board_notes.markdown(synthesis, circuit, choice, parts)]
     sheet = bench_sheet(subject) if isinstance(subject, RuleSubject) else None
     sections += [] if sheet is None else [sheet.markdown]

@@ -26,10 +26,10 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.design_rules.rule_subject import RuleSubject
-from designer.fabrication.board_cost import cost_or_none
+from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes
-from designer.folders.design_findings import findings, subject_of
+from designer.folders.design_findings import error_warnings, findings, subject_of
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
 from designer.linear_network.milp import SOLVER
@@ -80,9 +80,9 @@ def write_last(
     """Write the rest of the stage: the drawing, how to start each response, and ``design.json``.
     other : as of ``find_recipes``. drawing : waits for it."""
     design, responses = synthesis.design, synthesis.model_responses
-    subject = subject_of(synthesis, other)
-    document = dumps(answer(synthesis, subject))
-    folder.write(board_files.NOTES, board_files.notes(synthesis, subject))
+    subject, cost = subject_of(synthesis, other), cost_or_none(synthesis)
+    document = dumps(_answer(synthesis, subject, cost))
+    folder.write(board_files.NOTES, board_files.notes(synthesis, subject, cost))
     for name, content in drawing().items():
         folder.write(name, content)
     recipes = start_recipes(synthesis, jobs, other)
@@ -98,11 +98,22 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
             folder.rewrite(name, text)
 
 
-def answer(synthesis: Synthesis, subject: RuleSubject | InputError | None = None) -> dict[str, Any]:
-    """The JSON object of ``design.json``. subject : as of ``findings``; None for it to be made."""
+def answer(synthesis: Synthesis) -> dict[str, Any]:
+    """The JSON object of ``design.json``."""
+    return _answer(synthesis, subject_of(synthesis), cost_or_none(synthesis))
+
+
+def _answer(
+    synthesis: Synthesis, subject: RuleSubject | InputError, cost: CostEstimate | None
+) -> dict[str, Any]:
     doing("design rules of the circuit")
-    found = findings(synthesis, subject_of(synthesis) if subject is None else subject)
-    cost = cost_or_none(synthesis)
+    found = findings(synthesis, subject)
+    document = chosen(synthesis)
+    return {**document, "board_cost": None if cost is None else cost.as_dict(), **found}
+
+
+def chosen(synthesis: Synthesis) -> dict[str, Any]:
+    """Of ``answer``, what is known as soon as the parts are chosen."""
     document = synthesis_json(
         synthesis.modelfile,
         synthesis.design,
@@ -113,7 +124,7 @@ def answer(synthesis: Synthesis, subject: RuleSubject | InputError | None = None
     )
     if synthesis.stage_reason:
         document["dead_zone"]["reason"] = synthesis.stage_reason
-    return {**document, "board_cost": None if cost is None else cost.as_dict(), **found}
+    return {**document, "warnings": list(error_warnings(synthesis))}
 
 
 def design_provenance(synthesis: Synthesis) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[st
     A design without responses, or one that no board can be made of, has no rule that fails for
     want of something to look at; the latter is a warning.
     """
-    warnings = [*_error(synthesis), *_responses(synthesis)]
+    warnings = [*error_warnings(synthesis), *_responses(synthesis)]
     failed: list[RuleOutcome] = []
     if isinstance(subject, InputError):
         warnings.append(f"The design rules were not looked at: {subject}")
@@ -50,12 +50,14 @@ def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[st
         known = synthesis.outcomes
         outcomes = run_rules.on_circuit(subject, limits) if known is None else known
         failed = [o for o in outcomes if o.status == FAIL]
+    if synthesis.better_stage:
+        warnings.append(synthesis.better_stage)
     if failed:
         warnings.append(_rules([o.rule.id for o in failed]))
     return {"warnings": warnings, "failed_rules": [o.as_dict() for o in failed]}
 
 
-def _error(synthesis: Synthesis) -> Iterator[str]:
+def error_warnings(synthesis: Synthesis) -> Iterator[str]:
     """A largest coefficient error that is too large, and what lowers it."""
     design, spec = synthesis.design, synthesis.modelfile.circuit
     worst = design.errors.max_error

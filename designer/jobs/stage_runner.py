@@ -7,19 +7,26 @@ last; what is interrupted in between can be resumed.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
-from designer.base.progress import Progress
+from designer.base.plain_json import plain
+from designer.base.progress import Progress, Show
 from designer.base.second_process import Ask, other_process
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files, design_files, kicad_files
-from designer.folders.design_source import design_inputs, design_stage, standing_design
+from designer.folders.design_source import (
+    design_answer,
+    design_inputs,
+    design_stage,
+    standing_design,
+)
 from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, errors_in
@@ -34,7 +41,8 @@ class StageRunner:
     Parameters
     ----------
     out : the folder, which need not exist. anew : whether a design that was made with another
-    catalogue or version is to be chosen anew; it stands otherwise.
+    catalogue or version is to be chosen anew; it stands otherwise. shown : is given what is known
+    of the design as soon as its parts stand.
 
     Raises
     ------
@@ -49,10 +57,11 @@ class StageRunner:
         progress: Progress,
         *,
         anew: bool = False,
+        shown: Show = lambda _: None,
     ) -> None:
         options.check()
         self.modelfile, self.options, self.progress = modelfile, options, progress
-        self.catalog, self.folder = load_catalog(), Folder(out)
+        self.catalog, self.folder, self.shown = load_catalog(), Folder(out), shown
         self.stages = (
             design_stage(modelfile, design_inputs(modelfile, self.catalog))
             if anew
@@ -91,10 +100,16 @@ class StageRunner:
                 other_process(jobs, *WRITING) as other,
             ):
                 synthesis = stage_choice.synthesise(self.modelfile, self.catalog, jobs=jobs)
+                self.shown(plain(design_files.chosen(synthesis)))
                 compiled()
+                if self.modelfile.circuit.dead_zone is not None:
+                    self.progress.stage("the other stage of the clearance")
+                    better = stage_choice.better_stage(self.modelfile, synthesis, jobs)
+                    synthesis = replace(synthesis, better_stage=better)
                 write_design(self.folder, synthesis, stages, self.options, self.progress, other)
         else:
             synthesis = design_files.load(self.folder, self.modelfile, self.catalog)
+            self.shown(design_answer(self.folder))
             if stages:
                 self.folder.begin(stages, design_files.design_provenance(synthesis))
         return synthesis

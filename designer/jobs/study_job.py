@@ -11,7 +11,7 @@ from typing import Any
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
@@ -31,7 +31,6 @@ from designer.jobs.study_stage import (
     BUILT,
     RANDOM,
     Place,
-    Shown,
     StudyHelp,
     StudyStage,
     checks_in_memory,
@@ -55,7 +54,7 @@ def design_and_study(
     words: Mapping[str, Any],
     command: Callable[[Options, Path, Path | None], str],
     progress: Progress | None,
-    shown: Shown,
+    shown: Show,
     catalog: Catalog | None = None,
     *,
     whole_job: bool = False,
@@ -125,7 +124,7 @@ def run_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-    shown: Shown = lambda _: None,
+    shown: Show = lambda _: None,
     *,
     routed: bool = False,
 ) -> JobOutcome:
@@ -141,7 +140,7 @@ def run_into(
     options.check()
     need_responses(modelfile)
     options = rung_choice.with_rung(Folder(out), options, progress)
-    runner = StageRunner(modelfile, out, options, progress)
+    runner = StageRunner(modelfile, out, options, progress, shown=shown)
     folder = runner.folder
     # A study is of the boards as they are bought now, whatever the design's own inputs say.
     design_now = design_inputs(modelfile, runner.catalog)
@@ -178,7 +177,7 @@ def measured_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-    shown: Shown = lambda _: None,
+    shown: Show = lambda _: None,
 ) -> JobOutcome:
     """Study the boards of a list, once each, in the design folder whose parts they have.
 

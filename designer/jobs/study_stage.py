@@ -18,7 +18,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files, study_json
@@ -47,9 +47,6 @@ SPICE_TIMEOUT = 900.0
 """The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
 Checks = tuple[EquationCheck | None, tuple[CheckedResponse, ...]]
 """What ngspice says of a design's equations, and its nominal responses on every engine."""
-Shown = Callable[[Mapping[str, Any]], None]
-"""Called with the answer once the yields of the exact circuit stand, where ngspice is asked after
-that, and once all yields stand, where blame or maps take time after that."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +137,7 @@ class StudyStage:
     """The command line that its report states."""
     progress: Progress
     """Told how far the work is."""
-    shown: Shown
+    shown: Show
     """Shows the yields while the work goes on."""
     early: bool = False
     """Whether the yields were shown."""

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
@@ -33,10 +34,17 @@ from designer.report.comparison import (
 
 
 def synthesise_into(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress, *, compare: bool = False
+    modelfile: ModelFile,
+    out: Path,
+    options: Options,
+    progress: Progress,
+    shown: Show = lambda _: None,
+    *,
+    compare: bool = False,
 ) -> JobOutcome:
-    """The design in the folder ``out``; with ``compare`` the comparison is a stage of its own."""
-    runner = StageRunner(modelfile, out, options, progress, anew=True)
+    """The design in the folder ``out``; with ``compare`` the comparison is a stage of its own.
+    shown : is given what is known of the design as soon as its parts stand."""
+    runner = StageRunner(modelfile, out, options, progress, anew=True, shown=shown)
     names = [COMPARISON, *COMPARISON_PICTURES]
     stages: Stages = {"comparison": (runner.design_inputs, names)} if compare else {}
     synthesis = runner.design() if runner.decide(stages) else None
@@ -57,6 +65,8 @@ def synthesise_in_memory(
 ) -> JobOutcome:
     progress.stage("responses of the model, parts")
     synthesis = stage_choice.synthesise(modelfile, catalog, jobs=jobs)
+    better = stage_choice.better_stage(modelfile, synthesis, jobs)
+    synthesis = replace(synthesis, better_stage=better)
     answer = plain(design_files.answer(synthesis))
     if compare:
         answer = _beside(answer, plain(_comparison(synthesis, progress)))

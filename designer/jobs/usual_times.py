@@ -23,6 +23,8 @@ SEARCHED: Final[Mapping[str, float]] = {
 """Of the search for the design of the highest yield."""
 CHOSEN: Final[Mapping[str, float]] = {"responses of the model, parts": 12.0}
 """Of the choice of parts by the match."""
+OTHER_STAGE: Final[Mapping[str, float]] = {"the other stage of the clearance": 4.0}
+"""Of a look at the stage that the file does not state."""
 WRITTEN: Final[Mapping[str, float]] = {
     "files of the design": 5.0,
     "KiCad project": 4.0,
@@ -61,4 +63,7 @@ CURED: Final[Mapping[str, float]] = {
 
 def of_design(modelfile: ModelFile) -> dict[str, float]:
     """Of the design of this model file, made and written."""
-    return {**(SEARCHED if modelfile.circuit.objective == "yield" else CHOSEN), **WRITTEN}
+    if modelfile.circuit.objective == "yield":
+        return {**SEARCHED, **WRITTEN}
+    other = OTHER_STAGE if modelfile.circuit.dead_zone is not None else {}
+    return {**CHOSEN, **other, **WRITTEN}

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 if TYPE_CHECKING:
+    from designer.base.progress import Show
     from designer.model.model_file import ModelFile
 
 GROUPS = ("Design", "Study", "Explore", "Make")
@@ -87,9 +88,6 @@ Resume = Annotated[
     bool, option("--resume", None, "Go on with work that was interrupted.", decides=False)
 ]
 
-Show = Callable[[Mapping[str, Any]], None]
-"""Prints an answer as tables."""
-
 
 def answer_of(result: Any) -> Mapping[str, Any]:
     """The JSON object of what most verbs return."""
@@ -113,9 +111,11 @@ class Verb:
     """The object for ``--json``; None of a verb that has none."""
     satisfied: Callable[[Any], bool] = lambda _: True
     """Whether what the function returns is a yes: exit status 0."""
+    parts: Show | None = None
+    """How the design is shown as soon as its parts stand; the function is given what does that as
+    ``shown``."""
     early: tuple[Show, Show] | None = None
-    """How an answer is shown while the work goes on, the first time and then; the function is
-    given what does that as ``shown``."""
+    """How a study's answer is shown while the work goes on, the first time and then, likewise."""
     computes: bool = True
     """Whether it may need the exact engine, whose compilation is then announced."""
 

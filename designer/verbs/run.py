@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.verbs import next_steps
 from designer.verbs.declared import (
     Blame,
@@ -15,11 +15,10 @@ from designer.verbs.declared import (
     OwnSeed,
     Resume,
     Samples,
-    Show,
     Source,
     Verb,
 )
-from designer.verbs.tables import design_written, tolerance, whole_job
+from designer.verbs.tables import design_written, studied, synthesised, tolerance, whole_job
 
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
@@ -66,7 +65,9 @@ def run(
 
 def show(result: JobOutcome) -> None:
     """The tables, where the files are, and what may be done next."""
-    design_written(result, result.answer, whole_job, next_steps.after_study)
+    parts_stand_above = result.folder is not None and not result.reused
+    tables = studied if parts_stand_above else whole_job
+    design_written(result, result.answer, tables, next_steps.after_study)
 
 
 VERB = Verb(
@@ -75,5 +76,6 @@ VERB = Verb(
     "designer run model.toml --out out/model --samples 200",
     show=show,
     satisfied=lambda result: result.satisfied,
-    early=(whole_job, tolerance),
+    parts=synthesised,
+    early=(studied, tolerance),
 )

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import SEED
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.verbs import next_steps
 from designer.verbs.console import grid, say
 from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
-from designer.verbs.tables import design_written, synthesised
+from designer.verbs.tables import design_written, not_good_enough, synthesised
 
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
@@ -31,11 +31,13 @@ def synthesise(
     resume: Resume = False,
     catalog: Catalog | None = None,
     progress: Progress | None = None,
+    shown: Show = lambda _: None,
 ) -> JobOutcome:
     """Choose the parts and write the design folder.
 
     A ``ModelFile`` without ``out`` is worked on in memory, and so is a path with ``compare``.
-    catalog : in memory, instead of the one that is found.
+    catalog : in memory, instead of the one that is found. shown : is given what is known of the
+    design as soon as its parts stand.
 
     Raises
     ------
@@ -61,7 +63,9 @@ def synthesise(
     modelfile, folder = source(model, out)
     with progress.whole(usual_times.of_design(modelfile)):
         modelfile = design_file(modelfile, folder, options, progress)
-        return synthesise_job.synthesise_into(modelfile, folder, options, progress, compare=compare)
+        return synthesise_job.synthesise_into(
+            modelfile, folder, options, progress, shown, compare=compare
+        )
 
 
 synthesize = synthesise
@@ -70,12 +74,25 @@ synthesize = synthesise
 
 def show(result: JobOutcome) -> None:
     """The tables, where the files are, and what may be done next."""
-    design_written(result, result.answer, tables, next_steps.after_design)
+    parts_stand_above = result.folder is not None and not result.reused
+    design_written(
+        result,
+        result.answer,
+        _after_parts if parts_stand_above else tables,
+        next_steps.after_design,
+    )
 
 
 def tables(answer: Mapping[str, Any]) -> None:
     """The design, and beside the paper's where that was asked for."""
     synthesised(answer)
+    if "comparison" in answer:
+        _compared(answer["comparison"])
+
+
+def _after_parts(answer: Mapping[str, Any]) -> None:
+    """What was not known yet when the parts were shown."""
+    not_good_enough(answer)
     if "comparison" in answer:
         _compared(answer["comparison"])
 
@@ -95,5 +112,6 @@ VERB = Verb(
     "Design",
     "designer synthesise model.toml --out out/model",
     show=show,
+    parts=synthesised,
     satisfied=lambda result: result.satisfied,
 )

@@ -41,6 +41,12 @@ def whole_job(answer: Mapping[str, Any]) -> None:
     tolerance(answer)
 
 
+def studied(answer: Mapping[str, Any]) -> None:
+    """What is not good enough, then the responses; the parts were shown before."""
+    not_good_enough(answer)
+    tolerance(answer)
+
+
 def not_good_enough(answer: Mapping[str, Any]) -> None:
     """What stands before everything else that a verb says of a design, where there is
     something."""

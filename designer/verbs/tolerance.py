@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import Over, StudyEngine
 from designer.base.errors import InputError
-from designer.base.progress import Progress
+from designer.base.progress import Progress, Show
 from designer.verbs import next_steps, tables
 from designer.verbs.declared import (
     Blame,
@@ -20,7 +20,6 @@ from designer.verbs.declared import (
     OwnSeed,
     Resume,
     Samples,
-    Show,
     Verb,
     argument,
     option,

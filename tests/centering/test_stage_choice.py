@@ -55,6 +55,9 @@ def test_the_stage_is_taken_whose_boards_keep_the_response() -> None:
         stated = with_stage(modelfile, kind)
         other = made if kind == "rectifier" else stage_choice.synthesise(stated, CATALOG)
         assert other.modelfile.circuit.dead_zone == kind
+        said = stage_choice.better_stage(stated, other, 2)
+        assert ("with the rectifier stage" in said) is (kind == "saturation")
+        assert not stage_choice.better_stage(modelfile, other)  # none is stated there
         checked = checked_design.check(other.design, other.model_responses, None)
         plan = plan_study(stated, other.design, checked, CATALOG, samples=40, seed=11)
         answers = exact_rung.block(plan, range(40), 2)
