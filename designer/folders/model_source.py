@@ -26,6 +26,19 @@ def model_file(path: Path) -> ModelFile:
     return replace(modelfile, title=title)
 
 
+def model_of(model: Path | str | ModelFile) -> ModelFile:
+    """The model file of a verb that writes nothing into a folder: one that was read, its path, or a
+    design folder.
+
+    Raises
+    ------
+    InputError : none of these.
+    """
+    if isinstance(model, ModelFile):
+        return model
+    return source(model, model)[0] if Path(model).is_dir() else model_file(Path(model))
+
+
 def source(model: Path | str | ModelFile, out: Path | str | None) -> tuple[ModelFile, Path]:
     """The model file of a verb's argument (one that was read, its path, or a design folder), and
     the folder to write into.

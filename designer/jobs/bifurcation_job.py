@@ -43,7 +43,7 @@ from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders.curve_store import CurveBlocks, curves_csv
-from designer.folders.model_source import source
+from designer.folders.model_source import model_of
 from designer.folders.origin import provenance
 from designer.folders.share_store import ShareBlocks, shares_csv
 from designer.folders.sweep_store import GridStore, SweepStore, work_hash
@@ -59,7 +59,7 @@ from designer.jobs.bifurcation_request import (
     share_plan,
 )
 from designer.jobs.options import Options
-from designer.model.model_file import ModelFile, read_model_file
+from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
 from designer.plots import captions, point_captions, titles
 from designer.spread.part_rules import spread_of
@@ -447,18 +447,15 @@ def requested(
 def _subject(
     model: Path | str | ModelFile, request: Request, progress: Progress
 ) -> tuple[ModelFile, Swept]:
-    if not isinstance(model, ModelFile) and Path(model).is_dir():
-        if request.circuit:
-            from designer.folders.design_source import read_design
+    if request.circuit and not isinstance(model, ModelFile) and Path(model).is_dir():
+        from designer.folders.design_source import read_design
 
-            synthesis = read_design(model, progress=progress)
-            return synthesis.modelfile, BoardSubject(synthesis.design)
-        modelfile, _ = source(model, model)
-    else:
-        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
-        if request.circuit:
-            expected = "a design folder (designer synthesise)"
-            raise InputError(modelfile.source, "--circuit", "a model file", expected)
+        synthesis = read_design(model, progress=progress)
+        return synthesis.modelfile, BoardSubject(synthesis.design)
+    modelfile = model_of(model)
+    if request.circuit:
+        expected = "a design folder (designer synthesise)"
+        raise InputError(modelfile.source, "--circuit", "a model file", expected)
     return modelfile, ModelSubject(modelfile.model, scales=modelfile.si)
 
 

@@ -106,6 +106,12 @@ class Gap(FileTable):
     preload: Annotated[float, physical("N", zero=True)] = 0.0
     """Force with which the stops push as soon as they are touched: that of a spring that is held
     short."""
+    preload_over: Annotated[float | None, physical("m")] = None
+    """Depth over which that force rises from 0; None: it is there at once."""
+    restitution: Annotated[
+        float | None, number("", "a number > 0, at most 1", lambda e: 0.0 < e <= 1.0)
+    ] = None
+    """Speed after a contact over that before it, in the place of ``damping``."""
     law: Annotated[Literal["linear", "hertz"], choice("linear", "hertz")] = "linear"
     """Force of a stop over its depth: straight, or constant · depth^1.5."""
     constant: Annotated[float | None, number("", "a number > 0", lambda k: k > 0.0)] = None
@@ -131,10 +137,11 @@ class Gap(FileTable):
             stiffness = self.stiffness if side_stiffness is None else side_stiffness
             if gap is None:
                 return None
+            more = self.preload, self.preload_over or 0.0
             if hertz is not None:
-                return Side(gap, hertz.stiffness, hertz.further, self.preload)
+                return Side(gap, hertz.stiffness, hertz.further, *more)
             assert stiffness is not None
-            return Side(gap, stiffness, (), self.preload)
+            return Side(gap, stiffness, (), *more)
 
         return side(self.upper, self.upper_stiffness), side(self.lower, self.lower_stiffness)
 

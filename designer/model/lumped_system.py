@@ -9,6 +9,7 @@ refusal says which element, and what to do.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -95,6 +96,10 @@ def _check_gap(gap: Gap) -> None:
         text = f"{gap.upper:g}, with lower = {gap.lower:g}"
         more = "two stops that are both in contact at rest are two clearances, one for each"
         _refuse(f"{field}.upper", text, f"upper + lower > 0; {more}")
+    if gap.preload_over is not None and not gap.preload:
+        _refuse(f"{field}.preload_over", gap.preload_over, "none without a preload, which rises")
+    if gap.restitution is not None:
+        _check_restitution(gap, f"{field}.restitution")
     if gap.law == "hertz":
         for key in ("constant", "depth"):
             if getattr(gap, key) is None:
@@ -112,6 +117,18 @@ def _check_gap(gap: Gap) -> None:
             _refuse(f"{field}.{side}_stiffness", stiffness, f"none: there is no {side} stop")
         if getattr(gap, side) is not None and stiffness is None and gap.stiffness is None:
             _refuse(f"{field}.stiffness", MISSING, f"a stiffness, or {side}_stiffness")
+
+
+def _check_restitution(gap: Gap, field: str) -> None:
+    """It decides the damper of the stops, so that there is one damper and one stiffness for it."""
+    if gap.damping:
+        _refuse(field, gap.restitution, "none beside damping, which it decides")
+    if gap.law == "hertz":
+        _refuse(field, gap.restitution, 'damping instead: with law = "hertz" no stiffness decides')
+    upper, lower = gap.sides
+    if upper and lower and upper.stiffness != lower.stiffness:
+        expected = "stops of one stiffness, or a [[clearance]] for each: they have one damper"
+        _refuse(field, gap.restitution, expected)
 
 
 def _check_grounded(system: Elements) -> None:
@@ -142,9 +159,10 @@ def _check_driven(system: Elements) -> None:
         _refuse("force", MISSING, "a [[force]] with an amplitude, or a [base]: nothing moves")
     if system.base is not None and system.base.stops == "fixed":
         for gap in system.gaps:
-            if gap.damping and GROUND in gap.between:
-                expected = 'damping = 0 where [base] stops = "fixed": the damper\'s other end moves'
-                _refuse(f"clearance {gap.name}.damping", gap.damping, expected)
+            for key in ("damping", "restitution"):
+                if getattr(gap, key) and GROUND in gap.between:
+                    expected = f'no {key} where [base] stops = "fixed": its other end moves'
+                    _refuse(f"clearance {gap.name}.{key}", getattr(gap, key), expected)
     joints = [between for _, between in _joints(system) if GROUND not in between]
     moved = _reached(driven, joints)
     for gap in system.gaps:
@@ -194,11 +212,15 @@ LEAST: dict[str, dict[str, float]] = {
         "lower_stiffness": SMALLEST,
         "damping": 0.0,
         "preload": 0.0,
+        "preload_over": SMALLEST,
+        "restitution": SMALLEST,
     },
     "forces": {"amplitude": -GREATEST, "constant": -GREATEST},
     "base": {"amplitude": SMALLEST},
 }
 """The numbers of each list of elements that can be changed, and the least that each may be."""
+MOST = {"restitution": 1.0}
+"""The most that a number may be, where that is not ``GREATEST``."""
 TABLES = {
     "masses": "mass",
     "springs": "spring",
@@ -217,6 +239,7 @@ UNITS = {
     "upper": "m",
     "lower": "m",
     "preload": "N",
+    "preload_over": "m",
     "constant": "N",
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
@@ -285,24 +308,45 @@ class LumpedSystem(Elements):
         if mass == GROUND:
             mass, other, upper, lower = other, mass, lower, upper
         place = None if other == GROUND else self.names.index(other)
-        clearance = Clearance(gap.name, self.names.index(mass), place, upper, lower, gap.damping)
+        damping = self.stop_damping(gap)
+        clearance = Clearance(gap.name, self.names.index(mass), place, upper, lower, damping)
         return clearance.scaled(self.b)
+
+    def stop_damping(self, gap: Gap) -> float:
+        """Of the stops of a clearance: as stated, or what makes its restitution.
+
+        A contact of the bodies with such a stop alone lasts half a period of their motion on its
+        spring, which leaves exp(-π ζ/√(1 - ζ²)) of the speed.
+        """
+        if gap.restitution is None:
+            return gap.damping
+        loss = -math.log(gap.restitution)
+        ratio = loss / math.hypot(math.pi, loss)
+        inverse = sum(1.0 / m.mass for m in self.masses if m.name in gap.between)
+        stiffness = next(stop.stiffness for stop in gap.sides if stop is not None)
+        return 2.0 * ratio * math.sqrt(stiffness / inverse)
 
     @cached_property
     def parameters(self) -> Mapping[str, tuple[float, float]]:
         """``b``, and each number of an element as NAME.key: hammer.mass, hammer-casing.stiffness,
         A.upper, hammer.amplitude, base.amplitude."""
-        lows = {name: LEAST[group][key] for name, (group, _, key) in self._places.items()}
-        return {"b": (SMALLEST, GREATEST), **{name: (low, GREATEST) for name, low in lows.items()}}
+        return {
+            "b": (SMALLEST, GREATEST),
+            **{
+                name: (LEAST[group][key], MOST.get(key, GREATEST))
+                for name, (group, _, key) in self._places.items()
+            },
+        }
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """SI unit of each of ``parameters`` but the factor ``b``; an acceleration of the ground may
-        be in g."""
+        """SI unit of each of ``parameters`` that has one; an acceleration of the ground may be in
+        g."""
         amplitudes = {"forces": "N", "base": "m" if self.base is None else self.base.unit}
         return {
             name: amplitudes[group] if key == "amplitude" else UNITS[key]
             for name, (group, _, key) in self._places.items()
+            if key == "amplitude" or key in UNITS
         }
 
     @property
@@ -362,6 +406,7 @@ class LumpedSystem(Elements):
             low, high = self.parameters[name]
             if not low <= value <= high:
                 expected = "a number" + ("" if low < 0.0 else " >= 0" if low == 0.0 else " > 0")
+                expected += f", at most {high:g}" if high < GREATEST else ""
                 raise InputError(None, name, value, expected)
             if name == "b":
                 new["b"] = value
@@ -375,8 +420,16 @@ class LumpedSystem(Elements):
         return replace(self, **new) if new else self
 
     def as_dict(self) -> dict[str, object]:
-        """The elements by their lists; the ground's unit where it is not that of a displacement."""
+        """The elements by their lists; the ground's unit where it is not that of a displacement.
+
+        Of a clearance the later keys are there where they are stated, so that earlier files keep
+        their hashes.
+        """
         out = asdict(self)
+        for gap in out["gaps"]:
+            for key in ("preload_over", "restitution"):
+                if gap[key] is None:
+                    del gap[key]
         if self.base is not None and self.base.unit == "m":
             del out["base"]["unit"]
         return out

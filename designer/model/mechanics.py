@@ -11,8 +11,10 @@ z + y.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Literal, Protocol, Self
 
 import numpy as np
@@ -39,12 +41,38 @@ class Side:
     steps."""
     preload: float = 0.0
     """Force with which it pushes as soon as it is touched: that of a spring that is held short."""
+    rise: float = 0.0
+    """Depth over which that force rises from 0; 0: it is there at once."""
 
     @property
-    def springs(self) -> tuple[tuple[float, float], ...]:
+    def own_springs(self) -> tuple[tuple[float, float], ...]:
         """(displacement, stiffness) of every spring of the stop, the first met first."""
         deeper = ((self.gap + depth, stiffness) for depth, stiffness in self.further)
         return ((self.gap, self.stiffness), *deeper)
+
+    @property
+    def springs(self) -> tuple[tuple[float, float], ...]:
+        """The same with a preload that rises: a spring that joins in where the stop is touched, and
+        leaves again where the force has risen."""
+        if not self.rise:
+            return self.own_springs
+        joined: dict[float, float] = defaultdict(float)
+        steep = self.preload / self.rise
+        for place, stiffness in (*self.own_springs, (self.gap, steep)):
+            joined[place] += stiffness
+        joined[self.gap + self.rise] -= steep
+        return tuple(sorted(joined.items()))
+
+    @property
+    def jump(self) -> float:
+        """The preload, where it is there at once."""
+        return 0.0 if self.rise else self.preload
+
+    def scaled(self, factor: float) -> Side:
+        """The same with every length and the preload ``factor`` times as large."""
+        further = tuple((factor * depth, stiffness) for depth, stiffness in self.further)
+        lengths = factor * self.gap, self.stiffness, further
+        return Side(*lengths, factor * self.preload, factor * self.rise)
 
 
 @dataclass(frozen=True)
@@ -96,21 +124,14 @@ class Clearance:
 
     @property
     def jumps(self) -> bool:
-        """Whether the force of a stop begins with a jump: a damper or a preload makes one."""
-        return bool(self.damping) or any(stop.preload for _, stop in self.sides)
+        """Whether the force of a stop begins with a jump: a damper makes one, and a preload that
+        does not rise."""
+        return bool(self.damping) or any(stop.jump for _, stop in self.sides)
 
     def scaled(self, factor: float) -> Clearance:
         """The same with every length and preload ``factor`` times as large."""
-
-        def longer(stop: Side | None) -> Side | None:
-            if stop is None:
-                return None
-            further = tuple((factor * depth, stiffness) for depth, stiffness in stop.further)
-            return Side(factor * stop.gap, stop.stiffness, further, factor * stop.preload)
-
-        return Clearance(
-            self.name, self.mass, self.other, longer(self.upper), longer(self.lower), self.damping
-        )
+        upper, lower = (stop and stop.scaled(factor) for stop in (self.upper, self.lower))
+        return replace(self, upper=upper, lower=lower)
 
 
 @dataclass(frozen=True)
@@ -189,7 +210,9 @@ class SecondOrderSystem:
         if closed:
             for stop in self.clearances:
                 row = self.displacement(stop)
-                stiffest = max(sum(k for _, k in side.springs) for _, side in stop.sides)
+                stiffest = max(
+                    max(accumulate(k for _, k in side.springs)) for _, side in stop.sides
+                )
                 stiffness += stiffest * np.outer(row, row)
         root = np.sqrt(self.mass)
         squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
@@ -269,7 +292,7 @@ class _Contact:
         if not level:
             return
         side = int(np.sign(level))
-        d -= side * self._stop(side).preload * self.push_back
+        d -= side * self._stop(side).jump * self.push_back
         for place, stiffness in self._stop(side).springs[: abs(level)]:
             A -= stiffness * np.outer(self.push_back, self.row)
             B -= stiffness * self.on_drive * self.push_back

@@ -157,11 +157,10 @@ LIMITS = (
         keys=r"\w*friction\w*|mu|mu_\w+|coulomb\w*|stribeck\w*|stick\w*",
     ),
     ModelLimit(
-        "a coefficient of restitution",
+        "a coefficient of restitution, but as restitution of a [[clearance]] of format 2",
         "`restitution`",
-        "stiff stops; damping of a [[clearance]] of format 2, with "
-        "restitution = exp(-π ζ/√(1 - ζ²)), ζ = damping/(2 √(stiffness · mass)), which no circuit "
-        "makes",
+        "restitution of a [[clearance]] of format 2, whose stops have a stiffness; no circuit "
+        "makes it",
         tables=r"restitution|impacts?",
         keys=r"\w*restitution\w*|cor|e|rigid",
     ),

@@ -76,7 +76,7 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         text = f"damper, {' to '.join(damper.between)}"
         yield subscripted(f"c{i}"), damper.damping, "N s/m", text
     for gap in model.gaps:
-        yield from _of_gap(gap)
+        yield from _of_gap(gap, model.stop_damping(gap))
     for i, force in enumerate(model.forces, start=1):
         if force.amplitude:
             text = f"amplitude of the force on {force.on}"
@@ -90,7 +90,7 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         yield symbol, model.base.amplitude, model.base.unit, text
 
 
-def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
+def _of_gap(gap: Gap, damping: float) -> Iterator[tuple[str, float, str, str]]:
     location = f"in {gap.name}, {' to '.join(gap.between)}"
     for side in ("upper", "lower"):
         place = getattr(gap, side)
@@ -108,8 +108,15 @@ def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
     if gap.preload:
         text = f"push of the stops where they are touched {location}"
         yield f"{gap.name}.preload", gap.preload, "N", text
-    if gap.damping:
-        yield f"{gap.name}.damping", gap.damping, "N s/m", f"damping of the stops {location}"
+    if gap.preload_over is not None:
+        text = f"depth over which that push rises {location}"
+        yield f"{gap.name}.preload_over", gap.preload_over, "m", text
+    if gap.restitution is not None:
+        text = f"restitution: speed after a contact over that before {location}"
+        yield f"{gap.name}.restitution", gap.restitution, "", text
+    if damping:
+        more = "" if gap.restitution is None else ", which makes that restitution"
+        yield f"{gap.name}.damping", damping, "N s/m", f"damping of the stops {location}{more}"
 
 
 def _value(value: float, unit: str) -> str:
@@ -188,16 +195,23 @@ def _law(model: LumpedSystem, gap: Gap, naming: Naming) -> str:
         side_name = f"{gap.name}.{end}_stiffness"
         is_stated = getattr(gap, f"{end}_stiffness") is not None
         name = side_name if is_stated else f"{gap.name}.stiffness"
-        for place, stiffness in stop.springs:
+        for place, stiffness in stop.own_springs:
             shift = naming(f"{gap.name}.{end}", place)
             terms.append(f"{_times(naming(name, stiffness))}{bound}(u {sign} {shift}, 0)")
-        if stop.preload:
+        if stop.rise:
+            push = _times(naming(f"{gap.name}.preload", stop.preload))
+            over = naming(f"{gap.name}.preload_over", stop.rise)
+            way = "u" if end == "upper" else "−u"
+            depth = f"{way} − {naming(f'{gap.name}.{end}', stop.gap)}".replace("− −", "+ ")
+            risen = f"min(max({depth}, 0)/{over}, 1)"
+            terms.append(f"{'' if end == 'upper' else '−'}{push}{risen}")
+        elif stop.preload:
             holds = f"(u {'>' if end == 'upper' else '<'} {_at(model, gap, end, naming)})"
             push = _times(naming(f"{gap.name}.preload", stop.preload))
             terms.append(f"{'' if end == 'upper' else '−'}{push or '1 '}{holds}")
     text = " + ".join(terms).replace("− −", "+ ").replace("+ −", "− ")
-    if gap.damping:
-        text += f", and {_times(naming(f'{gap.name}.damping', gap.damping))}u′ in contact"
+    if clearance.damping:
+        text += f", and {_times(naming(f'{gap.name}.damping', clearance.damping))}u′ in contact"
     return f"{gap.name}(u) = {text}"
 
 

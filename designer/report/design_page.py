@@ -168,7 +168,7 @@ def _system(model: LumpedSystem, drawing: Picture, *, si: bool) -> PageSection:
     """The model of a file of format 2."""
     sketch = tuple(system_sketch(model).splitlines())
     caption = "Values as the model file gives them. Displacements count to the right."
-    if any(gap.preload for gap in model.gaps):
+    if any(gap.preload and gap.preload_over is None for gap in model.gaps):
         caption += " A comparison in the equations is 1 where it holds, else 0."
     equations: list[Block] = []
     for title, lines in (

@@ -86,8 +86,8 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 None,
                 f"clearance {clearance.name}.damping",
                 clearance.damping,
-                "0 for a circuit: a force that jumps at the contact has no stage; the dissipation "
-                "of short contacts is near that of larger [[damper]] values",
+                "none for a circuit, restitution neither: a force that jumps at the contact has no "
+                "stage; the dissipation of short contacts is near that of larger [[damper]] values",
             )
         preloads = [stop.preload for _, stop in clearance.sides if stop.preload]
         if preloads:
@@ -95,8 +95,9 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 None,
                 f"clearance {clearance.name}.preload",
                 preloads[0],
-                "0 for a circuit: a force that jumps at the contact has no stage; a negative gap "
-                "is a stop in contact at rest, which the rectifier makes",
+                "0 for a circuit: a force that jumps at the contact, or whose slope falls where it "
+                "has risen, has no stage; a negative gap is a stop in contact at rest, which the "
+                "rectifier makes",
             )
         if system.fixed_stops and system.ground_moves and clearance.other is None:
             raise InputError(

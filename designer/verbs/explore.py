@@ -50,23 +50,19 @@ def explore(
     InputError : a model that cannot be read, a port that is taken, an address that is none here,
         a file that cannot be written.
     """
-    from designer.explorer import server
-    from designer.explorer.saved_page import save_page
-    from designer.folders.model_source import source
-    from designer.jobs.options import Options
-    from designer.model.model_file import ModelFile, read_model_file
+    from designer.folders.model_source import model_of
 
     progress = Progress() if progress is None else progress
-    if isinstance(model, ModelFile):
-        modelfile = model
-    elif (path := Path(model)).is_dir():
-        modelfile, _ = source(path, path)
-    else:
-        modelfile = read_model_file(path)
+    modelfile = model_of(model)
     if save is not None:
+        from designer.explorer.saved_page import save_page
+        from designer.jobs.options import Options
+
         options = Options(seed, jobs, SAMPLES if samples is None else samples, overwrite)
         save_page(modelfile, Path(save), options, progress)
         return
+    from designer.explorer import server
+
     server.serve(
         modelfile,
         port=port,

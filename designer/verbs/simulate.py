@@ -119,7 +119,7 @@ def simulate(
     from designer.catalog.parts_catalog import load_catalog
     from designer.check import simulation
     from designer.folders.json_answers import simulate_json
-    from designer.folders.model_source import model_file, source
+    from designer.folders.model_source import model_of
     from designer.folders.origin import provenance
     from designer.jobs.options import Options
     from designer.model.model_file import ModelFile
@@ -129,17 +129,12 @@ def simulate(
     progress = Progress() if progress is None else progress
     began, catalog = time.perf_counter(), load_catalog()
     synthesis: Synthesis | None = None
-    path: Path | None = None
-    if isinstance(model, ModelFile):
-        modelfile = model
-    elif (path := Path(model)).is_dir():
-        modelfile, folder = source(path, path)
-        if engine != "model":
-            from designer.folders.design_source import read_design
+    path = None if isinstance(model, ModelFile) else Path(model)
+    modelfile = model_of(model)
+    if path is not None and path.is_dir() and engine != "model":
+        from designer.folders.design_source import read_design
 
-            synthesis = read_design(folder, catalog, progress)
-    else:
-        modelfile = model_file(path)
+        synthesis = read_design(path, catalog, progress)
     read = Reader(modelfile.model, modelfile.si)
     omegas = tuple(read.value("--omega", "omega", w) for w in _several("omega", omega, "0.85"))
     frequencies = _several("frequency", frequency, "'10 Hz'")

@@ -231,10 +231,9 @@ def test_an_end_that_is_not_located_is_a_row_that_says_so(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 6])
-def test_every_end_of_a_drawn_system(seed: int, tmp_path: Path) -> None:
+def test_every_end_of_a_drawn_system(tmp_path: Path) -> None:
     """Each is a point with the multipliers or the touch that its kind has, or says why not."""
-    made = swept(tmp_path / "drawn.toml", drawn(seed), 8.0, 40.0, 49, "down", "up")
+    made = swept(tmp_path / "drawn.toml", drawn(2), 8.0, 40.0, 49, "down", "up")
     found = window_ends.find(made)
     system, _ = mechanism_of(tmp_path / "drawn.toml", 1.0)
     seen = set()

@@ -32,14 +32,14 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
         OperatingPoint(float(omega), float(b), start.start)
         for b in np.linspace(0.25, 0.265, 4)
         for stretch in [near[min(near, key=lambda v: abs(v - b))]]
-        for omega in np.geomspace(0.49, 0.58, 24)
+        for omega in np.geomspace(0.49, 0.58, 12)
         for start in [min(stretch.places, key=lambda p: abs(p.omega - omega))]
     ]
     dense = score(bench, SPEC, grid, MANY, LADDER[1:])
     top = max(s.distance for s in dense)
-    # The grid has 96 places; a pattern of finite steps may stay a little below its best one.
+    # The grid has 48 places; a pattern of finite steps may stay a little below its best one.
     assert best.distance >= 0.95 * top
-    assert sum(s.stand is not None for s in dense) > 40
+    assert sum(s.stand is not None for s in dense) > 20
 
 
 def test_what_is_fixed_stays_fixed() -> None:

@@ -314,9 +314,10 @@ def test_limiters_that_see_the_drive(seed: int, n: int) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=15)
-@given(seed=st.integers(0, 10**6), n=st.sampled_from((1, 3)))
-def test_odd_numbers_of_states(seed: int, n: int) -> None:
-    follows_the_reference(seed, n)
+@given(seed=st.integers(0, 10**6))
+def test_an_odd_number_of_states(seed: int) -> None:
+    """The least there can be: each size is compiled anew."""
+    follows_the_reference(seed, 1)
 
 
 def follows_the_reference(seed: int, n: int) -> None:

@@ -22,6 +22,7 @@ from designer.dynamics.lyapunov_exponent import lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import TransientSettings, by_flow
+from designer.model.mechanics import Side
 from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
 
@@ -84,6 +85,20 @@ def test_the_monodromy_of_contacts_that_begin_with_a_force(gap: Gap) -> None:
     off = smooth.run(orbit.start, orbit.n, tangent=np.eye(6)).tangent
     assert off is not None
     assert np.abs(off[:, :3] - wanted).max() > 1e-3
+
+
+def test_a_preload_that_rises_is_a_spring_that_leaves_again() -> None:
+    """The force is continuous then, and the orbit that of the independent integrator."""
+    side = Side(0.1, 10.0, (), preload=0.2, rise=0.1)
+    assert np.array(side.springs) == pytest.approx(np.array([[0.1, 12.0], [0.2, -2.0]]))
+    larger = np.array(side.scaled(3.0).springs)
+    assert larger == pytest.approx(np.array([[0.3, 12.0], [0.6, -2.0]]))
+    system = replace(CHAIN, gaps=[CHAIN.gaps[0], Gap(2, 1, upper=side.springs)])
+    flow, orbit = settled(system)
+    assert flow.system.continuous
+    assert orbit.counts is not None
+    assert orbit.counts.impacts[1][0] > 0
+    assert map_of(system, orbit.start, orbit.n) == pytest.approx(orbit.start, abs=1e-7)
 
 
 def test_a_mass_that_rests_on_a_preloaded_stop() -> None:

@@ -25,7 +25,7 @@ from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
 
-FRESH = Options(seed=4242, samples=1000, rung="exact")
+FRESH = Options(seed=4242, samples=400, rung="exact")
 """Of the study by which a cure is judged."""
 
 
@@ -122,7 +122,7 @@ def test_another_b_alone(tmp_path: Path) -> None:
     (question,) = questions_of(made, made.model_responses)
     assert question is not None
     plan = plan_of(made, question, FRESH.seed)
-    along = yield_map(plan, 0, "omega", 0.25, values=(0.2125, 0.215, 0.2175), samples=50)
+    along = yield_map(plan, 0, "omega", 0.25, values=(0.2125, 0.215, 0.2175), samples=30)
     assert along.rate.max() < 0.8
 
 

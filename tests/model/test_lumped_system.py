@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from scipy.optimize import minimize_scalar
+from scipy.linalg import expm
+from scipy.optimize import brentq, minimize_scalar
 
 from designer.base.errors import InputError
 from designer.model.driven import model_flow
@@ -122,6 +123,55 @@ def test_every_parameter_has_a_name_and_can_be_changed() -> None:
     with pytest.raises(InputError) as caught:
         model.changed({"hammer.mass": -1.0})
     assert caught.value.expected == "a number > 0"
+
+
+@pytest.mark.parametrize("between", ['["hammer", "ground"]', '["hammer", "casing"]'])
+def test_restitution_is_the_speed_that_one_contact_leaves(between: str) -> None:
+    """Of the bodies with the stop alone, from Newton's law by another integrator."""
+    text = HAMMER.replace('expect = "1-1-1"\n', "").replace('["hammer", "ground"]', between, 1)
+    text = text.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\nrestitution = 0.7')
+    system = read(text).model.second_order()
+    (clearance,) = system.clearances
+    bodies = system.mass[:1] if clearance.other is None else system.mass
+    k, c, m = clearance.first.stiffness, clearance.damping, 1.0 / sum(1.0 / bodies)
+    rate = np.array([[0.0, 1.0], [-k / m, -c / m]])
+
+    def depth(t: float) -> float:
+        return float((expm(rate * t) @ [0.0, 1.0])[0])
+
+    half = np.pi * np.sqrt(m / k)  # of the undamped motion; the damped one is a little longer
+    end = brentq(depth, 0.5 * half, 1.9 * half, xtol=1e-16)
+    assert (expm(rate * end) @ [0.0, 1.0])[1] == pytest.approx(-0.7, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "field"),
+    [
+        ('stiffness = "1 kN/m"\nrestitution = 0.7\ndamping = 3.0', "restitution"),
+        ("upper_stiffness = 10.0\nlower_stiffness = 20.0\nrestitution = 0.7", "restitution"),
+        ('law = "hertz"\nconstant = 3e10\ndepth = "1 mm"\nrestitution = 0.7', "restitution"),
+        ('stiffness = "1 kN/m"\nrestitution = 1.2', "restitution"),
+        ('stiffness = "1 kN/m"\npreload_over = "1 mm"', "preload_over"),
+    ],
+)
+def test_what_a_stop_cannot_be_is_refused(keys: str, field: str) -> None:
+    told = refused(HAMMER.replace('stiffness = "540 kN/m"', keys))
+    assert told.field.endswith(f".{field}")
+
+
+def test_later_keys_of_a_clearance_change_no_hash_where_they_are_not_stated() -> None:
+    plain = read(HAMMER).model
+    assert not {"restitution", "preload_over"} & set(plain.as_dict()["gaps"][0])  # type: ignore[index]
+    more = 'stiffness = "540 kN/m"\nrestitution = 0.8\npreload = "5 N"\npreload_over = "1 mm"'
+    model = read(HAMMER.replace('stiffness = "540 kN/m"', more)).model
+    assert model.parameters["A.restitution"][1] == 1.0
+    assert model.units["A.preload_over"] == "m"
+    assert "A.restitution" not in model.units
+    (softer,) = model.changed({"A.restitution": 0.5}).second_order().clearances
+    (clearance,) = model.second_order().clearances
+    assert softer.damping > clearance.damping > 0.0
+    with pytest.raises(InputError, match="at most 1"):
+        model.changed({"A.restitution": 1.5})
 
 
 def without(text: str, table: str, number: int = 1) -> str:

@@ -79,19 +79,28 @@ def test_so_is_one_of_a_dimensionless_model(key: str) -> None:
     assert "format = 2" in error.expected
 
 
-@pytest.mark.parametrize("table", ["mass", "spring", "damper", "clearance", "force"])
+UNREAD = (
+    ("friction = 3", "friction"),
+    ("restitution = 0.8", "a coefficient of restitution"),
+    ("phase = 90", "another phase"),
+    ('frequency = "20 Hz"', "more than one drive frequency"),
+    ("harmonics = [[2, 1.0, 0.0]]", "no sine"),
+    ("delay = 1e-3", "a delay"),
+    ("cubic = 1.0", "a spring that is not linear"),
+    ("torque = 1.0", "rotation"),
+    ("gravity = 9.81", "a weight"),
+)
+"""Keys that no element of format 2 has but those of ``READ``, and what they ask for."""
+READ = {("clearance", "restitution")}
+
+
 @pytest.mark.parametrize(
-    ("line", "feature"),
+    ("table", "line", "feature"),
     [
-        ("friction = 3", "friction"),
-        ("restitution = 0.8", "a coefficient of restitution"),
-        ("phase = 90", "another phase"),
-        ('frequency = "20 Hz"', "more than one drive frequency"),
-        ("harmonics = [[2, 1.0, 0.0]]", "no sine"),
-        ("delay = 1e-3", "a delay"),
-        ("cubic = 1.0", "a spring that is not linear"),
-        ("torque = 1.0", "rotation"),
-        ("gravity = 9.81", "a weight"),
+        (table, *asked)
+        for table in ("mass", "spring", "damper", "clearance", "force")
+        for asked in UNREAD
+        if (table, asked[0].split()[0]) not in READ
     ],
 )
 def test_an_element_of_format_2_has_no_such_key(table: str, line: str, feature: str) -> None:

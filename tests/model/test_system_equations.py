@@ -27,6 +27,15 @@ FILES = {
     "fixed stops, Hertz": CHAIN.replace('stiffness = "540 kN/m"', HERTZ)
     + '[base]\namplitude = "0.3 mm"\nstops = "fixed"\n',
     "a push": CHAIN.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\npreload = "7 N"'),
+    "a push that rises": CHAIN.replace(
+        'stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\npreload = "7 N"\npreload_over = "0.3 mm"'
+    ),
+    "a push that rises beside Hertz": CHAIN.replace(
+        'stiffness = "540 kN/m"', f'{HERTZ}\npreload = "7 N"\npreload_over = "0.5 mm"'
+    ),
+    "restitution": CHAIN.replace(
+        'stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\nrestitution = 0.8'
+    ),
     "ground first, damped": CHAIN.replace('["hammer", "ground"]', '["ground", "hammer"]').replace(
         'stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\ndamping = 30.0'
     ),

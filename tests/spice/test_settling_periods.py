@@ -73,7 +73,7 @@ def pool() -> Iterator[SpicePool]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("p", range(1, 9))
+@pytest.mark.parametrize("p", [1, 4, 8])
 def test_ideal_from_the_third_period_on(pool: SpicePool, p: int) -> None:
     """The strobe, against the same run settled for 400 periods."""
     who = subject(p)
@@ -88,33 +88,37 @@ def test_ideal_from_the_third_period_on(pool: SpicePool, p: int) -> None:
     assert measured.gaps[2:].max() < STROBE_TOLERANCE
 
 
+WITH_MEMORY = 1, 3, 5, 8
+"""p of the responses that rungs with a memory are asked for."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rung", ["dynamic", "full"])
 def test_rungs_with_a_memory_after_what_is_predicted(pool: SpicePool, rung: Rung) -> None:
-    """p = 1 … 8: what is said to be discarded is enough, and the response is the wanted one.
+    """What is said to be discarded is enough, and the response is the wanted one.
 
     The settled strobe is that of a run ten times as long, of at least sixty periods.
     """
-    exact = [subject(p) for p in range(1, 9)]
+    exact = [subject(p) for p in WITH_MEMORY]
     asked = numerics_gate.warmed(pool, [replace(who, rung=rung) for who in exact])
     discarded = [who.discard for who in asked]
     assert all(numerics_gate.DISCARD <= d < MOST_DISCARDED for d in discarded)
     jobs = [
         warm_job(who, SolverSettings("trap", who.period / STEPS[p], numerics_gate.RELTOL),
                  max(10 * who.discard, 60))
-        for p, who in enumerate(asked, start=1)
+        for p, who in zip(WITH_MEMORY, asked, strict=True)
     ]  # fmt: skip
     found = dict(pool.map(jobs))
     needed = []
-    for i, who in enumerate(asked):
+    for i, (p, who) in enumerate(zip(WITH_MEMORY, asked, strict=True)):
         read = found[i]
         assert isinstance(read, Read)
-        assert read.orbit.response == f"1-{i + 1}-{i + 1}"
+        assert read.orbit.response == f"1-{p}-{p}"
         measured = warm(who, read)
-        assert measured.gaps[who.discard :].max() < STROBE_TOLERANCE, (i + 1, discarded)
+        assert measured.gaps[who.discard :].max() < STROBE_TOLERANCE, (p, discarded)
         assert measured.gaps[1] < 0.05, "op-amps that start elsewhere push the states away"
         needed.append(measured.needed)
-    assert sum(n > 1 for n in needed) >= 3, "a rung with an orbit of its own has a way to go"
+    assert sum(n > 1 for n in needed) >= 2, "a rung with an orbit of its own has a way to go"
 
 
 @pytest.mark.slow
