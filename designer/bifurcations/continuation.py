@@ -183,12 +183,12 @@ def follow(
     end = End.POINTS
     while len(points) < POINTS:
         current = points[-1]
+        if current.value == (high if tangent[-1] > 0.0 else low):
+            end = End.LIMIT
+            break
         new, solved = None, _step(curve, current.solved, tangent, step)
         if solved is not None and not low <= solved.value <= high:
             edge = low if solved.value < low else high
-            if current.value == edge:
-                end = End.LIMIT
-                break
             last = _onto(curve, current.solved, solved, edge)
             point = None if last is None else at(curve, last)
             inner = None if point is None else _between(curve, current, point)
