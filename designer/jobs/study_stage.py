@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
 from designer.base.errors import MISSING, InputError
@@ -42,6 +42,9 @@ from designer.yields.layers import LocalRunner, Runner
 from designer.yields.study import RunResult, Study
 from designer.yields.study_identity import RULES, checks_hash
 from designer.yields.tolerance_study import Stores, check, tolerance
+
+if TYPE_CHECKING:
+    from designer.report.data import ReportData
 
 SPICE_TIMEOUT = 900.0
 """The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
@@ -141,6 +144,8 @@ class StudyStage:
     """Shows the yields while the work goes on."""
     early: bool = False
     """Whether the yields were shown."""
+    data: ReportData | None = None
+    """What the report was made of that was written last."""
 
     def work(
         self,
@@ -222,12 +227,15 @@ class StudyStage:
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
 
-        starts, board = design_files.starts(folder), kicad_files.own_board(folder)
-        design = design_answer(folder)
-        found = design["warnings"], design["failed_rules"]
-        data = ReportData(result, self.command, starts, board, *map(tuple, found))
+        if self.data is None:
+            starts, board = design_files.starts(folder), kicad_files.own_board(folder)
+            design = design_answer(folder)
+            warnings, failed = tuple(design["warnings"]), tuple(design["failed_rules"])
+            self.data = ReportData(result, self.command, starts, board, warnings, failed)
+        else:
+            self.data = self.data.of_study(result)
         html, text = (folder / f"{prefix}{name}" for name in REPORTS)
-        write_report(data, html, text, () if prefix else later_sections(folder))
+        write_report(self.data, html, text, () if prefix else later_sections(folder))
 
 
 def study_of(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,8 @@ from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.study import RunResult, Study
 from designer.yields.yield_count import Yield
 
+OF_DESIGN = {"drawn", "traces", "stops", "bom", "board_cost", "bench", "board"}
+"""What the design and its nominal responses decide, by the names of ``ReportData``."""
 ALL = "all on one board"
 """Name of the yield of every response on the same board."""
 
@@ -55,6 +57,25 @@ class ReportData:
     """What is not good enough about the design, in sentences."""
     failed_rules: tuple[Mapping[str, str], ...] = ()
     """The design rules that fail on its circuit: ``id``, ``found``, ``limit`` and ``do``."""
+    drawn: dict[str, str] = field(default_factory=dict, init=False, compare=False, repr=False)
+    """Pictures and plots that the design and its nominal responses decide, by name (``once``)."""
+
+    def once(self, name: str, draw: Callable[[], str]) -> str:
+        """What ``draw`` makes; drawn once for this report and those that follow it
+        (``of_study``)."""
+        if name not in self.drawn:
+            self.drawn[name] = draw()
+        return self.drawn[name]
+
+    def of_study(self, result: RunResult) -> ReportData:
+        """The same report of a study that went on; what the design decides is taken over."""
+        later = replace(self, result=result)
+        alike = zip(result.checked, self.checked, strict=False)
+        if len(result.checked) != len(self.checked) or any(a is not b for a, b in alike):
+            return later
+        for name in OF_DESIGN & vars(self).keys():
+            vars(later)[name] = vars(self)[name]
+        return later
 
     @property
     def design(self) -> Design:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -59,20 +60,25 @@ _NUMBER = "{0.[0000]}"
 
 def plots(data: ReportData) -> dict[str, str]:
     """The documents of a page as JSON, by the names that its pictures have for them."""
-    drawn: dict[str, Any] = {}
+    drawn: dict[str, Callable[[], Model]] = {}
     for i, (c, traces) in enumerate(zip(data.checked, data.traces, strict=True)):
         for k, motion in enumerate(data.motions(i)):
-            drawn[portrait_name(i, k)] = _orbit(c, traces, motion)
+            drawn[portrait_name(i, k)] = partial(_orbit, c, traces, motion)
     for k, stop in enumerate(data.stops):
-        drawn[stop_name(k)] = _stop(stop)
-    if data.checked:
-        drawn["yields"] = _yields(*data.rated)
-        drawn["margins"] = _margins(data)
+        drawn[stop_name(k)] = partial(_stop, stop)
     if data.design.errors.max_error > EXACT:
         unit = design_tables.spring_of(data.design.model)
         errors = {words.coefficient(n, unit): e for n, e in data.design.errors.errors.items()}
-        drawn["errors"] = _errors(errors)
-    return {name: document(plot) for name, plot in drawn.items()}
+        drawn["errors"] = partial(_errors, errors)
+    made = {name: data.once(f"plot {name}", partial(_made, plot)) for name, plot in drawn.items()}
+    if data.checked:
+        made["yields"] = document(_yields(*data.rated))
+        made["margins"] = document(_margins(data))
+    return made
+
+
+def _made(plot: Callable[[], Model]) -> str:
+    return document(plot())
 
 
 def document(plot: Model) -> str:

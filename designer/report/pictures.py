@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -60,6 +61,8 @@ INDICES = "First-order: what a coordinate explains alone; total: with all others
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
 """From where each side is seen."""
 Element = Callable[[Figure, str], Markup]
+DrawnOnce = Callable[[str, Callable[[], Figure], str], Markup]
+"""The element of a figure that the design decides, by its name (``ReportData.once``)."""
 
 
 def pictures(data: ReportData) -> Pictures:
@@ -69,22 +72,26 @@ def pictures(data: ReportData) -> Pictures:
     def element(figure: Figure, shows: str) -> Markup:
         return page.element(to_svg(figure), shows)
 
+    def once(name: str, figure: Callable[[], Figure], shows: str) -> Markup:
+        return page.element(data.once(name, lambda: to_svg(figure())), shows)
+
     parameters = data.parameters
     out: dict[str, Picture | Gallery] = {}
     if isinstance(parameters, Dimensionless | Mechanical):
-        drawing = element(model_drawing.model_drawing(parameters), _drawing_label(data))
+        draw = partial(model_drawing.model_drawing, parameters)
+        drawing = once("model", draw, _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     elif isinstance(parameters, LumpedSystem):
-        drawing = element(
-            system_drawing.system_drawing(parameters, si=data.si is not None), _drawing_label(data)
-        )
+        draw = partial(system_drawing.system_drawing, parameters, si=data.si is not None)
+        drawing = once("model", draw, _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     if data.checked:
-        out["portraits"] = _portraits(data, element)
+        out["portraits"] = _portraits(data, once)
         out |= _study_pictures(data, element)
     for number, stop in enumerate(data.stops):
-        svg = element(
-            study_plots.stop_chart(design_tables.moved_nets(stop), stop),
+        svg = once(
+            stop_name(number),
+            partial(study_plots.stop_chart, design_tables.moved_nets(stop), stop),
             f"Output of the dead zone over the displacement in {stop.clearance}; the figures are "
             "in the table.",
         )
@@ -100,28 +107,31 @@ def pictures(data: ReportData) -> Pictures:
         unit = design_tables.spring_of(data.design.model)
         errors = {words.coefficient(k, unit): v for k, v in data.design.errors.errors.items()}
         shows = "Size of each coefficient error, as in the table."
-        svg = element(study_plots.coefficient_chart(errors), shows)
+        svg = once("errors", partial(study_plots.coefficient_chart, errors), shows)
         out["errors"] = Picture(svg=svg, plot="errors")
     circuit, pins = data.board
     svg = page.element(
-        schematic_drawing.svg(circuit, numbers=pins),
+        data.once("schematic", lambda: schematic_drawing.svg(circuit, numbers=pins)),
         "Schematic: one stage a cell, nets joined by their names.",
     )
     out["schematic"] = Picture(
         caption="Drawn from the circuit's parts; the same as schematic.svg.", svg=svg
     )
     if data.board_file is not None:
-        out["board"] = _board(data.board_file, page)
+        out["board"] = _board(data, data.board_file, page)
     return out
 
 
-def _board(board: BoardFile, page: InlineSvg) -> Gallery:
+def _board(data: ReportData, board: BoardFile, page: InlineSvg) -> Gallery:
     """Both sides of the board as its file stands."""
     routed = "with what is routed so far" if board.copper else "placed and not routed yet"
     sides = tuple(
         Picture(
             caption=f"From {seen}.",
-            svg=page.element(board_svg(board, side), f"The board from {seen}."),
+            svg=page.element(
+                data.once(f"board {side}", partial(board_svg, board, side)),
+                f"The board from {seen}.",
+            ),
         )
         for side, seen in SEEN.items()
     )
@@ -140,21 +150,21 @@ def _drawing_label(data: ReportData) -> str:
     return f"The model: ground, spring K2{damper}, mass M2, spring K1 and damper C1, mass M1{end}."
 
 
-def _portraits(data: ReportData, element: Element) -> Gallery:
+def _portraits(data: ReportData, once: DrawnOnce) -> Gallery:
     ngspice = any(c.gate is not None for c in data.checked)
     system = data.design.model.second_order()
-    key = orbit_plots.legend(ngspice=ngspice, stops=bool(system.clearances))
+    key = partial(orbit_plots.legend, ngspice=ngspice, stops=bool(system.clearances))
     cards = [
-        _card(data, response, view, element)
+        _card(data, response, view, once)
         for response in range(len(data.checked))
         for view in range(len(data.motions(response)))
     ]
     alone = [motion.symbol for motion in different_motions(system)] == ["x₁"]
     intro = (INTRO if alone else EVERY_CLEARANCE) + OVER_A_BASE * system.ground_moves
-    return Gallery(intro, Picture(svg=element(key, KEY)), tuple(cards))
+    return Gallery(intro, Picture(svg=once("key", key, KEY)), tuple(cards))
 
 
-def _card(data: ReportData, response: int, view: int, element: Element) -> Picture:
+def _card(data: ReportData, response: int, view: int, once: DrawnOnce) -> Picture:
     """One response, by one of its motions (``ReportData.motions``)."""
     c = data.checked[response]
     curves, place_at = data.traces[response], c.model.spec.place_text()
@@ -168,13 +178,13 @@ def _card(data: ReportData, response: int, view: int, element: Element) -> Pictu
         names = dict.fromkeys(system.clearances[k].name for k in motion.clearances)
         place = f" in {' and '.join(names)}"
         caption = f"{motion.label}{place} · {caption}"
-    portrait = orbit_plots.phase_portrait(c, curves, motion)
-    shows = element(portrait, f"Phase portrait{place} at {place_at}: {engines}.")
-    for each in (motion, *data.companions(response, motion)):
-        shows += element(
-            orbit_plots.time_traces(c, curves, each), f"{each.label} over time at {place_at}."
-        )
     plot = portrait_name(response, view)
+    portrait = partial(orbit_plots.phase_portrait, c, curves, motion)
+    shows = once(plot, portrait, f"Phase portrait{place} at {place_at}: {engines}.")
+    for each in (motion, *data.companions(response, motion)):
+        traces = partial(orbit_plots.time_traces, c, curves, each)
+        words_of = f"{each.label} over time at {place_at}."
+        shows += once(f"{plot} {each.label}", traces, words_of)
     return Picture("", caption, svg=shows, warning=words.problem(c), plot=plot)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from designer.base import figure_style
 from designer.base.errors import InputError
@@ -78,6 +79,28 @@ def whole(catalog: Catalog) -> ReportData:
 @pytest.fixture(scope="session")
 def html(whole: ReportData) -> str:
     return render_html(whole)
+
+
+def test_a_study_that_went_on_takes_the_design_s_pictures_over(
+    whole: ReportData, html: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page is that of the whole study made at once; only its own pictures are drawn again."""
+    begun = replace(whole.study, answers=whole.study.answers[:3], cross_checks=())
+    first = ReportData(replace(whole.result, study=begun), whole.command)
+    drawn: list[Figure] = []
+
+    def counted(figure: Figure) -> str:
+        drawn.append(figure)
+        return figure_style.to_svg(figure)
+
+    monkeypatch.setattr("designer.report.pictures.to_svg", counted)
+    assert render_html(first) != html
+    at_first = len(drawn)
+    assert render_html(first.of_study(whole.result)) == html
+    assert len(drawn) - at_first == 2  # yields and margins
+    other = replace(whole.result, checked=tuple(replace(c) for c in whole.checked))
+    assert render_html(first.of_study(other)) == html
+    assert len(drawn) - at_first > at_first
 
 
 def words_of(data: ReportData) -> Page:
