@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.verbs import next_steps
 from designer.verbs.console import say
 from designer.verbs.declared import Out, Overwrite, Resume, Source, Verb, option
 from designer.verbs.tables import files
@@ -146,6 +145,8 @@ def show(result: ExportResult) -> None:
     answer = result.answer
     tables(result.folder, result.reused, answer.get("refused", []), answer)
     if "routing" in answer and result.passed:
+        from designer.verbs import next_steps
+
         next_steps.show(next_steps.after_board(result.folder))
 
 

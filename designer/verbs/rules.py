@@ -13,7 +13,6 @@ from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
 from designer.base.progress import Progress
 from designer.base.version import __version__
-from designer.verbs import next_steps
 from designer.verbs.console import say, table
 from designer.verbs.declared import DesignDir, Verb, option
 
@@ -168,6 +167,8 @@ def _json(
 
 def show(result: RulesResult) -> None:
     """The rules, and what may be done next."""
+    from designer.verbs import next_steps
+
     tables(result.answer)
     next_steps.show(next_steps.after_rules(result.folder, result.answer))
 

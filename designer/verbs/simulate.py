@@ -15,7 +15,6 @@ from designer.base.errors import InputError
 from designer.base.frames import frame
 from designer.base.progress import Progress
 from designer.base.si_unit import DIGITS, value_text
-from designer.verbs import next_steps
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Seed, Source, Verb, option
 from designer.verbs.tables import YES_NO, pictures, response_cells, untrusted
@@ -342,6 +341,8 @@ def show(result: SimulationResult) -> None:
     if result.plots is not None:
         pictures(result.plots, result.answer["files"])
     if result.model is not None:
+        from designer.verbs import next_steps
+
         next_steps.show(next_steps.after_response(result.model, result.answer["responses"]))
 
 

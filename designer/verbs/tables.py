@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from designer.base.si_unit import drive_text, is_angular, value_text
 from designer.base.units import format_quantity
-from designer.verbs import next_steps
 from designer.verbs.console import grid, say, table
 
 if TYPE_CHECKING:
     from designer.jobs.job_outcome import JobOutcome
+    from designer.verbs.next_steps import Step
 
 YES_NO = {True: "yes", False: "no", None: "-"}
 
@@ -22,7 +22,7 @@ def design_written(
     outcome: JobOutcome,
     answer: Mapping[str, Any],
     tables: Callable[[Mapping[str, Any]], None],
-    after: Callable[[Path, Mapping[str, Any]], Iterable[next_steps.Step]],
+    after: Callable[[Path, Mapping[str, Any]], Iterable[Step]],
 ) -> None:
     """What a verb that writes a design folder has to say. answer : of the outcome, as it is
     printed. tables : shows it. after : what may be done next."""
@@ -31,6 +31,8 @@ def design_written(
     else:
         tables(answer)
     if outcome.folder is not None:
+        from designer.verbs import next_steps
+
         files(outcome.folder, outcome.reused)
         next_steps.show(after(outcome.folder, answer))
 
