@@ -148,7 +148,7 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
     with part(f"with the {kind} stage"):
         try:
             other = synthesis_result.synthesise(
-                with_stage(modelfile, kind), load_catalog(), jobs=jobs, told=False
+                with_stage(modelfile, kind), synthesis.catalog, jobs=jobs, told=False
             )
             others = boards_that_keep(other, jobs)
         except (InputError, Unreachable):
