@@ -16,7 +16,6 @@ from designer.check.synthesis_result import Synthesis
 from designer.design_rules.rule_subject import RuleSubject
 from designer.fabrication.bench_sheet import bench_sheet
 from designer.fabrication.board_cost import CostEstimate, cost_markdown
-from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
 
 BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
@@ -27,22 +26,10 @@ def names(modelfile: ModelFile) -> list[str]:
     return [BILL, NOTES, DRAWING, PICTURE, *(file_of(name) for name in modelfile.board.bom)]
 
 
-def texts(synthesis: Synthesis) -> dict[str, str]:
-    """The content of all but the notes and the drawing, by name.
-
-    Raises
-    ------
-    InputError : a case, a part or a layout that the catalogue does not have.
-    Unreachable : a value that cannot be bought.
-    """
-    doing("bill of materials")
-    return bills(synthesis)
-
-
 def notes(
     synthesis: Synthesis, subject: RuleSubject | InputError, cost: CostEstimate | None
 ) -> str:
-    """The text of ``board.md``; raises as ``texts`` does. subject : what the circuit does, for the
+    """The text of ``board.md``; raises as ``bills`` does. subject : what the circuit does, for the
     sheet at the bench. cost : of the boards, where they can be placed."""
     circuit, choice = board_circuit(synthesis)
     parts = components(circuit, synthesis.catalog, choice)
@@ -54,30 +41,32 @@ def notes(
 
 
 def bills(synthesis: Synthesis) -> dict[str, str]:
-    """The bills of materials alone, by name; raises as ``texts`` does."""
-    circuit, choice = board_circuit(synthesis)
-    return _bills(synthesis, components(circuit, synthesis.catalog, choice), choice)
+    """The bills of materials, by name.
 
-
-def listed(synthesis: Synthesis) -> tuple[Component, ...]:
-    """Everything of the board and the bill; raises as ``texts`` does."""
-    circuit, choice = board_circuit(synthesis)
-    return components(circuit, synthesis.catalog, choice)
-
-
-def bought(synthesis: Synthesis, stock: Sequence[StockRow] = ()) -> tuple[Line, ...]:
-    """The lines of the bill; raises as ``texts`` does. stock : a list before the catalogue's."""
-    _, choice = board_circuit(synthesis)
-    return bill(to_buy(listed(synthesis), choice), (*stock, *synthesis.catalog.stock))
-
-
-def _bills(synthesis: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
-    lines = bill(to_buy(parts, choice), synthesis.catalog.stock)
+    Raises
+    ------
+    InputError : a case, a part or a layout that the catalogue does not have.
+    Unreachable : a value that cannot be bought.
+    """
+    doing("bill of materials")
+    lines = bought(synthesis)
     others = layouts(synthesis.modelfile.board.bom, synthesis.catalog.folders)
     return {
         BILL: bill_csv(lines),
         **{layout.file: layout.csv(lines) for layout in others},
     }
+
+
+def listed(synthesis: Synthesis) -> tuple[Component, ...]:
+    """Everything of the board and the bill; raises as ``bills`` does."""
+    circuit, choice = board_circuit(synthesis)
+    return components(circuit, synthesis.catalog, choice)
+
+
+def bought(synthesis: Synthesis, stock: Sequence[StockRow] = ()) -> tuple[Line, ...]:
+    """The lines of the bill; raises as ``bills`` does. stock : a list before the catalogue's."""
+    _, choice = board_circuit(synthesis)
+    return bill(to_buy(listed(synthesis), choice), (*stock, *synthesis.catalog.stock))
 
 
 def drawing(synthesis: Synthesis) -> dict[str, str | bytes]:

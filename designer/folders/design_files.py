@@ -58,7 +58,7 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(synthesis),
         "scales.csv": scales_csv(modelfile, design, synthesis.model_responses),
-        **board_files.texts(synthesis),
+        **board_files.bills(synthesis),
     }
 
 
