@@ -10,6 +10,7 @@ from the cache is silent.
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -44,6 +45,7 @@ def announced(say: Callable[[str], None]) -> Iterator[None]:
     told: set[str] = set()
 
     def tell(module: str | None) -> None:
+        again()
         if module is None or not module.startswith("designer."):
             return
         part = PARTS.get(module.rpartition(".")[2], MOTION)
@@ -51,30 +53,56 @@ def announced(say: Callable[[str], None]) -> Iterator[None]:
             told.add(part)
             say(TEXT.format(part=part))
 
-    with _interruptible(), jit.compilation_watched(tell):
+    with _interruptible() as again, jit.compilation_watched(tell):
         yield
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """Ctrl-C is put off for a moment while the compiler calls back through C, where it is lost."""
+def _interruptible() -> Iterator[Callable[[], None]]:
+    """Ctrl-C is not lost where the compiler would lose it.
+
+    It is put off for a moment while the compiler calls back through C. Where it ends unheard in a
+    destructor or a callback, it is repeated. Where compiled code clears it, the function that is
+    given raises it again: who compiles calls it with each compilation.
+    """
     usual = signal.getsignal(signal.SIGINT)
     main = threading.current_thread() is threading.main_thread()
     if not main or usual is not signal.default_int_handler:
-        yield
+        yield lambda: None
         return
+    asked = False
 
     def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
         inner = frame
         while frame is not None:
             if frame.f_globals.get("__name__") == CALLS_BACK:
-                threading.Timer(0.02, signal.raise_signal, (number,)).start()
+                _soon()
                 return
             frame = frame.f_back
+        asked = True
         signal.default_int_handler(number, inner)
 
+    def unheard(failure: sys.UnraisableHookArgs) -> None:
+        if issubclass(failure.exc_type, KeyboardInterrupt):
+            _soon()
+        else:
+            usual_hook(failure)
+
+    def again() -> None:
+        if asked and threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+
+    usual_hook, sys.unraisablehook = sys.unraisablehook, unheard
     signal.signal(signal.SIGINT, handle)
     try:
-        yield
+        yield again
     finally:
         signal.signal(signal.SIGINT, usual)
+        sys.unraisablehook = usual_hook
+
+
+def _soon() -> None:
+    """Ctrl-C a moment later, in the main thread, whatever it waits for."""
+    main = threading.main_thread().ident
+    threading.Timer(0.02, signal.pthread_kill, (main, signal.SIGINT)).start()

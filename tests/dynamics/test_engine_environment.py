@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -13,9 +14,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
+from designer.base.jit_notice import announced
 from designer.base.threads import interrupt, parallel
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
@@ -134,6 +137,37 @@ def test_ctrl_c_while_compiling(tmp_path: Path) -> None:
 
 # ---------------------------------------------------------------------------------------------
 # Ctrl-C
+
+
+def _nothing(_: str) -> None:
+    """What is said is not asked here."""
+
+
+class _Last:
+    """Ctrl-C comes while its destructor runs, as while one of the compiler's."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_in_a_destructor_is_heard() -> None:
+    def work() -> None:
+        last = _Last()
+        del last
+        time.sleep(PROMPT)
+
+    with pytest.raises(KeyboardInterrupt), announced(_nothing):
+        work()
+
+
+def test_ctrl_c_that_was_cleared_is_raised_by_the_next_compilation() -> None:
+    def work() -> None:
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        numba.njit(lambda x: x + 1)(1)
+
+    with pytest.raises(KeyboardInterrupt), announced(_nothing):
+        work()
 
 
 @pytest.mark.parametrize("engine", ["model", "circuit"])
