@@ -43,6 +43,8 @@ from designer.base.seal import sha256
 from designer.base.toml_reader import parse_toml
 
 MODEL, ASKED = "model.toml", "asked.toml"
+MEASURED = "measured.csv"
+"""Its copy of the values that were measured on boards."""
 DESIGN = "design.json"
 TOLERANCE = "tolerance.json"
 REPORTS = ("report.html", "report.md")

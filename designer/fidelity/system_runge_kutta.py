@@ -57,6 +57,16 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
                 places.append(place)
                 pushes.append(side * stiffness * force)
                 drags.append((0.0 if number else stop.damping) * np.outer(force, rate))
+    for law in system.laws:
+        along, force, watched = np.array(law.row), np.zeros(size), np.zeros(size + 1)
+        force[1::2] = along / system.mass
+        watched[(0 if law.quantity == "displacement" else 1) : size : 2] = along
+        for side, bends in law.bends.items():
+            for place, change in bends:
+                rows.append(side * watched)
+                places.append(place)
+                pushes.append(side * change * force)
+                drags.append(np.zeros((size, size)))
     count = len(rows)
     return SystemRates(
         system.state_matrix(),

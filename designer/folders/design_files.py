@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from designer.base.design_folder import DESIGN, MODEL, Folder
+from designer.base.design_folder import DESIGN, MEASURED, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
@@ -35,7 +35,6 @@ from designer.folders.origin import provenance
 from designer.linear_network.milp import SOLVER
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import find, peaks
-from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, errors_in
 from designer.spice import deck
 from designer.spread.part_grades import better_grades

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, Folder
+from designer.base.design_folder import DESIGN, DESIGN_FILES, MEASURED, MODEL, Folder
 from designer.base.manifest import Stages, object_hash
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
@@ -18,7 +18,6 @@ from designer.folders import board_files
 from designer.folders.design_files import load
 from designer.folders.design_findings import FINDINGS, findings, subject_of
 from designer.folders.model_source import design_inputs_of, source
-from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile
 from designer.spread.part_grades import once_otherwise
 

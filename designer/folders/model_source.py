@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN, MODEL, Folder, is_design_folder
+from designer.base.design_folder import DESIGN, MEASURED, MODEL, Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
-from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, read_model_file
 
 

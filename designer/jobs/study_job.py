@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import Folder, is_design_folder
+from designer.base.design_folder import MEASURED, Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
 from designer.base.progress import Progress, Show
@@ -39,7 +39,7 @@ from designer.jobs.study_stage import (
     satisfied,
     study_of,
 )
-from designer.model.measured_values import MEASURED, read_measured
+from designer.model.measured_values import read_measured
 from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.spread.part_rules import spread_of
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from designer.model.law_elements import Law
     from designer.model.lumped_elements import Elements
     from designer.model.model import Dimensionless
 
@@ -55,15 +56,16 @@ def system_sketch(system: Elements) -> str:
     widths = [len(name) + 4 for name in row]
     widths[0] = 1
     springs = {frozenset(spring.between) for spring in system.springs}
+    springs |= {frozenset(spring.between) for spring in system.cubic_springs}
     dampers = {frozenset(damper.between) for damper in system.dampers}
     pairs = [frozenset(name.replace("|", "ground") for name in row[i : i + 2])
              for i in range(len(row) - 1)]  # fmt: skip
     lines = []
-    for joints, symbol in ((springs, _SPRING), (set[frozenset[str]](), _NONE), (dampers, _DAMPER)):
-        named = not joints
+    for joints, symbol in ((springs, _SPRING), (None, _NONE), (dampers, _DAMPER)):
+        named = joints is None
         parts = ["|"]
         for pair, name, width in zip(pairs, row[1:], widths[1:], strict=True):
-            parts.append(symbol if pair in joints else _NONE)
+            parts.append(symbol if joints and pair in joints else _NONE)
             parts.append(f"[ {name} ]" if named else "|" + " " * (width - 2) + "|")
         lines.append("".join(parts))
     lines.append("")
@@ -73,8 +75,17 @@ def system_sketch(system: Elements) -> str:
     for gap in system.gaps:
         sides = " and ".join(s for s in ("upper", "lower") if getattr(gap, s) is not None)
         lines.append(f"{gap.name}: {sides} stop, {' to '.join(gap.between)}")
+    lines += [f"law {law.name}: {_joined(law)}" for law in system.laws]
+    lines += [f"cubic spring: {' to '.join(each.between)}" for each in system.cubic_springs]
+    lines += [f"friction: {' to '.join(each.between)}" for each in system.frictions]
     lines += [f"force on {force.on}" for force in system.forces]
     if system.base is not None:
         stops = "with it" if system.base.stops == "base" else "stay"
         lines.append(f"the ground moves, stops go {stops}".replace("go stay", "stay"))
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _joined(law: Law) -> str:
+    if law.between is not None:
+        return " to ".join(law.between)
+    return " ".join(f"{factor:+g} {name}" for name, factor in law.factors.items())

@@ -18,7 +18,8 @@ from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.model.driven import model_flow
-from designer.model.mechanics import Clearance, MechanicalModel, check_omega
+from designer.model.force_law import Quantity
+from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem, check_omega
 from designer.model.model import Dimensionless, SiScales
 from designer.model.response_table import Response
 
@@ -182,15 +183,27 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
 
 def scale_of(model: MechanicalModel, omega: float) -> Array:
     """(states,) size of the states that starts are drawn from: the static deflection and the widest
-    gap."""
+    gap, or the corner of a law that is furthest from rest."""
     system = model.second_order()
-    flexibility = np.linalg.inv(system.stiffness)
+    flexibility = np.linalg.inv(system.spanning_stiffness)
     gaps = [abs(side.gap) for stop in system.clearances for _, side in stop.sides]
     # Without a stop the clearance b of a dimensionless model is a length still; else b is a factor.
     length = model.b if isinstance(model, Dimensionless) else 0.0
     x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=length)
-    x = x + np.abs(flexibility @ system.constant)
-    return np.stack([x, x * max(omega, system.own_frequency)], axis=1).ravel()
+    x = x + np.abs(flexibility @ system.constant) + _law_reach(system, "displacement")
+    v = x * max(omega, system.own_frequency) + _law_reach(system, "velocity")
+    return np.stack([x, v], axis=1).ravel()
+
+
+def _law_reach(system: SecondOrderSystem, quantity: Quantity) -> Array:
+    """(n,) displacement or velocity of each mass, the others at rest, at the furthest corner of a
+    law; 0 without one."""
+    reach = np.zeros(system.size)
+    for law in system.laws:
+        if law.quantity == quantity:
+            row = np.abs(law.row)
+            reach = np.maximum(reach, np.divide(law.reach, row, where=row > 0.0, out=0.0 * row))
+    return reach
 
 
 @dataclass(frozen=True)

@@ -5,59 +5,33 @@ All numbers are in the file's own consistent units; texts with units become SI.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.schema import (
-    Accepts,
-    FileTable,
-    choice,
-    number,
-    physical,
-    several,
-    text,
-    whole_number,
-)
+from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_quantity
+from designer.model.element_keys import GROUND, NAME, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
+from designer.model.law_elements import (
+    CubicSpring,
+    Friction,
+    Law,
+    NonlinearElement,
+    factors_of,
+    quantity_of,
+)
 from designer.model.mechanics import Side
-
-GROUND = "ground"
-"""What a spring, a damper or a clearance may stand on beside the masses."""
-_NAME = r"[A-Za-z][A-Za-z0-9_]{0,31}"
-
-
-def _name() -> Accepts:
-    return text(_NAME, "a name: a letter, then letters, digits and _, at most 32 characters")
-
-
-def _between() -> Accepts:
-    expected = 'two different names, of masses or "ground", such as ["hammer", "ground"]'
-    each = several(expected, text(_NAME, expected), least=2)
-
-    def check(value: object) -> tuple[str, str]:
-        names = each.check(value)
-        if len(names) != 2:
-            raise ValueError
-        return names[0], names[1]
-
-    return Accepts(expected, check, json={**each.json, "maxItems": 2})
-
-
-def _signed(unit: str, expected: str) -> Accepts:
-    return number(unit, f"{expected} in {unit}, or text with its unit", math.isfinite)
 
 
 @dataclass(frozen=True)
 class Mass(FileTable):
     """A mass; it moves along one line."""
 
-    name: Annotated[str, _name()]
+    name: Annotated[str, NAME]
     """Its name."""
     mass: Annotated[float, physical("kg")]
     """Its mass."""
@@ -67,7 +41,7 @@ class Mass(FileTable):
 class Spring(FileTable):
     """A linear spring."""
 
-    between: Annotated[tuple[str, str], _between()]
+    between: Annotated[tuple[str, str], two_bodies()]
     """What it joins."""
     stiffness: Annotated[float, physical("N/m")]
     """Its stiffness."""
@@ -77,7 +51,7 @@ class Spring(FileTable):
 class Damper(FileTable):
     """A linear damper."""
 
-    between: Annotated[tuple[str, str], _between()]
+    between: Annotated[tuple[str, str], two_bodies()]
     """What it joins."""
     damping: Annotated[float, physical("N s/m")]
     """Its damping."""
@@ -87,13 +61,13 @@ class Damper(FileTable):
 class Gap(FileTable):
     """A clearance: the gap that a mass has to a stop on one side or both."""
 
-    name: Annotated[str, _name()]
+    name: Annotated[str, NAME]
     """Its name."""
-    between: Annotated[tuple[str, str], _between()]
+    between: Annotated[tuple[str, str], two_bodies()]
     """What moves in it, and what carries the stops."""
-    upper: Annotated[float | None, _signed("m", "a length, negative for a preloaded stop,")] = None
+    upper: Annotated[float | None, signed("m", "a length, negative for a preloaded stop,")] = None
     """Gap to the upper stop; None where there is none."""
-    lower: Annotated[float | None, _signed("m", "a length, negative for a preloaded stop,")] = None
+    lower: Annotated[float | None, signed("m", "a length, negative for a preloaded stop,")] = None
     """Gap to the lower stop; None where there is none."""
     stiffness: Annotated[float | None, physical("N/m")] = None
     """Stiffness of the stops; None where each side has its own, or a law."""
@@ -150,11 +124,11 @@ class Gap(FileTable):
 class Force(FileTable):
     """A force on a mass: amplitude · sin ωt + constant."""
 
-    on: Annotated[str, _name()]
+    on: Annotated[str, NAME]
     """The mass."""
-    amplitude: Annotated[float, _signed("N", "a force")] = 0.0
+    amplitude: Annotated[float, signed("N", "a force")] = 0.0
     """Amplitude; negative: in antiphase."""
-    constant: Annotated[float, _signed("N", "a force")] = 0.0
+    constant: Annotated[float, signed("N", "a force")] = 0.0
     """Constant part, such as a weight or a preload."""
 
 
@@ -234,6 +208,27 @@ class Elements:
     """The forces."""
     base: MovingBase | None = None
     """How the ground moves; None where it rests."""
+    laws: tuple[Law, ...] = ()
+    """The laws that are given point by point."""
+    cubic_springs: tuple[CubicSpring, ...] = ()
+    """The cubic springs."""
+    frictions: tuple[Friction, ...] = ()
+    """Dry friction."""
+
+    @property
+    def nonlinear(self) -> dict[str, NonlinearElement]:
+        """All elements whose force is a law, by their names."""
+        return {
+            **{law.name: law for law in self.laws},
+            **{f"{'-'.join(each.between)}.cubic": each for each in self.cubic_springs},
+            **{f"{'-'.join(each.between)}.friction": each for each in self.frictions},
+        }
+
+    @property
+    def holding(self) -> tuple[tuple[str, ...], ...]:
+        """What each element joins whose force depends on a displacement, clearances left out."""
+        laws = [each for each in self.nonlinear.values() if quantity_of(each) == "displacement"]
+        return (*(spring.between for spring in self.springs), *map(joined_by, laws))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -244,12 +239,20 @@ class Elements:
     def row(self) -> tuple[str, ...]:
         """Names of the masses from the ground on, by how many springs away from it they are."""
         reached, row = {GROUND}, list[str]()
-        ends = [set(spring.between) for spring in self.springs]
+        ends = [set(bodies) for bodies in self.holding]
         while len(row) < len(self.masses):
             near = {n for pair in ends if not reached.isdisjoint(pair) for n in pair} - reached
             row += [name for name in reversed(self.names) if name in near]
             reached |= near
         return tuple(row)
+
+    def row_of(self, factors: Mapping[str, float]) -> Array:
+        """(n,) coefficients of the masses' displacements in a sum of those of bodies."""
+        row = np.zeros(len(self.masses))
+        for name, factor in factors.items():
+            if name != GROUND:
+                row[self.names.index(name)] += factor
+        return row
 
     @property
     def stiffness_matrix(self) -> Array:
@@ -264,10 +267,13 @@ class Elements:
     def _matrix(self, joints: Sequence[tuple[tuple[str, str], float]]) -> Array:
         """Each joint pulls on the difference of the two displacements between which it stands."""
         out = np.zeros((len(self.masses), len(self.masses)))
-        for between, value in joints:
-            row = np.zeros(len(self.masses))
-            for name, sign in zip(between, (1.0, -1.0), strict=True):
-                if name != GROUND:
-                    row[self.names.index(name)] = sign
+        for (first, second), value in joints:
+            row = self.row_of({first: 1.0, second: -1.0})
             out += value * np.outer(row, row)
         return out
+
+
+def joined_by(element: NonlinearElement) -> tuple[str, ...]:
+    """The bodies that the force of an element joins; a combination of masses stands on ground."""
+    names = tuple(factors_of(element))
+    return names if element.between is not None else (*names, GROUND)

@@ -21,7 +21,17 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import one_of
-from designer.model.lumped_elements import GROUND, Elements, Gap
+from designer.model.cubic_law import MOST_POINTS
+from designer.model.element_keys import GROUND
+from designer.model.force_law import ForceLaw
+from designer.model.law_elements import (
+    CubicSpring,
+    Friction,
+    Law,
+    factors_of,
+    quantity_of,
+)
+from designer.model.lumped_elements import Elements, Gap, joined_by
 from designer.model.mechanics import Clearance, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
@@ -35,6 +45,8 @@ DRIFTS = (
 )
 UNDAMPED = 1e-12
 """Least damping ratio of a mode: below it no steady response is reached."""
+ROUNDED = 1e-12
+"""Of the steepest slope: an eigenvalue of a matrix of slopes that small may be 0."""
 
 
 def check(system: Elements) -> None:
@@ -51,6 +63,12 @@ def check(system: Elements) -> None:
     _check_names(system)
     for gap in system.gaps:
         _check_gap(gap)
+    for law in system.laws:
+        _check_law(law)
+    for cubic in system.cubic_springs:
+        _check_cubic(cubic)
+    for friction in system.frictions:
+        _check_friction(friction)
     _check_grounded(system)
     _check_driven(system)
 
@@ -61,11 +79,12 @@ def _refuse(field: str, found: object, expected: str) -> NoReturn:
 
 def _check_names(system: Elements) -> None:
     """Each name once, and only names that there are."""
-    names = [*system.names, *(gap.name for gap in system.gaps)]
+    laws = [law.name for law in system.laws]
+    names = [*system.names, *(gap.name for gap in system.gaps), *laws]
     for name, count in Counter(names).items():
-        field = "mass" if name in system.names else "clearance"
+        field = "mass" if name in system.names else "law" if name in laws else "clearance"
         if count > 1:
-            _refuse(f"{field}.name", name, "a name that no other mass or clearance has")
+            _refuse(f"{field}.name", name, "a name that no other mass, clearance or law has")
         if name in RESERVED:
             _refuse(f"{field}.name", name, f"a name other than {', '.join(RESERVED)}")
     nets = Counter(gap.name.casefold().removesuffix("_out") for gap in system.gaps)
@@ -73,19 +92,24 @@ def _check_names(system: Elements) -> None:
         if nets[gap.name.casefold().removesuffix("_out")] > 1:
             expected = "a name that differs from the others in more than capitals or an _out"
             _refuse("clearance.name", gap.name, expected)
-    for kind, between in _joints(system):
-        for name in between:
+    for key, bodies in _joints(system):
+        for name in bodies:
             if name not in (*system.names, GROUND):
-                _refuse(f"{kind}.between", name, one_of(name, (*system.names, GROUND)))
+                _refuse(key, name, one_of(name, (*system.names, GROUND)))
     for force in system.forces:
         if force.on not in system.names:
             _refuse("force.on", force.on, one_of(force.on, system.names))
 
 
-def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, str]]]:
-    yield from (("spring", spring.between) for spring in system.springs)
-    yield from (("damper", damper.between) for damper in system.dampers)
-    yield from (("clearance", gap.between) for gap in system.gaps)
+def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
+    """(key of the model file, bodies) of everything that joins bodies."""
+    yield from (("spring.between", spring.between) for spring in system.springs)
+    yield from (("damper.between", damper.between) for damper in system.dampers)
+    yield from (("clearance.between", gap.between) for gap in system.gaps)
+    for law in system.laws:
+        yield ("law.of" if law.between is None else "law.between"), joined_by(law)
+    yield from (("cubic_spring.between", each.between) for each in system.cubic_springs)
+    yield from (("friction.between", each.between) for each in system.frictions)
 
 
 def _check_gap(gap: Gap) -> None:
@@ -131,16 +155,49 @@ def _check_restitution(gap: Gap, field: str) -> None:
         _refuse(field, gap.restitution, expected)
 
 
+def _check_law(law: Law) -> None:
+    if (law.between is None) == (law.of is None):
+        found = MISSING if law.of is None else "between and of"
+        _refuse(f"law {law.name}.between", found, "between = [A, B], or of = {A = factor, …}")
+    expected = {"displacement": "m", "velocity": "m/s"}[law.quantity]
+    if law.points.unit not in ("", expected):
+        text = f"x in {law.points.unit}"
+        _refuse(f"law {law.name}.points", text, f"x in {expected}: the law is of a {law.quantity}")
+
+
+def _check_cubic(spring: CubicSpring) -> None:
+    field = f"cubic_spring {'-'.join(spring.between)}"
+    if spring.points is not None and spring.error is not None:
+        _refuse(f"{field}.error", spring.error, "none beside points, which decide it")
+    if spring.count is None:
+        expected = (
+            f"an error that {MOST_POINTS} points reach; they reach {spring.largest_error:.2g}"
+        )
+        _refuse(f"{field}.error", spring.error, expected)
+
+
+def _check_friction(friction: Friction) -> None:
+    field = f"friction {'-'.join(friction.between)}"
+    if (friction.static is None) != (friction.stribeck is None):
+        key = "static" if friction.static is None else "stribeck"
+        _refuse(f"{field}.{key}", MISSING, "both static and stribeck, or neither")
+    if friction.static is not None and friction.static < friction.force:
+        _refuse(f"{field}.static", friction.static, f"at least force = {friction.force:g}")
+    if friction.stribeck is not None and not friction.stribeck > friction.velocity:
+        expected = f"more than velocity = {friction.velocity:g}"
+        _refuse(f"{field}.stribeck", friction.stribeck, expected)
+
+
 def _check_grounded(system: Elements) -> None:
     """Springs hold every mass to ground, directly or through others."""
-    sprung = {name for spring in system.springs for name in spring.between}
+    sprung = {name for bodies in system.holding for name in bodies}
     for name in system.names:
         if name not in sprung:
             expected = f"a [[spring]] between {name} and another"
             if any(name in gap.between for gap in system.gaps):
                 expected += DRIFTS
             _refuse("spring.between", f"no spring on {name}", expected)
-    grounded = _reached({GROUND}, [spring.between for spring in system.springs])
+    grounded = _reached({GROUND}, system.holding)
     floating = [name for name in system.names if name not in grounded]
     if floating:
         _refuse(
@@ -173,7 +230,7 @@ def _check_driven(system: Elements) -> None:
             )
 
 
-def _reached(start: set[str], joints: Sequence[tuple[str, str]]) -> set[str]:
+def _reached(start: set[str], joints: Sequence[tuple[str, ...]]) -> set[str]:
     """What hangs together with ``start``."""
     reached = set(start)
     while True:
@@ -181,6 +238,35 @@ def _reached(start: set[str], joints: Sequence[tuple[str, str]]) -> set[str]:
         if not more:
             return reached
         reached |= more
+
+
+def check_bounded(stiffness: Array, damping: Array, laws: Sequence[ForceLaw]) -> None:
+    """Refuse a system that far out nothing holds, or something drives.
+
+    stiffness, damping : (n, n) of the springs and of the dampers. A matrix that a slope makes
+    positive definite is so with every larger slope: the lower end of each law decides.
+
+    Raises
+    ------
+    InputError : names the law with the lowest end.
+    """
+    for quantity, matrix in (("displacement", stiffness), ("velocity", damping)):
+        own = [law for law in laws if law.quantity == quantity]
+        if not own:
+            continue
+        outer = matrix + sum(min(law.ends) * np.outer(law.row, law.row) for law in own)
+        values = np.linalg.eigvalsh(outer)
+        steepest = max(abs(values).max(), *(abs(s) for law in own for s in law.slopes))
+        holds = quantity == "displacement"
+        if values[0] > ROUNDED * steepest or (not holds and values[0] >= -ROUNDED * steepest):
+            continue
+        lowest = min(own, key=lambda law: min(law.ends))
+        text = f"slope {min(lowest.ends):.6g} beyond its points"
+        if holds:
+            expected = "a slope there with which springs and laws hold every mass: it would leave"
+        else:
+            expected = "a slope there with which dampers and laws do not drive a motion for ever"
+        _refuse(lowest.name, text, expected)
 
 
 def check_damped(state_matrix: Array) -> None:
@@ -217,6 +303,14 @@ LEAST: dict[str, dict[str, float]] = {
     },
     "forces": {"amplitude": -GREATEST, "constant": -GREATEST},
     "base": {"amplitude": SMALLEST},
+    "cubic_springs": {"k1": -GREATEST, "k3": -GREATEST, "range": SMALLEST},
+    "frictions": {
+        "force": 0.0,
+        "velocity": SMALLEST,
+        "static": SMALLEST,
+        "stribeck": SMALLEST,
+        "speed": -GREATEST,
+    },
 }
 """The numbers of each list of elements that can be changed, and the least that each may be."""
 MOST = {"restitution": 1.0}
@@ -228,6 +322,8 @@ TABLES = {
     "gaps": "clearance",
     "forces": "force",
     "base": "base",
+    "cubic_springs": "cubic_spring",
+    "frictions": "friction",
 }
 """The table of a model file that has each list of elements."""
 UNITS = {
@@ -241,6 +337,13 @@ UNITS = {
     "preload": "N",
     "preload_over": "m",
     "constant": "N",
+    "k1": "N/m",
+    "range": "m",
+    "force": "N",
+    "velocity": "m/s",
+    "static": "N",
+    "stribeck": "m/s",
+    "speed": "m/s",
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
@@ -248,7 +351,7 @@ NUMBERS = (1e-60, 1e60)
 """Least and greatest size of a number that is not 0: the squares of ratios of such are still
 numbers."""
 
-_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant")
+_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "k1", "force", "speed")
 
 
 @dataclass(frozen=True)
@@ -267,7 +370,9 @@ class LumpedSystem(Elements):
     def __post_init__(self) -> None:
         check(self)
         self._check_sizes()
-        check_damped(self.second_order().state_matrix())
+        system = self.second_order()
+        check_bounded(self.stiffness_matrix, self.damping_matrix, system.laws)
+        check_damped(system.spanning_state_matrix())
 
     def _check_sizes(self) -> None:
         low, high = NUMBERS
@@ -289,10 +394,16 @@ class LumpedSystem(Elements):
         for each in self.forces:
             force[self.names.index(each.on)] += each.amplitude
             constant[self.names.index(each.on)] += self.b * each.constant
+        damping, stiffness = self.damping_matrix, self.stiffness_matrix
+        laws = self._force_laws()
+        for law in laws:
+            matrix = stiffness if law.quantity == "displacement" else damping
+            matrix += law.slope * np.outer(law.row, law.row)
+            constant -= law.offset * np.array(law.row)
         return SecondOrderSystem(
             mass=np.array([mass.mass for mass in self.masses]),
-            damping=self.damping_matrix,
-            stiffness=self.stiffness_matrix,
+            damping=damping,
+            stiffness=stiffness,
             force=force,
             clearances=tuple(self._clearance(gap) for gap in self.gaps),
             constant=constant,
@@ -300,7 +411,21 @@ class LumpedSystem(Elements):
             base_acceleration=0.0 if self.base is None else self.base.acceleration,
             fixed_stops=self.base is not None and self.base.stops == "fixed",
             names=self.names,
+            laws=laws,
         )
+
+    def _force_laws(self) -> tuple[ForceLaw, ...]:
+        """Of the elements whose force is not linear."""
+        laws = [
+            ForceLaw(
+                name,
+                tuple(float(each) for each in self.row_of(factors_of(element))),
+                quantity_of(element),
+                element.corners,
+            )
+            for name, element in self.nonlinear.items()
+        ]
+        return tuple(law.scaled(self.b) for law in laws)
 
     def _clearance(self, gap: Gap) -> Clearance:
         """With ground first it is the same gap seen from the mass, its sides changed."""
@@ -366,6 +491,8 @@ class LumpedSystem(Elements):
             "gaps": [gap.name for gap in self.gaps],
             "forces": [force.on for force in self.forces],
             "base": ["base"] if self.base is not None else [],
+            "cubic_springs": ["-".join(each.between) for each in self.cubic_springs],
+            "frictions": ["-".join(each.between) for each in self.frictions],
         }
         return {
             f"{name}.{key}": (group, index, key)
@@ -422,7 +549,7 @@ class LumpedSystem(Elements):
     def as_dict(self) -> dict[str, object]:
         """The elements by their lists; the ground's unit where it is not that of a displacement.
 
-        Of a clearance the later keys are there where they are stated, so that earlier files keep
+        Lists and keys of later versions are there where a file has them, so that earlier files keep
         their hashes.
         """
         out = asdict(self)
@@ -432,6 +559,9 @@ class LumpedSystem(Elements):
                     del gap[key]
         if self.base is not None and self.base.unit == "m":
             del out["base"]["unit"]
+        for later in ("laws", "cubic_springs", "frictions"):
+            if not out[later]:
+                del out[later]
         return out
 
     def at(self, b: float) -> LumpedSystem:

@@ -23,8 +23,6 @@ from designer.base.guarded_reading import csv_rows, decode, read_bytes
 from designer.base.schema import one_of
 from designer.base.units import parse_quantity
 
-MEASURED = "measured.csv"
-"""A design folder's own copy."""
 _MOST_BYTES = 4_000_000
 _COLUMNS = ("part", "value", "tolerance", "board")
 _UNITS = (

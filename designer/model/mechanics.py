@@ -1,12 +1,12 @@
 """Masses, dampers, springs and stops as a piecewise-linear system.
 
-    M z'' + C z' + K z + Σ stops = force(ω) · sin ωt + constant
+    M z'' + C z' + K z + Σ stops + Σ laws = force(ω) · sin ωt + constant
 
-with any number of masses and clearances; Eq. (1)-(2) of the paper is the case of two masses and one
-two-sided clearance. Where the ground moves, by y = Y sin ωt, z = x - y is the displacement relative
-to it: the force is then that of the file and M Y ω² (every spring and damper to ground stands on
-what moves). Y or the acceleration Y ω² is given. Stops that do not move with the ground watch
-z + y.
+with any number of masses, clearances and force laws; Eq. (1)-(2) of the paper is the case of two
+masses and one two-sided clearance. Where the ground moves, by y = Y sin ωt, z = x - y is the
+displacement relative to it: the force is then that of the file and M Y ω² (every spring, damper and
+law to ground stands on what moves). Y or the acceleration Y ω² is given. Stops that do not move
+with the ground watch z + y.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.model.force_law import ForceLaw, Quantity
 
 Sides = Literal["both", "upper", "lower"]
 POSITIONS: dict[Sides, tuple[int, ...]] = {"both": (1, -1), "upper": (1,), "lower": (-1,)}
@@ -141,9 +142,9 @@ class SecondOrderSystem:
     mass: Array
     """(n,) masses."""
     damping: Array
-    """(n, n) damping matrix."""
+    """(n, n) damping matrix, with every law on its piece at rest."""
     stiffness: Array
-    """(n, n) stiffness matrix."""
+    """(n, n) stiffness matrix, with every law on its piece at rest."""
     force: Array
     """(n,) amplitude of the force on each mass."""
     clearances: tuple[Clearance, ...]
@@ -158,6 +159,8 @@ class SecondOrderSystem:
     """Whether the stops between a mass and ground stay where they are while the ground moves."""
     names: tuple[str, ...] = ()
     """Names of the masses; () where they have none."""
+    laws: tuple[ForceLaw, ...] = ()
+    """Further forces. What they are at rest is in the matrices and in ``constant``."""
 
     def __post_init__(self) -> None:
         if not len(self.constant):
@@ -170,8 +173,22 @@ class SecondOrderSystem:
 
     @property
     def own_frequency(self) -> float:
-        """Of the first mass on its own springs, the others held, in rad per unit of time."""
-        return float(np.sqrt(self.stiffness[0, 0] / self.mass[0]))
+        """Of the first mass on its own springs, the others held, in rad per unit of time; of a law
+        its mean slope counts."""
+        return float(np.sqrt(self.spanning_stiffness[0, 0] / self.mass[0]))
+
+    @property
+    def spanning_stiffness(self) -> Array:
+        """(n, n) stiffness matrix of a motion that spans the points of every law."""
+        return self.stiffness + self._spanning("displacement")
+
+    def _spanning(self, quantity: Quantity) -> Array:
+        """(n, n) what the laws' mean slopes are more than those at rest."""
+        more = np.zeros((self.size, self.size))
+        for law in self.laws:
+            if law.quantity == quantity:
+                more += (law.mean_slope - law.slope) * np.outer(law.row, law.row)
+        return more
 
     @property
     def ground_moves(self) -> bool:
@@ -204,9 +221,9 @@ class SecondOrderSystem:
         return float(clearance.first.stiffness / spring_stiffness)
 
     def natural_frequencies(self, *, closed: bool = False) -> Array:
-        """(n,) undamped ones, ascending, in rad per unit of time. closed : with every stop in
-        contact, of each clearance the stiffest; else with none."""
-        stiffness = self.stiffness.copy()
+        """(n,) undamped ones, ascending, in rad per unit of time; of a law its mean slope counts.
+        closed : with every stop in contact, of each clearance the stiffest; else with none."""
+        stiffness = self.spanning_stiffness
         if closed:
             for stop in self.clearances:
                 row = self.displacement(stop)
@@ -220,17 +237,26 @@ class SecondOrderSystem:
 
     def state_matrix(self) -> Array:
         """(2n, 2n) A of the open system; states x1, x1', x2, x2', … as in Eq. (10)."""
+        return self._first_order(self.stiffness, self.damping)
+
+    def spanning_state_matrix(self) -> Array:
+        """The same of a motion that spans the points of every law."""
+        damping = self.damping + self._spanning("velocity")
+        return self._first_order(self.spanning_stiffness, damping)
+
+    def _first_order(self, stiffness: Array, damping: Array) -> Array:
         n = self.size
         A = np.zeros((2 * n, 2 * n))
         for i in range(n):
             A[2 * i, 2 * i + 1] = 1.0
-            A[2 * i + 1, 0::2] = -self.stiffness[i] / self.mass[i]
-            A[2 * i + 1, 1::2] = -self.damping[i] / self.mass[i]
+            A[2 * i + 1, 0::2] = -stiffness[i] / self.mass[i]
+            A[2 * i + 1, 1::2] = -damping[i] / self.mass[i]
         return A
 
     def piecewise_linear(self, omega: float | None = None) -> PiecewiseLinearSystem:
-        """States x1, x1', x2, x2', …; one key entry per clearance, in their order: how many springs
-        of the upper stop are met, or minus how many of the lower.
+        """States x1, x1', x2, x2', …; one key entry per clearance in their order, then one per law:
+        how many springs of the upper stop are met, or minus how many of the lower; of a law how
+        many corners the motion is above its piece at rest, or minus how many below.
 
         omega : of the drive; only a moving ground asks for it.
 
@@ -242,7 +268,11 @@ class SecondOrderSystem:
             raise ValueError("what a moving ground does depends on omega")
         n = self.size
         ground = self.ground(1.0 if omega is None else omega)
-        contacts = [_Contact(self, stop, ground) for stop in self.clearances]
+        contacts = [
+            *(_Contact.with_stops(self, k, ground) for k in range(len(self.clearances))),
+            *(_Contact.with_law(self, law) for law in self.laws),
+        ]
+        stops, count = contacts[: len(self.clearances)], len(self.clearances)
         A0 = self.state_matrix()
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
         B0[1::2] = self.drive_force(omega or 0.0) / self.mass
@@ -254,50 +284,83 @@ class SecondOrderSystem:
             for j, (contact, level) in enumerate(zip(contacts, key, strict=True)):
                 contact.push(level, A, B, d)
                 guards += contact.guards(j, key)
-            return Mode(A, B, d, tuple(guards), sides=tuple(int(np.sign(level)) for level in key))
+            sides = tuple(int(np.sign(level)) for level in key[:count])
+            return Mode(A, B, d, tuple(guards), sides=sides)
 
         even = all(stop.upper == stop.lower for stop in self.clearances)
+        even = even and all(law.even for law in self.laws)
         return PiecewiseLinearSystem(
             states=state_names(n),
             build=build,
             start=(0,) * len(contacts),
             clearances=tuple(stop.name for stop in self.clearances),
-            displacement=tuple(np.append(c.row, [c.on_drive, 0.0]) for c in contacts),
-            velocity=tuple(np.append(c.rate, c.on_drive) for c in contacts),
+            displacement=tuple(np.append(c.row, [c.on_drive, 0.0]) for c in stops),
+            velocity=tuple(np.append(c.rate, c.on_drive) for c in stops),
             mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
             continuous=not any(stop.jumps for stop in self.clearances),
         )
 
 
+@dataclass(frozen=True)
 class _Contact:
-    """One clearance in the equations of first order."""
+    """One clearance or one law in the equations of first order: what joins in where."""
 
-    def __init__(self, system: SecondOrderSystem, clearance: Clearance, ground: float) -> None:
-        row = system.displacement(clearance)
-        self.clearance = clearance
-        self.row = np.zeros(2 * system.size)
-        self.row[0::2] = row
-        self.rate = np.zeros(2 * system.size)
-        self.rate[1::2] = row
-        self.push_back = np.zeros(2 * system.size)
-        self.push_back[1::2] = row / system.mass
+    row: Array
+    """(2n,) over the states: what its springs watch."""
+    rate: Array
+    """(2n,) over the states: its rate, of a clearance."""
+    push_back: Array
+    """(2n,) change of the states' rates for a unit of force."""
+    springs: Mapping[int, tuple[tuple[float, float], ...]]
+    """(place, stiffness) of what joins in on each side, 1 upper and -1 lower, the nearest first."""
+    jumps: Mapping[int, float]
+    """Force that is there at once on each side."""
+    damping: float = 0.0
+    """While there is contact."""
+    on_drive: float = 0.0
+    """Coefficient of the drive in what is watched."""
+    clearance: int = -1
+    """Index of the clearance whose contact it is; -1 of a law."""
+
+    @classmethod
+    def with_stops(cls, system: SecondOrderSystem, index: int, ground: float) -> _Contact:
+        """One clearance of a system."""
+        clearance = system.clearances[index]
+        along = system.displacement(clearance)
         fixed = system.fixed_stops and clearance.other is None
-        self.on_drive = ground if fixed else 0.0
+        return cls(
+            _interleaved(along, 0),
+            _interleaved(along, 1),
+            _interleaved(along / system.mass, 1),
+            {side: stop.springs for side, stop in clearance.sides},
+            {side: stop.jump for side, stop in clearance.sides},
+            clearance.damping,
+            ground if fixed else 0.0,
+            index,
+        )
+
+    @classmethod
+    def with_law(cls, system: SecondOrderSystem, law: ForceLaw) -> _Contact:
+        """One law of a system, beyond its piece at rest."""
+        along = np.array(law.row)
+        watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
+        push_back = _interleaved(along / system.mass, 1)
+        return cls(watched, np.zeros_like(watched), push_back, law.bends, {})
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:
-        """Add the force of the springs in contact to the equations.
+        """Add the force of what has joined in to the equations.
 
-        level : number of springs in contact; negative at the lower stop.
+        level : how many springs; negative on the lower side.
         """
         if not level:
             return
         side = int(np.sign(level))
-        d -= side * self._stop(side).jump * self.push_back
-        for place, stiffness in self._stop(side).springs[: abs(level)]:
+        d -= side * self.jumps.get(side, 0.0) * self.push_back
+        for place, stiffness in self.springs[side][: abs(level)]:
             A -= stiffness * np.outer(self.push_back, self.row)
             B -= stiffness * self.on_drive * self.push_back
             d += stiffness * side * place * self.push_back
-        A -= self.clearance.damping * np.outer(self.push_back, self.rate)
+        A -= self.damping * np.outer(self.push_back, self.rate)
 
     def guards(self, index: int, key: ModeKey) -> list[Guard]:
         """Guards of the transitions to one spring more or one fewer."""
@@ -305,26 +368,29 @@ class _Contact:
         out = []
         if level:
             side = int(np.sign(level))
-            springs = self._stop(side).springs
+            springs = self.springs[side]
             out.append(self._guard(-side, springs[abs(level) - 1][0], level - side, index, key))
             if abs(level) < len(springs):
                 out.append(self._guard(side, -springs[abs(level)][0], level + side, index, key))
             return out
         return [
-            self._guard(side, -stop.gap, side, index, key) for side, stop in self.clearance.sides
+            self._guard(side, -springs[0][0], side, index, key)
+            for side, springs in self.springs.items()
         ]
-
-    def _stop(self, side: int) -> Side:
-        return dict(self.clearance.sides)[side]
 
     def _guard(self, sign: int, constant: float, level: int, index: int, key: ModeKey) -> Guard:
         target = (*key[:index], level, *key[index + 1 :])
-        touches = not (
-            level and key[index]
-        )  # contact begins or ends; deeper springs only stiffen it
-        return Guard(
-            sign * self.row, sign * self.on_drive, constant, target, index if touches else -1
-        )
+        # Contact begins or ends; deeper springs only stiffen it.
+        touches = not (level and key[index])
+        clearance = self.clearance if touches else -1
+        return Guard(sign * self.row, sign * self.on_drive, constant, target, clearance)
+
+
+def _interleaved(row: Array, first: int) -> Array:
+    """(2n,) over the states of a row (n,). first : 0 over displacements, 1 over velocities."""
+    out = np.zeros(2 * len(row))
+    out[first::2] = row
+    return out
 
 
 class MechanicalModel(Hashable, Protocol):

@@ -27,7 +27,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
@@ -42,9 +42,9 @@ from designer.dynamics.counts import Counts
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
+from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
-from designer.model.measured_values import MeasuredBoards, read_measured
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.response_table import Response, ResponseTable
@@ -53,6 +53,9 @@ from designer.model.search_table import SearchSpec
 from designer.model.si_units import in_si
 from designer.model.spread_table import BENCH_1, SpreadSpec
 from designer.model.tuning_bands import Bands
+
+if TYPE_CHECKING:
+    from designer.model.measured_values import MeasuredBoards
 
 MAX_BYTES = 1_000_000
 """A model file is a page of text; anything larger is something else."""
@@ -138,6 +141,8 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     named = modelfile.spread.measured
     if named is None:
         return modelfile
+    from designer.model.measured_values import read_measured
+
     try:
         place = measured or inside(path.parent, named, "spread.measured")
     except InputError as error:
@@ -272,27 +277,39 @@ class _SystemFile(_Tables):
     """Forces on masses."""
     base: BaseTable | None = None
     """How the ground moves; without it the ground rests."""
+    law: tuple[Law, ...] = ()
+    """Forces that are straight between given points."""
+    cubic_spring: tuple[CubicSpring, ...] = ()
+    """Springs with a cubic force."""
+    friction: tuple[Friction, ...] = ()
+    """Dry friction."""
     mechanical: ClassVar[None] = None
 
     @property
     def system(self) -> LumpedSystem:
         """What is computed with."""
         base = None if self.base is None else self.base.motion
-        return LumpedSystem(self.mass, self.spring, self.damper, self.clearance, self.force, base)
+        return LumpedSystem(
+            self.mass,
+            self.spring,
+            self.damper,
+            self.clearance,
+            self.force,
+            base,
+            self.law,
+            self.cubic_spring,
+            self.friction,
+        )
 
     def scales(self, data: Mapping[str, Any]) -> SiScales | None:
         """The file is in SI where a value of its elements is a text with a unit."""
-        keys = ("mass", "spring", "damper", "clearance", "force")
+        keys = (key for key in model_limits.ELEMENTS if key != "base")
         elements = [element for key in keys for element in data.get(key, ())]
         elements += [data["base"]] if "base" in data else []
-        words = ("name", "between", "on", "law", "stops")
-        texts = (
-            value
-            for element in elements
-            for key, value in element.items()
-            if key not in words and isinstance(value, str)
-        )
-        return SiScales() if any(texts) else None
+        words = ("name", "between", "on", "law", "stops", "quantity")
+        values = [v for each in elements for key, v in each.items() if key not in words]
+        values += [v for law in data.get("law", ()) for point in law["points"] for v in point]
+        return SiScales() if any(isinstance(value, str) for value in values) else None
 
 
 FORMATS: tuple[type[_ModelFile], type[_SystemFile]] = (_ModelFile, _SystemFile)

@@ -25,7 +25,9 @@ from designer.base.schema import (
 WHERE = "docs/model-file.md#limits"
 MODELS = ("model", "mechanical")
 """The two tables that a model of format 1 may be given in."""
-ELEMENTS = ("mass", "spring", "damper", "clearance", "force", "base")
+ELEMENTS = (
+    "mass", "spring", "damper", "clearance", "force", "base", "law", "cubic_spring", "friction",
+)  # fmt: skip
 """Tables of the elements of format 2."""
 _REWRITTEN = "designer new FILE --from OLD rewrites a file in it"
 
@@ -84,7 +86,7 @@ LIMITS = (
         f"format = 2, which has [[mass]], [[spring]], [[damper]], [[clearance]] and [[force]]; "
         f"{_REWRITTEN}",
         (1,),
-        tables=r"mass(es)?|springs?|dampers?|clearances?|stops?|forces?",
+        tables=r"mass(es)?|springs?|dampers?|clearances?|stops?|forces?|law|cubic_spring|friction",
     ),
     ModelLimit(
         "a third mass",
@@ -149,11 +151,11 @@ LIMITS = (
         tables="|".join(MODELS),
     ),
     ModelLimit(
-        "friction",
-        "`[[friction]]`, `friction`, `mu`",
-        "a linear damper that takes the same energy from a period, 4 F/(π ω X) for the friction "
-        "force F at amplitude X: right at that amplitude alone, and without sticking",
-        tables=r"frictions?|coulomb|stribeck|dry_friction",
+        "friction, but as a [[friction]] of format 2",
+        "`friction`, `mu`",
+        "[[friction]] of format 2, whose force rises with the velocity until it slides; the force "
+        "is stated, no coefficient of a normal force; no circuit makes it",
+        tables=r"frictions|coulomb|stribeck|dry_friction",
         keys=r"\w*friction\w*|mu|mu_\w+|coulomb\w*|stribeck\w*|stick\w*",
     ),
     ModelLimit(
@@ -165,19 +167,19 @@ LIMITS = (
         keys=r"\w*restitution\w*|cor|e|rigid",
     ),
     ModelLimit(
-        "a spring that is not linear",
-        "`cubic`, `k3`, `[[cubic_spring]]`, `[[law]]`",
-        "steps of stiffness: a [[clearance]] of format 2 for each, at rising gaps; n-p-q counts "
-        "the entries into each",
-        tables=r"laws?|cubic\w*|nonlinear\w*|duffing\w*|characteristics?",
+        "a spring that is not linear, but as a [[law]] or a [[cubic_spring]] of format 2",
+        "`cubic`, `k3`, `exponent`",
+        "[[cubic_spring]] of format 2, or a [[law]] point by point; for a circuit a [[clearance]] "
+        "for each step of a stiffness that rises",
+        tables=r"laws|cubics?|cubic_?springs|cubicspring|nonlinear\w*|duffing\w*|characteristics?",
         keys=r"cubic\w*|\w*_cubic|[Kk]_?3|[Kk]_?nl|nonlinear\w*|alpha|beta|gamma|duffing\w*|law|"
         r"exponent|power|points|curve|stiffness_?[2-9]",
     ),
     ModelLimit(
-        "a damper that is not linear",
+        "a damper that is not linear, but as a [[law]] of format 2",
         "`drag`, `quadratic`",
-        "a linear damper that takes the same energy from a period, 8 d ω X/(3π) for the force d v² "
-        "at amplitude X",
+        'a [[law]] of format 2 with quantity = "velocity", point by point; or a linear damper that '
+        "takes the same energy from a period, 8 d ω X/(3π) for the force d v² at amplitude X",
         tables=r"drags?",
         keys=r"drag\w*|quadratic\w*|damping_?[2-9]",
     ),
@@ -248,6 +250,7 @@ LIMITS = (
         "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
         tables=r"\w+",
         keys=r"\w+",
+        of=tuple(name for name in (*MODELS, *ELEMENTS) if name != "law"),
         value=_is_matrix,
     ),
     ModelLimit(
@@ -275,8 +278,8 @@ LIMITS = (
     ModelLimit(
         "negative stiffness",
         '`stiffness = "-5 kN/m"`',
-        "a softer spring; where a stop that is in contact at rest (a negative gap) is left, the "
-        "stiffness falls, but never below that of the springs",
+        "a [[law]] or a [[cubic_spring]] of format 2, which may fall as long as it rises far out; "
+        "no circuit makes it",
         keys=r"\w*stiffness|[Kk][0-2]?|constant",
         of=(*MODELS, "spring", "clearance"),
         value=_is_negative,
@@ -284,7 +287,8 @@ LIMITS = (
     ModelLimit(
         "negative damping",
         "`damping = -1.0`",
-        "none: a motion that is not damped reaches no steady response",
+        'a [[law]] of format 2 with quantity = "velocity", which may fall as long as it does not '
+        "far out",
         keys=r"damping|[Cc][12]?|zeta",
         of=(*MODELS, "damper", "clearance"),
         value=_is_negative,

@@ -17,7 +17,6 @@ from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, checked, line, literal, number, one_of
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.design_rule import DesignRule, Override
-from designer.catalog.design_rules import RULES
 
 
 def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override]:
@@ -27,14 +26,17 @@ def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override
     ------
     InputError : an unknown id, no reason, or a limit that is no value in the rule's unit.
     """
-    by_id = {rule.id: rule for rule in RULES}
+    if not tables:
+        return {}
+    from designer.catalog.design_rules import BY_ID
+
     for name, table in tables.items():
-        if name not in by_id:
-            raise InputError(file, f"rules.{name[:60]}", "an unknown rule", one_of(name, by_id))
+        if name not in BY_ID:
+            raise InputError(file, f"rules.{name[:60]}", "an unknown rule", one_of(name, BY_ID))
         if not isinstance(table, dict):
             raise InputError(file, f"rules.{name}", literal(table), "a table with limit and reason")
     return {
-        name: _override(rule, tables[name], file) for name, rule in by_id.items() if name in tables
+        name: _override(rule, tables[name], file) for name, rule in BY_ID.items() if name in tables
     }
 
 

@@ -10,7 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from designer.base.si_unit import quantity_text
-from designer.model.lumped_elements import GROUND, Gap
+from designer.model.element_keys import GROUND
+from designer.model.law_elements import (
+    CubicSpring,
+    Law,
+    NonlinearElement,
+    factors_of,
+    quantity_of,
+)
+from designer.model.lumped_elements import Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 
@@ -33,6 +41,10 @@ def equations_of(model: LumpedSystem, naming: Naming = symbol_of) -> tuple[str, 
     """One line for each mass, one for each clearance, and the ground's motion."""
     lines = [_line(model, i, naming) for i in range(len(model.masses))]
     lines += [_law(model, gap, naming) for gap in model.gaps]
+    symbols = law_symbols(model)
+    lines += [
+        _nonlinear(symbols[name], element, naming) for name, element in model.nonlinear.items()
+    ]
     if model.base is not None:
         if model.base.acceleration:
             lines.append(f"y = {naming('a', model.base.acceleration)}/ω² {MOTION}")
@@ -52,9 +64,25 @@ def element_rows(model: LumpedSystem, *, si: bool) -> list[tuple[str, str, str]]
     ]
 
 
-def hertz_notes(model: LumpedSystem, *, si: bool) -> list[str]:
-    """A sentence for each clearance whose stops follow Hertz's law: by how much the pieces miss."""
+def law_symbols(model: LumpedSystem) -> dict[str, str]:
+    """What each element whose force is a law is called in equations, by its name: a [[law]] by that
+    name, the others F₁, F₂, …"""
+    laws = {law.name: law.name for law in model.laws}
+    others = [name for name in model.nonlinear if name not in laws]
+    return {**laws, **{name: subscripted(f"F{i}") for i, name in enumerate(others, start=1)}}
+
+
+def approximation_notes(model: LumpedSystem, *, si: bool) -> list[str]:
+    """A sentence for each curved law by how much its straight pieces miss it: stops after Hertz,
+    cubic springs."""
     notes = []
+    for spring in model.cubic_springs:
+        reach = _value(spring.range, "m" if si else "")
+        notes.append(
+            f"{' to '.join(spring.between)}: {spring.k1:.4g} x + {spring.k3:.4g} x³ by "
+            f"{spring.count} points, straight between them, up to {reach}; the force differs from "
+            f"the law by at most {100.0 * spring.largest_error:.2g} % of the largest in that range."
+        )
     for gap in model.gaps:
         if gap.hertz is not None and gap.depth is not None:
             depth = _value(gap.depth, "m" if si else "")
@@ -77,6 +105,8 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         yield subscripted(f"c{i}"), damper.damping, "N s/m", text
     for gap in model.gaps:
         yield from _of_gap(gap, model.stop_damping(gap))
+    for name, symbol in law_symbols(model).items():
+        yield from _of_law(symbol, model.nonlinear[name])
     for i, force in enumerate(model.forces, start=1):
         if force.amplitude:
             text = f"amplitude of the force on {force.on}"
@@ -119,6 +149,28 @@ def _of_gap(gap: Gap, damping: float) -> Iterator[tuple[str, float, str, str]]:
         yield f"{gap.name}.damping", damping, "N s/m", f"damping of the stops {location}{more}"
 
 
+def _of_law(symbol: str, element: NonlinearElement) -> Iterator[tuple[str, float, str, str]]:
+    if isinstance(element, Law):
+        unit = "m" if element.quantity == "displacement" else "m/s"
+        for i, (x, force) in enumerate(element.corners, start=1):
+            yield subscripted(f"{symbol}.x{i}"), x, unit, f"{element.quantity} at point {i}"
+            yield subscripted(f"{symbol}.f{i}"), force, "N", f"force at point {i}"
+        return
+    where = " to ".join(element.between)
+    if isinstance(element, CubicSpring):
+        yield f"{symbol}.k1", element.k1, "N/m", f"linear part of the spring, {where}"
+        yield f"{symbol}.k3", element.k3, "", f"cubic part of the spring, {where}, N/m³ in SI"
+        yield f"{symbol}.range", element.range, "m", f"up to which its pieces are laid, {where}"
+        return
+    yield f"{symbol}.force", element.force, "N", f"friction, {where}"
+    yield f"{symbol}.velocity", element.velocity, "m/s", f"up to which it rises, {where}"
+    if element.static is not None and element.stribeck is not None:
+        yield f"{symbol}.static", element.static, "N", f"friction there, {where}"
+        yield f"{symbol}.stribeck", element.stribeck, "m/s", f"where it has fallen, {where}"
+    if element.speed:
+        yield f"{symbol}.speed", element.speed, "m/s", f"of the surface that it slides on, {where}"
+
+
 def _value(value: float, unit: str) -> str:
     if not unit:
         return f"{value:.6g}"
@@ -142,6 +194,13 @@ def _line(model: LumpedSystem, mass: int, naming: Naming) -> str:
         if name in gap.between:
             sign = "+" if name == gap.between[0] else "−"
             text += f" {sign} {gap.name}({_motion(model, gap)})"
+    for name_of_law, symbol in law_symbols(model).items():
+        element = model.nonlinear[name_of_law]
+        factor = factors_of(element).get(name, 0.0)
+        if factor:
+            size = _times(number_of("", abs(factor)))
+            sign = "+" if factor > 0.0 else "−"
+            text += f" {sign} {size}{symbol}({law_variable(model, element)})"
     return f"{text} = {_forces(model, name, naming)}"
 
 
@@ -167,6 +226,40 @@ def _motion(model: LumpedSystem, gap: Gap) -> str:
     moves = model.base is not None and model.base.stops == "base"
     first, second = (_place(model, name, "", moves=moves) for name in gap.between)
     return f"{first} − {second}" if first and second else first or f"−{second}"
+
+
+def law_variable(model: LumpedSystem, element: NonlinearElement) -> str:
+    """What the force of an element depends on."""
+    prime = "" if quantity_of(element) == "displacement" else "′"
+    terms = []
+    for name, factor in factors_of(element).items():
+        place = _place(model, name, prime)
+        if place:
+            size = _times(number_of("", abs(factor)))
+            terms.append(f"{'+' if factor > 0.0 else '−'} {size}{place}")
+    return " ".join(terms).removeprefix("+ ").replace("− ", "−", not terms[0].startswith("+"))
+
+
+def _nonlinear(symbol: str, element: NonlinearElement, naming: Naming) -> str:
+    """The force of an element over what it depends on, u."""
+    if isinstance(element, Law):
+        points = (f"({number_of('', x)}, {number_of('', f)})" for x, f in element.corners)
+        return f"{symbol}(u) straight from point to point: {', '.join(points)}"
+
+    def value(key: str) -> str:
+        return naming(f"{symbol}.{key}", getattr(element, key))
+
+    if isinstance(element, CubicSpring):
+        linear = f"{_times(value('k1'))}u + " if element.k1 else ""
+        return f"{symbol}(u) = {linear}{_times(value('k3'))}u³".replace("+ −", "− ")
+    slip = f"u − {value('speed')}".replace("− −", "+ ") if element.speed else "u"
+    slip = f"({slip})" if element.speed else slip
+    if element.static is None:
+        return f"{symbol}(u) = {_times(value('force'))}min(max({slip}/{value('velocity')}, −1), 1)"
+    return (
+        f"{symbol}(u) = {_times(value('static'))}{slip}/{value('velocity')} up to that speed, then "
+        f"falling to {value('force')} at the speed {value('stribeck')}"
+    )
 
 
 def _forces(model: LumpedSystem, name: str, naming: Naming) -> str:
@@ -224,4 +317,4 @@ def _at(model: LumpedSystem, gap: Gap, end: str, naming: Naming) -> str:
 
 
 def _times(value: str) -> str:
-    return "" if value == "1" else f"{value} "
+    return {"1": "", "−1": "−"}.get(value, f"{value} ")

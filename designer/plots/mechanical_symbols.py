@@ -48,6 +48,24 @@ class MechanicalSheet:
         self.line([middle + 0.15, middle + 0.15], [y + 0.26, y - 0.26], INK, 1.8)
         self.line([middle + 0.15, x1], [y, y], INK, 1.2)
 
+    def friction(self, x0: float, x1: float, y: float) -> None:
+        """A rod between two pads that rub on it."""
+        middle, half = 0.5 * (x0 + x1), 0.6
+        self.line([x0, middle + half], [y, y], INK, 1.2)
+        for pad in (y + 0.14, y - 0.14):
+            self.line([middle - half, middle + half], [pad, pad], INK, 1.8)
+        end = middle + half + 0.25
+        self.line([middle + half, end, end, middle + half], [y + 0.3] * 2 + [y - 0.3] * 2, INK, 1.2)
+        self.line([end, x1], [y, y], INK, 1.2)
+
+    def slash(self, x0: float, x1: float, y: float) -> None:
+        """An arrow across a spring or a damper that is not linear."""
+        middle = 0.5 * (x0 + x1)
+        self.axes.annotate(
+            "", (middle + 0.55, y + 0.42), (middle - 0.55, y - 0.42),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.1, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+
     def wall(self, x: float, low: float, high: float, side: int) -> None:
         """Ground, hatched on the side away from the system."""
         self.line([x, x], [low, high], INK, 1.2)

@@ -12,19 +12,23 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, styled
-from designer.model.lumped_elements import GROUND, Damper, Gap, Spring
+from designer.model.element_keys import GROUND
+from designer.model.law_elements import CubicSpring, Friction, Law
+from designer.model.lumped_elements import Damper, Gap, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
-from designer.model.system_equations import element_rows
+from designer.model.system_equations import element_rows, law_symbols, law_variable
 from designer.plots.mechanical_symbols import MechanicalSheet
 
-Joint = Spring | Damper
+Joint = Spring | Damper | CubicSpring | Friction | Law
 _WALL, _FIRST, _WIDTH, _PITCH = 0.9, 5.3, 2.6, 7.0
 """Abscissae of the wall and of the first mass, the width of a mass, and from one to the next."""
 _ROW = 1.6
 """Height of one spring, damper or force between neighbours."""
 _LANE, _DEEP = 3.0, 1.7
 """Height of a clearance above the row, and of a joint below it."""
+_LINE = 0.8
+"""Height of a line of text below it."""
 _SHIFT = 0.35
 """Between the rods of clearances on one mass."""
 _GAP, _STOP = 1.3, 2.3
@@ -45,25 +49,31 @@ class _Page(MechanicalSheet):
         self.between: list[list[str]] = [[] for _ in self.row]
         self.below: list[str] = []
         self.joints = self._joints()
+        self.combinations = [s for s, element in self._laws() if element.between is None]
         self._sort()
         rows = max(len(slot) for slot in self.between)
         self.top = 0.6 + _ROW * max(rows, 2)
         high = self.top + 0.6 + _LANE * len(model.gaps)
         width = _FIRST + _PITCH * (len(model.masses) - 1) + _WIDTH + 4.6
-        self.floor = 0.5 - 1.1 - _DEEP * len(self.below) if self.below else 0.0
+        low = _DEEP * len(self.below) + _LINE * len(self.combinations)
+        self.floor = 0.5 - 1.1 - low if low else 0.0
         super().__init__(width, high, self.floor - 1.1)
         self._draw()
 
     def _joints(self) -> dict[str, Joint]:
-        """Springs and dampers by their symbols."""
+        """What joins two bodies, clearances left out, by symbols."""
         springs = {subscripted(f"k{i}"): s for i, s in enumerate(self.model.springs, start=1)}
         dampers = {subscripted(f"c{i}"): d for i, d in enumerate(self.model.dampers, start=1)}
-        return {**springs, **dampers}
+        return {**springs, **dampers, **{s: e for s, e in self._laws() if e.between is not None}}
+
+    def _laws(self) -> list[tuple[str, CubicSpring | Friction | Law]]:
+        elements = self.model.nonlinear
+        return [(symbol, elements[name]) for name, symbol in law_symbols(self.model).items()]
 
     def _sort(self) -> None:
         """What stands between neighbours, at the right of each place of the row, and what below."""
         for symbol, joint in self.joints.items():
-            left, right = self._ends(joint.between)
+            left, right = self._ends(joint.between or ())
             (self.between[left] if right == left + 1 else self.below).append(symbol)
         for place, name in enumerate(self.row):
             forced = [f"force {name}"] if self._force(name) else []
@@ -100,6 +110,10 @@ class _Page(MechanicalSheet):
                 self._neighbours(place, self.top - 0.9 - _ROW * number, symbol)
         for number, symbol in enumerate(self.below):
             self._under(-1.5 - _DEEP * number, symbol)
+        for number, symbol in enumerate(self.combinations):
+            y = -1.2 - _DEEP * len(self.below) - _LINE * number
+            law = self.model.nonlinear[symbol]
+            self.text(_WALL + 0.4, y, f"{symbol}({law_variable(self.model, law)})", "left")
         for number, gap in enumerate(self.model.gaps):
             self._clearance(self.top + 1.3 + _LANE * number, gap, self._shift(number))
 
@@ -133,12 +147,28 @@ class _Page(MechanicalSheet):
         self._joint(x0, x1, y, symbol)
 
     def _joint(self, x0: float, x1: float, y: float, symbol: str) -> None:
-        (self.spring if isinstance(self.joints[symbol], Spring) else self.damper)(x0, x1, y)
-        self.text(0.5 * (x0 + x1), y + 0.4, f"{symbol} = {self.values[symbol]}")
+        joint = self.joints[symbol]
+        if isinstance(joint, Friction):
+            self.friction(x0, x1, y)
+        elif isinstance(joint, Damper) or (isinstance(joint, Law) and joint.quantity == "velocity"):
+            self.damper(x0, x1, y)
+        else:
+            self.spring(x0, x1, y)
+        if isinstance(joint, CubicSpring | Law):
+            self.slash(x0, x1, y)
+        self.text(0.5 * (x0 + x1), y + 0.4, self._label(symbol, joint))
+
+    def _label(self, symbol: str, joint: Joint) -> str:
+        if isinstance(joint, CubicSpring):
+            linear = f"{self.values[f'{symbol}.k1']} x, " if joint.k1 else ""
+            return f"{symbol}: {linear}{self.values[f'{symbol}.k3']} x³"
+        if isinstance(joint, Friction):
+            return f"{symbol}: {self.values[f'{symbol}.force']}"
+        return symbol if isinstance(joint, Law) else f"{symbol} = {self.values[symbol]}"
 
     def _under(self, y: float, symbol: str) -> None:
         """A joint of what are no neighbours, below the row."""
-        left, right = self._ends(self.joints[symbol].between)
+        left, right = self._ends(self.joints[symbol].between or ())
         x0 = self._middle(left) + (0.3 * _WIDTH if left else 0.0)
         x1 = self._middle(right) - 0.3 * _WIDTH
         for x, place in ((x0, left), (x1, right)):

@@ -31,7 +31,7 @@ from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
-from designer.model.system_equations import equations_of, hertz_notes, number_of
+from designer.model.system_equations import approximation_notes, equations_of, number_of
 from designer.report import design_tables, response_tables, tolerance_tables, words
 from designer.report.data import ReportData
 from designer.report.four_answers import answers
@@ -179,7 +179,7 @@ def _system(model: LumpedSystem, drawing: Picture, *, si: bool) -> PageSection:
     blocks: list[Block] = [
         replace(drawing, sketch=sketch, caption=caption),
         PageSection("Equations of motion", equations),
-        *(SmallPrint(note) for note in hertz_notes(model, si=si)),
+        *(SmallPrint(note) for note in approximation_notes(model, si=si)),
         design_tables.elements_table(model, si=si),
     ]
     return PageSection("The model", blocks, "model")

@@ -22,6 +22,7 @@ from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, sta
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
+from designer.model.force_law import ForceLaw
 from designer.model.mechanics import Clearance, MechanicalModel
 
 _SECTION = re.compile("[A-OQ-Z]")
@@ -80,6 +81,8 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
+    for law in system.laws:
+        raise InputError(None, f"law {law.name}", "a force that is not linear", _in_its_place(law))
     for clearance in system.clearances:
         if clearance.damping:
             raise InputError(
@@ -118,6 +121,31 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     refusal = stage_refusal(system.clearances, stage_kind(spec, system.clearances))
     if refusal is not None:
         raise refusal
+
+
+def _in_its_place(law: ForceLaw) -> str:
+    """What a file may say in the place of a law that a circuit is to make."""
+    if law.quantity == "velocity":
+        return "none for a circuit: no stage follows a velocity; a [[damper]] is linear"
+    if {abs(factor) for factor in law.row} - {0.0, 1.0}:
+        return "none for a circuit: no stage follows masses by unequal factors"
+    changes = [change for bends in law.bends.values() for _, change in bends]
+    if any(change < 0.0 for change in changes) or law.slope < 0.0 or law.offset:
+        return (
+            "none for a circuit: no stage makes a slope that falls away from rest, or a force "
+            "at rest; steps that stiffen are [[clearance]]s at rising gaps"
+        )
+    words = {1: "upper", -1: "lower"}
+    steps = [
+        f"{words[side]} = {place:.6g} with stiffness = {change:.6g}"
+        for side, bends in law.bends.items()
+        for place, change in bends
+    ]
+    spring = f"a [[spring]] with stiffness = {law.slope:.6g} and " if law.slope else ""
+    return (
+        f"for a circuit {spring}a [[clearance]] for each step, at the same place: "
+        f"{', '.join(steps)}; n-p-q then counts the entry into each"
+    )
 
 
 def stage_refusal(clearances: Sequence[Clearance], kind: DeadZone) -> Refusal:

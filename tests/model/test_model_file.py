@@ -19,6 +19,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import FileTable, keys_of
 from designer.dynamics.counts import Counts
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
+from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
@@ -634,7 +635,7 @@ def test_the_docs_name_every_key_of_an_element() -> None:
             found.setdefault(table, {}).update(dict.fromkeys(keys, match[3]))
     kinds: dict[str, type[FileTable]] = {
         "mass": Mass, "spring": Spring, "damper": Damper, "clearance": Gap, "force": Force,
-        "base": BaseTable,
+        "base": BaseTable, "law": Law, "cubic_spring": CubicSpring, "friction": Friction,
     }  # fmt: skip
     assert found.keys() == kinds.keys()
     for table, kind in kinds.items():

@@ -132,9 +132,9 @@ def _element(table: str) -> type[FileTable]:
 @pytest.mark.parametrize(
     ("table", "feature"),
     [
-        ('[[friction]]\nbetween = ["hammer", "ground"]\nforce = 1', "friction"),
-        ('[[law]]\nname = "x"', "a spring that is not linear"),
-        ('[[cubic_spring]]\nbetween = ["hammer", "ground"]\nk3 = 1', "a spring that is not linear"),
+        ('[[coulomb]]\nbetween = ["hammer", "ground"]\nforce = 1', "friction"),
+        ('[[nonlinear_spring]]\nname = "x"', "a spring that is not linear"),
+        ("[[duffing]]\nk3 = 1", "a spring that is not linear"),
         ("[matrices]\nmass = [[1.0]]", "matrices"),
         ("[gravity]\ng = 9.81", "a weight"),
         ("[initial]\nx = 1", "initial conditions"),

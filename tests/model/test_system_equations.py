@@ -10,9 +10,9 @@ import pytest
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import parse_model_file
 from designer.model.system_equations import (
+    approximation_notes,
     element_rows,
     equations_of,
-    hertz_notes,
     number_of,
 )
 from tests.model.test_lumped_system import HAMMER
@@ -104,6 +104,6 @@ def test_elements_have_units_and_hertz_its_error() -> None:
     assert (rows["m₁"], rows["k₁"], rows["A.upper"]) == ("2 kg", "60 kN/m", "0.5 mm")
     assert {symbol: value for symbol, value, _ in element_rows(model, si=False)}["k₁"] == "60000"
     assert model.gaps[0].hertz is not None
-    (note,) = hertz_notes(model, si=True)
+    (note,) = approximation_notes(model, si=True)
     assert f"at most {100.0 * model.gaps[0].hertz.largest_error:.2g} %" in note
     assert "^1.5" in equations_of(model)[2]

@@ -28,8 +28,22 @@ SAME_MASS = system_text(
     clearance("stiffening_by_steps", "a", "ground", upper=0.75, lower=0.7, stiffness=14.0),
     table("force", on="a", amplitude=8.5),
 )
-IN_THE_TABLE_ALONE = (".constant", ".depth", ".damping", ".restitution", ".preload_over")
-SYSTEMS = {**FILES, "branch": BRANCH, "same mass": SAME_MASS}
+LAWS = system_text(
+    {"a": 1.5, "b": 2.5},
+    {("a", "b"): 4.5, ("b", "ground"): 5.5},
+    {("a", "b"): 0.75},
+    table("cubic_spring", between=("b", "ground"), k1=-1.25, k3=7.5, range=2.0),
+    table("friction", between=("a", "ground"), force=0.375, velocity=0.1),
+    table("law", name="soft", between=("a", "b"), points=[[-1, -2], [1, 2], [2, 3]]),
+    table("law", name="mesh", points=[[-1, -2], [1, 2]]) + "of = { a = 1.0, b = -0.5 }\n",
+    table("law", name="oil", between=("a", "b"), quantity="velocity", points=[[-1, -2], [1, 2]]),
+    table("force", on="a", amplitude=8.5),
+)
+IN_THE_TABLE_ALONE = (
+    *(".constant", ".depth", ".damping", ".restitution", ".preload_over", ".range", ".velocity"),
+    *"₁₂₃₄",
+)
+SYSTEMS = {**FILES, "branch": BRANCH, "same mass": SAME_MASS, "laws": LAWS}
 
 
 def texts(figure: Figure) -> list[str]:

@@ -1,0 +1,34 @@
+"""What keys accept that several elements have: a name, two bodies, a value of either sign."""
+
+from __future__ import annotations
+
+import math
+
+from designer.base.schema import Accepts, number, several, text
+
+GROUND = "ground"
+"""What a spring, a damper or a clearance may stand on beside the masses."""
+NAME = text(
+    r"[A-Za-z][A-Za-z0-9_]{0,31}",
+    "a name: a letter, then letters, digits and _, at most 32 characters",
+)
+"""The name of an element."""
+
+
+def two_bodies() -> Accepts:
+    """Two bodies, of which one may be ground."""
+    expected = 'two different names, of masses or "ground", such as ["hammer", "ground"]'
+    each = several(expected, Accepts(expected, NAME.check, json=NAME.json), least=2)
+
+    def check(value: object) -> tuple[str, str]:
+        names = each.check(value)
+        if len(names) != 2:
+            raise ValueError
+        return names[0], names[1]
+
+    return Accepts(expected, check, json={**each.json, "maxItems": 2})
+
+
+def signed(unit: str, expected: str) -> Accepts:
+    """A finite number of either sign, or text with its unit."""
+    return number(unit, f"{expected} in {unit}, or text with its unit", math.isfinite)
