@@ -15,7 +15,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
-from designer.dynamics.mode_tables import augmented, augmented_row, step_length
+from designer.dynamics.mode_tables import augmented, augmented_row, augmented_state, step_length
 from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
 from designer.kernels.kernel_algebra import motion_terms
 
@@ -65,21 +65,25 @@ def height_along(
             return None
         state, along = run.strobes[-1], along if run.tangent is None else run.tangent
     angle = 2.0 * np.pi * k / nodes
-    drive = flow.drive
+    drive, orders = flow.drive, flow.system.orders or ()
     u = drive.amplitude * float(np.sin(angle)) + drive.offset
     mode = _mode(flow.system, state, u, touch)
-    row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive)
-    z = np.zeros((len(x) + 3, 1 + along.shape[1]))
-    z[:, 0] = np.concatenate([state, [np.sin(angle), np.cos(angle), 1.0]])
+    row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive, orders)
+    whole = augmented_state(state, angle, orders)
+    z = np.zeros((len(whole), 1 + along.shape[1]))
+    z[:, 0] = whole
     z[: len(x), 1:] = along
-    return _derivatives(row, augmented(mode, drive), z, (place - k) * period / nodes, period)
+    return _derivatives(
+        row, augmented(mode, drive, orders), z, (place - k) * period / nodes, period
+    )
 
 
 def _nodes(flow: Flow, touch: StopTouch) -> int:
     """Nodes in a drive period: a step of the general kernel apart, in contact too."""
     rest = flow.system.mode(flow.system.start)
     contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == touch.clearance]
-    step = min(step_length(mode.A, flow.drive.omega) for mode in (rest, *contacts))
+    fastest = flow.drive.omega * max(flow.system.orders or (), default=1)
+    step = min(step_length(mode.A, fastest) for mode in (rest, *contacts))
     return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
 
 

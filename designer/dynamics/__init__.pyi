@@ -46,6 +46,7 @@ from .modal_tables import (
 from .mode_tables import (
     augmented as augmented,
     augmented_row as augmented_row,
+    augmented_state as augmented_state,
     step_length as step_length,
 )
 from .orbit import (

@@ -5,7 +5,7 @@ step is a matrix exponential; boundaries are found to rounding error and grazing
 absent or found (see ``kernels.kernel_general``). Four states with one stop pair take the modal
 fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
 every other system of few states, and a circuit that keeps to its working modes, takes that of
-``kernels.kernel_propagators``.
+``kernels.kernel_propagators``. A drive with harmonics is the general kernel's alone.
 """
 
 from __future__ import annotations
@@ -56,12 +56,14 @@ class Flow:
     def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
         self.system = system
         self.drive = drive
+        fast = fast and not system.orders
         self._modal = modal_tables.tables(system, drive) if fast and not system.working else None
         tabulated = fast and self._modal is None and system.size <= MOST_STATES
         self._tabulated = TabulatedModes(system, drive) if tabulated else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         alone = zip(system.displacement, system.state_in, strict=True)
+        self._orders = system.orders or ()
         self._watched = [row for row, state in alone if state is None]
         self._tables = self._room(4, 2)
         self._budget: Budget | None = None
@@ -81,7 +83,8 @@ class Flow:
         """Steps that the general kernel takes for one drive period in the mode of rest; more where
         a contact is stiffer."""
         A = self.system.mode(self.system.start).A
-        return self.drive.period / mode_tables.step_length(A, self.drive.omega)
+        fastest = self.drive.omega * max(self._orders, default=1)
+        return self.drive.period / mode_tables.step_length(A, fastest)
 
     @property
     def met(self) -> list[ModeKey]:
@@ -182,7 +185,7 @@ class Flow:
     ) -> FlowResult:
         """The same by the general kernel, which builds modes as it meets them. phase : of the drive
         at the start."""
-        z, before = np.concatenate([x, [np.sin(phase), np.cos(phase), 1.0]]), phi.copy()
+        z, before = mode_tables.augmented_state(x, phase, self._orders), phi.copy()
         clock, budget = np.array([phase / self.drive.omega, 0.0, 0.0]), self._budget or Budget()
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
         log = self._log(x, stretches, room)
@@ -198,7 +201,7 @@ class Flow:
                 clock,
                 cursor,
                 self.drive.period / points,
-                working_modes.anchors(points),
+                working_modes.anchors(points, self._orders),
                 phi,
                 depth,
                 max_events,
@@ -410,7 +413,9 @@ class Flow:
         touched = [
             self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
         ]
-        mode_tables.fill(self._tables, number, mode, touched, self._watched, self.drive)
+        mode_tables.fill(
+            self._tables, number, mode, touched, self._watched, self.drive, self._orders
+        )
         self._index[key] = number
         self._keys.append(key)
         for g, guard in enumerate(mode.guards):
@@ -425,7 +430,8 @@ class Flow:
     def _room(self, modes: int, guards: int) -> ModeTables:
         """Empty tables for so many modes with so many guards each."""
         clearances, watched = len(self.system.clearances), len(self._watched)
-        return mode_tables.empty_tables(modes, guards, self.system.size + 3, clearances, watched)
+        width = self.system.size + 3 + 2 * len(self._orders)
+        return mode_tables.empty_tables(modes, guards, width, clearances, watched)
 
     def _link(self, number: int, guard: int) -> None:
         """Give a guard its target, building the mode if it is new."""

@@ -1,6 +1,6 @@
 """Set-up of the modal fast path: which systems it fits, and their tables.
 
-Fits four states and at most one clearance whose guards all watch one displacement; everything
+Fits four states, a sine and one clearance whose guards all watch one displacement; everything
 else, and any mode whose quadratics are nearly equal or whose modal matrix is ill-conditioned, goes
 to the general kernel.
 """
@@ -28,7 +28,7 @@ TURNS = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0.0, np.pi, 8, end
 
 def tables(system: PiecewiseLinearSystem, drive: Drive) -> ModalTables | None:
     """The tables of a system under a drive, or None where the fast path does not fit."""
-    if system.size != 4 or len(system.clearances) != 1:
+    if system.size != 4 or len(system.clearances) != 1 or system.orders is not None:
         return None
     modes = _modes(system)
     if modes is None:

@@ -20,26 +20,39 @@ CHORD = ORDERS * (ORDERS - 1.0) / 8.0
 """Entrywise |C M² exp(M t)| h²/8 over the step is k (k - 1) |c_k| / 8, plus the cut-off tail."""
 
 
-def augmented(mode: Mode, drive: Drive) -> Array:
-    """(n + 3, n + 3) M with z' = M z for z = (x, sin, cos, 1)."""
-    n = len(mode.d)
-    M = np.zeros((n + 3, n + 3))
+def augmented(mode: Mode, drive: Drive, orders: Sequence[int] = ()) -> Array:
+    """(N, N) M with z' = M z for z = (x, sin, cos, 1), and the sine and cosine of each harmonic."""
+    n, more = len(mode.d), 2 * len(orders)
+    M = np.zeros((n + 3 + more, n + 3 + more))
     M[:n, :n] = mode.A
     M[:n, n] = drive.amplitude * mode.B
     M[:n, n + 2] = mode.d + drive.offset * mode.B
     M[n, n + 1] = drive.omega
     M[n + 1, n] = -drive.omega
+    if mode.waves is not None:
+        M[:n, n + 1] = drive.amplitude * mode.waves[:, 0]
+        M[:n, n + 3 :] = drive.amplitude * mode.waves[:, 1:]
+    for i, order in enumerate(orders):
+        sine = n + 3 + 2 * i
+        M[sine, sine + 1], M[sine + 1, sine] = order * drive.omega, -order * drive.omega
     return M
 
 
-def augmented_row(row: Array, drive: Drive) -> Array:
-    """A row over (x, u, 1) as one over (x, sin, cos, 1)."""
+def augmented_state(x: Array, angle: float, orders: Sequence[int] = ()) -> Array:
+    """(N,) z of the state x (n,) at the drive's phase ``angle``."""
+    waves = [f(order * angle) for order in orders for f in (np.sin, np.cos)]
+    return np.concatenate([x, [np.sin(angle), np.cos(angle), 1.0], waves])
+
+
+def augmented_row(row: Array, drive: Drive, orders: Sequence[int] = ()) -> Array:
+    """A row over (x, u, 1) as one over z."""
     C, D, e = row[:-2], row[-2], row[-1]
-    return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
+    ends = [D * drive.amplitude, 0.0, e + D * drive.offset]
+    return np.concatenate([C, ends, np.zeros(2 * len(orders))])
 
 
 def step_length(A: Array, omega: float) -> float:
-    """Length of a step in a mode with the state matrix A."""
+    """Length of a step in a mode with the state matrix A. omega : of the drive's fastest wave."""
     return STEP / max(_balanced_norm(A.tobytes(), len(A)), omega)
 
 
@@ -58,14 +71,15 @@ def fill(
     touched: Sequence[Array | None],
     watched: Sequence[Array],
     drive: Drive,
+    orders: Sequence[int] = (),
 ) -> None:
     """Write the tables of mode number i.
 
     touched : for each clearance the row of the displacement past the stop in contact.
     watched : rows of displacements that are no state.
     """
-    M = augmented(mode, drive)
-    h = step_length(mode.A, drive.omega)
+    M = augmented(mode, drive, orders)
+    h = step_length(mode.A, drive.omega * max(orders, default=1))
     powers = tables.taylor[i]
     exponential_terms(M, h, powers)
     tables.step[i] = h
@@ -75,14 +89,15 @@ def fill(
     tables.clipped[i] = mode.clipped
     for j, past in enumerate(touched):
         if past is not None:
-            rows_of_terms(augmented_row(past, drive), powers, tables.depth[i, j])
+            rows_of_terms(augmented_row(past, drive, orders), powers, tables.depth[i, j])
     for r, row in enumerate(watched):
-        rows_of_terms(augmented_row(row, drive), powers, tables.watched[i, r])
+        rows_of_terms(augmented_row(row, drive, orders), powers, tables.watched[i, r])
     count, taylors = len(mode.guards), tables.guard[i]
     if count:
         C, D, e = mode.guard_rows
+        none = np.zeros((count, 2 * len(orders)))
         ahead = np.column_stack(
-            [C, D * drive.amplitude, np.zeros(count), e + D * drive.offset]
+            [C, D * drive.amplitude, np.zeros(count), e + D * drive.offset, none]
         )  # as of ``augmented_row``
         for g in range(count):
             rows_of_terms(ahead[g], powers, taylors[g])

@@ -4,11 +4,12 @@ In each mode the state x (n entries) follows
 
     x' = A x + B u(t) + d,      u(t) = amplitude · sin(ω t + phase) + offset
 
-until a guard becomes positive. A guard is a linear function C x + D u + e of state and drive,
-negative inside its mode, and names the mode on its other side. A mode's key is a tuple of small
-integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an op-amp: -1 at its
-lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else 0). Modes are built
-when first entered and kept, never enumerated.
+until a guard becomes positive. The drive's cosine and harmonics of it may act too, times the same
+amplitude: forces of other phases and of other shapes. A guard is a linear function C x + D u + e of
+state and drive, negative inside its mode, and names the mode on its other side. A mode's key is a
+tuple of small integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an
+op-amp: -1 at its lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else
+0). Modes are built when first entered and kept, never enumerated.
 
 The state is continuous across every boundary. So is the vector field of springs and limiters: a
 crossing then changes the mode and nothing else. Dampers that act in contact only make the vector
@@ -68,6 +69,9 @@ class Mode:
     """For each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper."""
     clipped: bool = False
     """Whether an element that ought to be linear is at its limit."""
+    waves: Array | None = None
+    """(n, 1 + 2 h) input vectors of ``PiecewiseLinearSystem.waves``, without the amplitude; None
+    where the drive is a sine."""
 
     @cached_property
     def guard_rows(self) -> tuple[Array, Array, Array]:
@@ -129,6 +133,8 @@ class PiecewiseLinearSystem:
     working: tuple[ModeKey, ...] = ()
     """Keys of the modes that a board as it should be moves between, ``start`` first; the fast path
     of circuits tabulates them."""
+    orders: tuple[int, ...] | None = None
+    """The h harmonics that act beside the drive's sine and cosine; None where it is a sine."""
     _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
 
     @property
@@ -149,6 +155,14 @@ class PiecewiseLinearSystem:
     def moving(self) -> int:
         """Index of the state that moves most in the first clearance; 0 where there is none."""
         return int(np.argmax(np.abs(self.displacement[0][:-2]))) if self.displacement else 0
+
+    def waves(self, angle: Array) -> Array:
+        """(k, 1 + 2 h) at angles ωt (k,) the cosine, then the sine and cosine of each of
+        ``orders``."""
+        columns = [np.cos(angle)]
+        for order in self.orders or ():
+            columns += [np.sin(order * angle), np.cos(order * angle)]
+        return np.stack(columns, axis=-1)
 
     def mode(self, key: ModeKey) -> Mode:
         """The mode of this key, built on its first use."""

@@ -9,7 +9,7 @@ interval errs by the square of its penetration, so the sign of the height and it
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,7 @@ def turning_points_of(
 ) -> list[TurningPoint]:
     """Every turning point of each displacement, seen from each of its stops; see ``heights``."""
     system, drive = flow.system, flow.drive
-    rate = max(_rate(flow, orbit), drive.omega)
+    rate = max(_rate(flow, orbit), drive.omega * max(system.orders or (), default=1))
     points = int(np.clip(np.ceil(drive.period * rate / RESOLUTION), FEWEST, MOST))
     x = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=points).strobes
     angle = 2.0 * np.pi * np.arange(len(x)) / points
@@ -68,7 +68,7 @@ def turning_points_of(
         return []
     rows = [row for _, _, row in stops]
     past = np.stack([x @ row[:-2] + row[-2] * u + row[-1] for row in rows])
-    first, second = _derivatives(flow, x, u, du)
+    first, second = _derivatives(flow, x, angle)
     step = drive.period / points
     turning: list[TurningPoint] = []
     for (clearance, side, row), h in zip(stops, past, strict=True):
@@ -88,8 +88,13 @@ def _rate(flow: Flow, orbit: Orbit) -> float:
     return max(float(np.abs(np.linalg.eigvals(A)).max()) for A in matrices)
 
 
-def _derivatives(flow: Flow, x: Array, u: Array, du: Array) -> tuple[Array, Array]:
-    """(nodes, states) x' and x'', each node in the mode that holds there."""
+def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
+    """(nodes, states) x' and x'', each node in the mode that holds there at its drive phase."""
+    drive, orders = flow.drive, flow.system.orders
+    u = drive.amplitude * np.sin(angle) + drive.offset
+    du = drive.amplitude * drive.omega * np.cos(angle)
+    waves = drive.amplitude * flow.system.waves(angle)
+    turns = _turned(waves, u - drive.offset, drive.omega, orders or ())
     first, second = np.empty_like(x), np.empty_like(x)
     left, near = np.arange(len(x)), None
     while len(left):
@@ -101,8 +106,21 @@ def _derivatives(flow: Flow, x: Array, u: Array, du: Array) -> tuple[Array, Arra
         holds[0] = True  # by rounding a guard may be above zero where its mode was found
         nodes, left = left[holds], left[~holds]
         first[nodes] = x[nodes] @ mode.A.T + u[nodes, None] * mode.B + mode.d
-        second[nodes] = first[nodes] @ mode.A.T + du[nodes, None] * mode.B
+        second[nodes] = du[nodes, None] * mode.B
+        if mode.waves is not None:
+            first[nodes] += waves[nodes] @ mode.waves.T
+            second[nodes] += turns[nodes] @ mode.waves.T
+        second[nodes] += first[nodes] @ mode.A.T
     return first, second
+
+
+def _turned(waves: Array, sine: Array, omega: float, orders: Sequence[int]) -> Array:
+    """Rates of ``PiecewiseLinearSystem.waves`` (k, 1 + 2 h). sine : (k,) the drive's, of which the
+    first wave is the cosine."""
+    rates = [-omega * sine]
+    for i, order in enumerate(orders):
+        rates += [order * omega * waves[:, 2 + 2 * i], -order * omega * waves[:, 1 + 2 * i]]
+    return np.stack(rates, axis=-1)
 
 
 def _turning(h: Array, dh: Array, ddh: Array, step: float) -> list[tuple[float, float, bool]]:

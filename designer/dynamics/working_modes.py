@@ -18,10 +18,11 @@ processor."""
 
 
 @lru_cache(maxsize=32)
-def anchors(points: int) -> Array:
-    """(points, 2) sine and cosine of the drive at the start of each stretch of a period; kept."""
+def anchors(points: int, orders: tuple[int, ...] = ()) -> Array:
+    """(points, 2 + 2 h) sine and cosine of the drive, then of each harmonic, at the start of each
+    stretch of a period; kept."""
     phases = 2.0 * np.pi * np.arange(points) / points
-    return np.stack([np.sin(phases), np.cos(phases)], axis=1)
+    return np.stack([f(n * phases) for n in (1, *orders) for f in (np.sin, np.cos)], axis=1)
 
 
 ANCHORS = Anchors(anchors(1), anchors(32), anchors(POINTS))
@@ -38,6 +39,7 @@ def empty_modes(
     return kernel.Modes(
         A=np.zeros((boards, modes, n, n)),
         B=np.zeros((boards, modes, n)),
+        quadrature=np.zeros((boards, modes, n)),
         d=np.zeros((boards, modes, n)),
         guard=np.zeros((boards, modes, guards, n + 2)),
         past=np.zeros((boards, modes, clearances, n + 2)),
@@ -204,6 +206,8 @@ class TabulatedModes:
     def _write(self, number: int, mode: Mode) -> None:
         out = self._modes
         out.A[0, number], out.B[0, number], out.d[0, number] = mode.A, mode.B, mode.d
+        if mode.waves is not None:
+            out.quadrature[0, number] = mode.waves[:, 0]
         out.good[0, number], out.side[number] = 1, mode.sides
         for c, side in enumerate(mode.sides):
             if side:

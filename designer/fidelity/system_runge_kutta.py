@@ -18,12 +18,17 @@ Float = NDArray[np.float64]
 
 
 class SystemRates(NamedTuple):
-    """The numbers of y' = A y + B sin ωt + d - Σ springs, y = x1, x1', x2, …, for s springs."""
+    """The numbers of y' = A y + Σ B sin nωt + C cos nωt + d - Σ springs, y = x1, x1', x2, x2', …,
+    for s springs and w multiples n of the drive's frequency."""
 
     A: Float
     """(2n, 2n) of the open system."""
     B: Float
-    """(2n,) of the drive."""
+    """(w, 2n) of the sines, the drive's own first."""
+    C: Float
+    """(w, 2n) of the cosines."""
+    order: NDArray[np.int64]
+    """(w,) the multiples."""
     d: Float
     """(2n,) of the constant forces."""
     row: Float
@@ -39,8 +44,13 @@ class SystemRates(NamedTuple):
 def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     """The numbers of a system at a drive frequency."""
     size = 2 * system.size
-    B, d = np.zeros(size), np.zeros(size)
-    B[1::2], d[1::2] = system.drive_force(omega) / system.mass, system.constant / system.mass
+    orders = [1, *(harmonic.order for harmonic in system.harmonics)]
+    B, C, d = np.zeros((len(orders), size)), np.zeros((len(orders), size)), np.zeros(size)
+    B[:, 1::2] = [system.drive_force(omega), *(each.sine for each in system.harmonics)]
+    C[:, 1::2] = [system.quadrature, *(each.cosine for each in system.harmonics)]
+    d[1::2] = system.constant
+    for part in (B, C, d):
+        part[..., 1::2] /= system.mass
     rows, places, pushes, drags = [], [], [], []
     for stop in system.clearances:
         along = system.displacement(stop)
@@ -71,6 +81,8 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     return SystemRates(
         system.state_matrix(),
         B,
+        C,
+        np.array(orders, dtype=np.int64),
         d,
         np.array(rows).reshape(count, size + 1),
         np.array(places, dtype=float),
@@ -80,11 +92,17 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
 
 
 @callee
-def _slope(y: Float, wave: float, rates: SystemRates, out: Float) -> None:
-    """out ← y'."""
-    size = y.shape[0]
+def _slope(y: Float, angle: float, rates: SystemRates, out: Float) -> None:
+    """out ← y' at the drive's phase ``angle``."""
+    size, wave = y.shape[0], np.sin(angle)
+    shaped = rates.order.shape[0] > 1 or rates.C.any()
     for i in range(size):
-        total = rates.B[i] * wave + rates.d[i]
+        total = rates.B[0, i] * wave + rates.d[i]
+        if shaped:
+            for k in range(rates.order.shape[0]):
+                turn = rates.order[k] * angle
+                total += rates.C[k, i] * np.cos(turn)
+                total += rates.B[k, i] * np.sin(turn) if k else 0.0
         for j in range(size):
             total += rates.A[i, j] * y[j]
         out[i] = total
@@ -108,10 +126,10 @@ def carry(y: Float, rates: SystemRates, omega: float, steps: int, first: int, co
     k, total, at = np.empty(size), np.empty(size), np.empty(size)
     for i in range(first, first + count):
         phase = (i % steps) * h  # from the period's begin: it does not drift
-        _slope(y, np.sin(omega * phase), rates, k)
+        _slope(y, omega * phase, rates, k)
         for j in range(size):
             total[j], at[j] = k[j], y[j] + 0.5 * h * k[j]
-        half = np.sin(omega * (phase + 0.5 * h))
+        half = omega * (phase + 0.5 * h)
         _slope(at, half, rates, k)
         for j in range(size):
             total[j] += 2.0 * k[j]
@@ -120,7 +138,7 @@ def carry(y: Float, rates: SystemRates, omega: float, steps: int, first: int, co
         for j in range(size):
             total[j] += 2.0 * k[j]
             at[j] = y[j] + h * k[j]
-        _slope(at, np.sin(omega * (phase + h)), rates, k)
+        _slope(at, omega * (phase + h), rates, k)
         for j in range(size):
             y[j] += h / 6.0 * (total[j] + k[j])
 

@@ -336,13 +336,13 @@ def advance(
     z : (N,) augmented state, overwritten. clock : (3,) time in the stretch, impacts met (logged
     as far as the log reaches), steps that are left: with none left it returns PAUSED.
     cursor : (4,) stretch index, mode index, events in this stretch and, on UNKNOWN_MODE, the guard
-    whose target is missing. anchor : (stretches a period, 2) the drive's exact sine and cosine at
-    the start of each stretch, so that its phase does not drift. phi : (n, k) tangent vectors,
-    (0, 0) for none. depth : (c,) deepest penetration of the running contact. jumps : whether the
-    vector field differs on the two sides of a boundary.
+    whose target is missing. anchor : (stretches a period, N - n - 1) the drive's exact sine and
+    cosine at the start of each stretch, so that its phase does not drift, then its harmonics'.
+    phi : (n, k) tangent vectors, (0, 0) for none. depth : (c,) deepest penetration of the running
+    contact. jumps : whether the vector field differs on the two sides of a boundary.
     """
     size = z.shape[0]
-    n = size - 3
+    n = log.strobes.shape[1]
     z1 = np.empty(size)
     work = np.empty((n, n))
     c = np.empty(tables.guard.shape[2])
@@ -438,6 +438,8 @@ def advance(
         here = cursor[0] % anchor.shape[0]
         z[n] = anchor[here, 0]
         z[n + 1] = anchor[here, 1]
+        for i in range(n + 3, size):
+            z[i] = anchor[here, i - n - 1]
         for i in range(n):
             log.strobes[cursor[0], i] = z[i]
     return DONE

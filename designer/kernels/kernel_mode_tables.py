@@ -54,6 +54,8 @@ class Modes(NamedTuple):
     """(N, K, n, n) state matrices."""
     B: Float
     """(N, K, n) input vectors."""
+    quadrature: Float
+    """(N, K, n) input vectors of the drive's cosine."""
     d: Float
     """(N, K, n) constant terms."""
     guard: Float
@@ -324,7 +326,8 @@ def _generator(driven: DrivenModes, m: int, M: Float) -> None:
     for i in range(n):
         for j in range(n):
             M[i, j] = modes.A[board, m, i, j]
-        M[i, n], M[i, n + 1] = amplitude * modes.B[board, m, i], 0.0
+        M[i, n] = amplitude * modes.B[board, m, i]
+        M[i, n + 1] = amplitude * modes.quadrature[board, m, i]
         M[i, n + 2] = modes.d[board, m, i] + offset * modes.B[board, m, i]
 
 

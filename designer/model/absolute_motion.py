@@ -34,18 +34,18 @@ def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
         return orbit.extremes
     rest = Drive(flow.drive.omega, 0.0, flow.drive.offset)
     moved = Flow(_in_absolute_terms(flow, ground), rest, fast=False)
-    start = np.concatenate([orbit.start, [0.0, 1.0]])
+    start = np.concatenate([orbit.start, np.tile([0.0, 1.0], 1 + len(flow.system.orders or ()))])
     with moved.within(Budget(step_budget.SETTLING)):
         run = moved.run(start, orbit.n or OPEN_PERIODS, mode=orbit.mode or None, measure=True)
     if run.status is not FlowStatus.DONE:
         return np.zeros((0, 2))
-    return np.asarray(run.extremes[:-2])
+    return np.asarray(run.extremes[: flow.system.size])
 
 
 def _in_absolute_terms(flow: Flow, ground: Array) -> PiecewiseLinearSystem:
-    """The system of the states (z + ground sin ωt, sin ωt, cos ωt); it counts no impacts."""
+    """The system of the states (z + ground sin ωt, sin ωt, cos ωt, …); it counts no impacts."""
     driven, n = with_drive_states(flow.system, flow.drive), flow.system.size
-    forth, back = np.eye(n + 2), np.eye(n + 2)
+    forth, back = np.eye(driven.size), np.eye(driven.size)
     forth[:n, n], back[:n, n] = ground, -ground
 
     def build(key: ModeKey) -> Mode:

@@ -190,6 +190,8 @@ def scale_of(model: MechanicalModel, omega: float) -> Array:
     # Without a stop the clearance b of a dimensionless model is a length still; else b is a factor.
     length = model.b if isinstance(model, Dimensionless) else 0.0
     x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=length)
+    for wave in (system.quadrature, *(w for h in system.harmonics for w in (h.sine, h.cosine))):
+        x = x + np.abs(flexibility @ wave)
     x = x + np.abs(flexibility @ system.constant) + _law_reach(system, "displacement")
     v = x * max(omega, system.own_frequency) + _law_reach(system, "velocity")
     return np.stack([x, v], axis=1).ravel()

@@ -5,7 +5,8 @@ All numbers are in the file's own consistent units; texts with units become SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -25,6 +26,7 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.mechanics import Side
+from designer.model.waveforms import Waveform, series
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,56 @@ class Gap(FileTable):
         return side(self.upper, self.upper_stiffness), side(self.lower, self.lower_stiffness)
 
 
+Harmonics = tuple[tuple[int, float, float], ...]
+"""(n, amplitude, phase [rad]) of each."""
+MOST_HARMONICS = 32
+"""Of one force."""
+HIGHEST = 64
+"""Harmonic."""
+
+
+def _angle() -> Accepts:
+    expected = 'an angle in rad, or text such as "90 deg" or "1.57 rad"'
+
+    def check(value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError
+        if isinstance(value, str) and value.rstrip().endswith(("deg", "°")):
+            return math.radians(
+                parse_quantity(value.rstrip().removesuffix("°").removesuffix("deg"), "")
+            )
+        return parse_quantity(value, "rad")
+
+    return Accepts(expected, check, json={"type": ["number", "string"]})
+
+
+def _harmonics() -> Accepts:
+    expected = (
+        f"a list of [n, amplitude, phase], n different whole numbers from 2 to {HIGHEST}, at most "
+        f'{MOST_HARMONICS} of them, such as [[2, 1.5, 0.0], [3, "2 N", "90 deg"]]'
+    )
+    angle, force = _angle(), signed("N", "a force")
+
+    def check(value: object) -> Harmonics:
+        if not isinstance(value, list) or not 1 <= len(value) <= MOST_HARMONICS:
+            raise ValueError
+        if not all(isinstance(each, list) and len(each) == 3 for each in value):
+            raise ValueError
+        orders = [n for n, _, _ in value]
+        if not all(type(n) is int and 2 <= n <= HIGHEST for n in orders):
+            raise ValueError
+        if len(set(orders)) < len(orders):
+            raise ValueError("one n twice")
+        return tuple((n, force.check(size), angle.check(phase)) for n, size, phase in value)
+
+    each = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 3, "maxItems": 3}
+    json = {"type": "array", "items": each, "minItems": 1, "maxItems": MOST_HARMONICS}
+    return Accepts(expected, check, json=json)
+
+
 @dataclass(frozen=True)
 class Force(FileTable):
-    """A force on a mass: amplitude · sin ωt + constant."""
+    """A force on a mass: amplitude · sin(ωt + phase) + constant, and harmonics of it."""
 
     on: Annotated[str, NAME]
     """The mass."""
@@ -130,6 +179,30 @@ class Force(FileTable):
     """Amplitude; negative: in antiphase."""
     constant: Annotated[float, signed("N", "a force")] = 0.0
     """Constant part, such as a weight or a preload."""
+    phase: Annotated[float | None, _angle()] = None
+    """Of the force, before the drive's sine; None: in phase."""
+    waveform: Annotated[Waveform | None, choice("square", "triangle", "sawtooth")] = None
+    """Shape with the peak ``amplitude``, in the place of the sine."""
+    terms: Annotated[
+        int | None,
+        whole_number(f"a whole number from 1 to {MOST_HARMONICS}", 1, MOST_HARMONICS),
+    ] = None
+    """How many harmonics that the waveform has are kept, the first among them."""
+    harmonics: Annotated[Harmonics, _harmonics()] = ()
+    """Forces amplitude · sin(nωt + phase) beside it."""
+
+    @property
+    def waves(self) -> Iterator[tuple[int, float, float]]:
+        """(n, amplitude, phase) of all that it is the sum of: amplitude · sin(nωt + phase)."""
+        phase = self.phase or 0.0
+        shape = [(1, 1.0)] if self.waveform is None else series(self.waveform, self.terms or 1)
+        yield from ((n, self.amplitude * size, n * phase) for n, size in shape)
+        yield from self.harmonics
+
+    @property
+    def drives(self) -> bool:
+        """Whether it changes with time."""
+        return any(size for _, size, _ in self.waves)
 
 
 BaseStops = Literal["base", "fixed"]

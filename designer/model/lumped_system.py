@@ -32,7 +32,7 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.lumped_elements import Elements, Gap, joined_by
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.mechanics import Clearance, HarmonicForce, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")
@@ -69,6 +69,10 @@ def check(system: Elements) -> None:
         _check_cubic(cubic)
     for friction in system.frictions:
         _check_friction(friction)
+    for force in system.forces:
+        if (force.waveform is None) != (force.terms is None):
+            key = "waveform" if force.waveform is None else "terms"
+            _refuse(f"force on {force.on}.{key}", MISSING, "both waveform and terms, or neither")
     _check_grounded(system)
     _check_driven(system)
 
@@ -209,7 +213,7 @@ def _check_grounded(system: Elements) -> None:
 
 def _check_driven(system: Elements) -> None:
     """A drive that reaches every clearance."""
-    driven = {force.on for force in system.forces if force.amplitude}
+    driven = {force.on for force in system.forces if force.drives}
     if system.base is not None:
         driven |= set(system.names)  # the ground's inertia force is on every mass
     if not driven:
@@ -301,7 +305,7 @@ LEAST: dict[str, dict[str, float]] = {
         "preload_over": SMALLEST,
         "restitution": SMALLEST,
     },
-    "forces": {"amplitude": -GREATEST, "constant": -GREATEST},
+    "forces": {"amplitude": -GREATEST, "constant": -GREATEST, "phase": -GREATEST},
     "base": {"amplitude": SMALLEST},
     "cubic_springs": {"k1": -GREATEST, "k3": -GREATEST, "range": SMALLEST},
     "frictions": {
@@ -337,6 +341,7 @@ UNITS = {
     "preload": "N",
     "preload_over": "m",
     "constant": "N",
+    "phase": "rad",
     "k1": "N/m",
     "range": "m",
     "force": "N",
@@ -351,7 +356,7 @@ NUMBERS = (1e-60, 1e60)
 """Least and greatest size of a number that is not 0: the squares of ratios of such are still
 numbers."""
 
-_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "k1", "force", "speed")
+_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "phase", "k1", "force", "speed")
 
 
 @dataclass(frozen=True)
@@ -390,10 +395,14 @@ class LumpedSystem(Elements):
     @cached_property
     def _second_order(self) -> SecondOrderSystem:
         n = len(self.masses)
-        force, constant = np.zeros(n), np.zeros(n)
+        constant, waves = np.zeros(n), dict[int, Array]()
         for each in self.forces:
-            force[self.names.index(each.on)] += each.amplitude
-            constant[self.names.index(each.on)] += self.b * each.constant
+            place = self.names.index(each.on)
+            constant[place] += self.b * each.constant
+            for order, size, phase in each.waves:
+                wave = waves.setdefault(order, np.zeros((2, n)))
+                wave[:, place] += size * np.array([math.cos(phase), math.sin(phase)])
+        force, quadrature = waves.pop(1, np.zeros((2, n)))
         damping, stiffness = self.damping_matrix, self.stiffness_matrix
         laws = self._force_laws()
         for law in laws:
@@ -411,6 +420,8 @@ class LumpedSystem(Elements):
             base_acceleration=0.0 if self.base is None else self.base.acceleration,
             fixed_stops=self.base is not None and self.base.stops == "fixed",
             names=self.names,
+            quadrature=quadrature,
+            harmonics=tuple(HarmonicForce(k, *waves[k]) for k in sorted(waves)),
             laws=laws,
         )
 
@@ -557,6 +568,10 @@ class LumpedSystem(Elements):
             for key in ("preload_over", "restitution"):
                 if gap[key] is None:
                     del gap[key]
+        for force in out["forces"]:
+            for key in ("phase", "waveform", "terms", "harmonics"):
+                if not force[key]:
+                    del force[key]
         if self.base is not None and self.base.unit == "m":
             del out["base"]["unit"]
         for later in ("laws", "cubic_springs", "frictions"):

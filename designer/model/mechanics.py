@@ -136,6 +136,18 @@ class Clearance:
 
 
 @dataclass(frozen=True)
+class HarmonicForce:
+    """Forces at a multiple of the drive's frequency: sine · sin nωt + cosine · cos nωt."""
+
+    order: int
+    """n, from 2 on."""
+    sine: Array
+    """(masses,) amplitudes."""
+    cosine: Array
+    """(masses,) amplitudes."""
+
+
+@dataclass(frozen=True)
 class SecondOrderSystem:
     """Masses, dampers and springs with stops, driven by forces and by the ground."""
 
@@ -159,12 +171,18 @@ class SecondOrderSystem:
     """Whether the stops between a mass and ground stay where they are while the ground moves."""
     names: tuple[str, ...] = ()
     """Names of the masses; () where they have none."""
+    quadrature: Array = field(default_factory=lambda: np.zeros(0))
+    """(n,) amplitude of cos ωt in the force on each mass; zero where it is not given."""
+    harmonics: tuple[HarmonicForce, ...] = ()
+    """Forces at multiples of the drive's frequency, one for each."""
     laws: tuple[ForceLaw, ...] = ()
     """Further forces. What they are at rest is in the matrices and in ``constant``."""
 
     def __post_init__(self) -> None:
         if not len(self.constant):
             object.__setattr__(self, "constant", np.zeros(self.size))
+        if not len(self.quadrature):
+            object.__setattr__(self, "quadrature", np.zeros(self.size))
 
     @property
     def size(self) -> int:
@@ -205,6 +223,20 @@ class SecondOrderSystem:
         """(n,) amplitude of the force on each mass at a drive frequency, the ground's included."""
         acceleration = self.base * omega * omega + self.base_acceleration
         return np.asarray(self.force + self.mass * acceleration)
+
+    @property
+    def driven_by_sine(self) -> bool:
+        """Whether all forces are in phase, or in antiphase, and of one frequency."""
+        return not self.quadrature.any() and not self.harmonics
+
+    def _waves(self) -> Array | None:
+        """(2n, 1 + 2 h) ``Mode.waves``."""
+        if self.driven_by_sine:
+            return None
+        columns = [self.quadrature]
+        for harmonic in self.harmonics:
+            columns += [harmonic.sine, harmonic.cosine]
+        return np.stack([_interleaved(each / self.mass, 1) for each in columns], axis=1)
 
     def displacement(self, clearance: Clearance) -> Array:
         """(n,) row over the masses' displacements that gives the one in a clearance."""
@@ -277,6 +309,7 @@ class SecondOrderSystem:
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
         B0[1::2] = self.drive_force(omega or 0.0) / self.mass
         d0[1::2] = self.constant / self.mass
+        waves, orders = self._waves(), tuple(harmonic.order for harmonic in self.harmonics)
 
         def build(key: ModeKey) -> Mode:
             A, B, d = A0.copy(), B0.copy(), d0.copy()
@@ -285,10 +318,11 @@ class SecondOrderSystem:
                 contact.push(level, A, B, d)
                 guards += contact.guards(j, key)
             sides = tuple(int(np.sign(level)) for level in key[:count])
-            return Mode(A, B, d, tuple(guards), sides=sides)
+            return Mode(A, B, d, tuple(guards), sides=sides, waves=waves)
 
         even = all(stop.upper == stop.lower for stop in self.clearances)
         even = even and all(law.even for law in self.laws)
+        even = even and all(order % 2 for order in orders)
         return PiecewiseLinearSystem(
             states=state_names(n),
             build=build,
@@ -298,6 +332,7 @@ class SecondOrderSystem:
             velocity=tuple(np.append(c.rate, c.on_drive) for c in stops),
             mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
             continuous=not any(stop.jumps for stop in self.clearances),
+            orders=None if waves is None else orders,
         )
 
 

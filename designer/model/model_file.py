@@ -35,7 +35,6 @@ from designer.base.json_schema import DIALECT, either, of_tables
 from designer.base.schema import FileTable, checked, line, such, whole_number
 from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
-from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
 from designer.catalog.parts_catalog import Catalog
 from designer.dynamics.counts import Counts
@@ -48,13 +47,13 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.response_table import Response, ResponseTable
-from designer.model.rules_table import overrides
 from designer.model.search_table import SearchSpec
 from designer.model.si_units import in_si
 from designer.model.spread_table import BENCH_1, SpreadSpec
 from designer.model.tuning_bands import Bands
 
 if TYPE_CHECKING:
+    from designer.catalog.design_rule import Override
     from designer.model.measured_values import MeasuredBoards
 
 MAX_BYTES = 1_000_000
@@ -197,7 +196,7 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         spread=tables.spread,
         tuning=tables.tuning,
         board=tables.board,
-        rules=overrides(tables.rules, file),
+        rules=_rules(tables.rules, file),
         search=tables.search,
     )
 
@@ -210,6 +209,15 @@ _RULES = such(
     lambda value: isinstance(value, dict),
     {"type": "object", "additionalProperties": {"type": "object"}},
 )
+
+
+def _rules(tables: Mapping[str, Any], file: str | None) -> dict[str, Override]:
+    """``rules_table.overrides``; of no tables nothing, and the rules are not imported for it."""
+    if not tables:
+        return {}
+    from designer.model.rules_table import overrides
+
+    return overrides(tables, file)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,9 +314,10 @@ class _SystemFile(_Tables):
         keys = (key for key in model_limits.ELEMENTS if key != "base")
         elements = [element for key in keys for element in data.get(key, ())]
         elements += [data["base"]] if "base" in data else []
-        words = ("name", "between", "on", "law", "stops", "quantity")
+        words = ("name", "between", "on", "law", "stops", "quantity", "waveform", "phase")
         values = [v for each in elements for key, v in each.items() if key not in words]
         values += [v for law in data.get("law", ()) for point in law["points"] for v in point]
+        values += [v for f in data.get("force", ()) for _, v, _ in f.get("harmonics", ())]
         return SiScales() if any(isinstance(value, str) for value in values) else None
 
 

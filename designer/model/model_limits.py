@@ -184,9 +184,10 @@ LIMITS = (
         keys=r"drag\w*|quadratic\w*|damping_?[2-9]",
     ),
     ModelLimit(
-        "a force or a base of another phase",
-        "`phase`",
-        "in phase, or in antiphase by a negative amplitude of a [[force]] of format 2",
+        "another phase, but as phase of a [[force]] of format 2",
+        "`[base] phase`, `phi`",
+        "phase of a [[force]] of format 2, which counts from the drive's sine, that of a [base]; "
+        "no circuit makes another than 0 or half a turn",
         keys=r"\w*phase\w*|phi\w?|angle|lag|lead",
     ),
     ModelLimit(
@@ -220,9 +221,9 @@ LIMITS = (
         tables=r"drives?|excitations?|inputs?|loads?",
     ),
     ModelLimit(
-        "a drive that is no sine",
-        "`waveform`, `harmonics`, `[[waveform]]`",
-        "its first harmonic, as an amplitude",
+        "a drive that is no sine, but as waveform or harmonics of a [[force]] of format 2",
+        "`[base] harmonics`, `square`, `[[waveform]]`",
+        "waveform with terms, or harmonics, of a [[force]] of format 2; no circuit makes them",
         tables=r"waveforms?|harmonics?|signals?|sweep|chirp|noise",
         keys=r"waveform\w*|harmonics?|shape|square|triangle|sawtooth|pulse\w*|terms|noise|"
         r"random\w*|signal|chirp|sweep",
@@ -250,7 +251,7 @@ LIMITS = (
         "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
         tables=r"\w+",
         keys=r"\w+",
-        of=tuple(name for name in (*MODELS, *ELEMENTS) if name != "law"),
+        of=tuple(name for name in (*MODELS, *ELEMENTS) if name not in ("law", "force")),
         value=_is_matrix,
     ),
     ModelLimit(

@@ -17,6 +17,7 @@ from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, checked, line, literal, number, one_of
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.design_rule import DesignRule, Override
+from designer.catalog.design_rules import BY_ID
 
 
 def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override]:
@@ -26,10 +27,6 @@ def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override
     ------
     InputError : an unknown id, no reason, or a limit that is no value in the rule's unit.
     """
-    if not tables:
-        return {}
-    from designer.catalog.design_rules import BY_ID
-
     for name, table in tables.items():
         if name not in BY_ID:
             raise InputError(file, f"rules.{name[:60]}", "an unknown rule", one_of(name, BY_ID))

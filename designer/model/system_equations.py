@@ -18,7 +18,7 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
-from designer.model.lumped_elements import Gap
+from designer.model.lumped_elements import Force, Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 
@@ -111,6 +111,16 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         if force.amplitude:
             text = f"amplitude of the force on {force.on}"
             yield subscripted(f"P{i}"), force.amplitude, "N", text
+        if force.phase:
+            yield subscripted(f"φ{i}"), force.phase, "rad", f"phase of the force on {force.on}"
+        if force.terms is not None:
+            text = f"harmonics kept of the {force.waveform} force on {force.on}"
+            yield f"{subscripted(f'P{i}')}.terms", force.terms, "", text
+        for n, amplitude, phase in force.harmonics:
+            text = f"harmonic {n} of the force on {force.on}"
+            yield f"{subscripted(f'P{i}')}.{n}", amplitude, "N", f"amplitude of {text}"
+            if phase:
+                yield f"{subscripted(f'φ{i}')}.{n}", phase, "rad", f"phase of {text}"
         if force.constant:
             yield subscripted(f"G{i}"), force.constant, "N", f"constant force on {force.on}"
     if model.base is not None:
@@ -265,11 +275,29 @@ def _nonlinear(symbol: str, element: NonlinearElement, naming: Naming) -> str:
 def _forces(model: LumpedSystem, name: str, naming: Naming) -> str:
     terms: list[str] = []
     for i, force in enumerate(model.forces, start=1):
-        if force.on == name and force.amplitude:
-            terms.append(f"{_times(naming(subscripted(f'P{i}'), force.amplitude))}{MOTION}")
+        if force.on == name:
+            terms += drive_terms(force, i, naming)
         if force.on == name and force.constant:
             terms.append(naming(subscripted(f"G{i}"), force.constant))
     return " + ".join(terms).replace("+ −", "− ") or "0"
+
+
+def drive_terms(force: Force, number: int, naming: Naming) -> list[str]:
+    """What a force is the sum of, but for its constant part. number : of the force, from 1 on."""
+    P, φ = subscripted(f"P{number}"), subscripted(f"φ{number}")
+
+    def wave(shape: str, order: int, amplitude: float, phase: float, names: tuple[str, str]) -> str:
+        turn = f"{order if order > 1 else ''}ωt"
+        if phase:
+            turn = f"({turn} + {naming(names[1], phase)})".replace("+ −", "− ")
+        return f"{_times(naming(names[0], amplitude))}{shape}{'' if phase else ' '}{turn}"
+
+    terms = []
+    if force.amplitude:
+        terms.append(wave(force.waveform or "sin", 1, force.amplitude, force.phase or 0.0, (P, φ)))
+    for n, amplitude, phase in force.harmonics:
+        terms.append(wave("sin", n, amplitude, phase, (f"{P}.{n}", f"{φ}.{n}")))
+    return terms
 
 
 def _law(model: LumpedSystem, gap: Gap, naming: Naming) -> str:

@@ -8,6 +8,7 @@ Displacements count to the right, so upper stops stand at the right.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from matplotlib.figure import Figure
 
@@ -17,7 +18,7 @@ from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import Damper, Gap, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
-from designer.model.system_equations import element_rows, law_symbols, law_variable
+from designer.model.system_equations import drive_terms, element_rows, law_symbols, law_variable
 from designer.plots.mechanical_symbols import MechanicalSheet
 
 Joint = Spring | Damper | CubicSpring | Friction | Law
@@ -87,12 +88,18 @@ class _Page(MechanicalSheet):
         """The forces on a mass as text."""
         terms = []
         for i, force in enumerate(self.model.forces, start=1):
-            amplitude, constant = subscripted(f"P{i}"), subscripted(f"G{i}")
-            if force.on == name and amplitude in self.values:
-                terms.append(f"{self.values[amplitude]} sin ωt")
+            constant = subscripted(f"G{i}")
+            if force.on == name:
+                # Phases and harmonics are in the table alone: there is no room for them.
+                first = replace(force, harmonics=())
+                terms += drive_terms(first, i, self._amplitude)
+                terms += ["…"] if force.harmonics else []
             if force.on == name and constant in self.values:
                 terms.append(self.values[constant])
         return " + ".join(terms).replace("+ -", "− ").replace("-", "−")
+
+    def _amplitude(self, symbol: str, _value: float) -> str:
+        return symbol if symbol.startswith("φ") else self.values[symbol]
 
     def _left(self, place: int) -> float:
         return _FIRST + _PITCH * (place - 1) if place else _WALL - _WIDTH

@@ -81,6 +81,14 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
+    if not system.driven_by_sine:
+        raise InputError(
+            None,
+            "force.phase",
+            "forces that are not in phase, or no sines",
+            "for a circuit forces in phase or in antiphase, of the drive's frequency: one "
+            "generator with a sine drives them all",
+        )
     for law in system.laws:
         raise InputError(None, f"law {law.name}", "a force that is not linear", _in_its_place(law))
     for clearance in system.clearances:

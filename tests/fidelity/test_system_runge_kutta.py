@@ -20,6 +20,7 @@ THREE = system_text(
     clearance("A", "a", "ground", upper=0.3, lower=0.5, stiffness=9.0),
     clearance("B", "b", "c", upper=0.1, upper_stiffness=4.0),
     table("force", on="b", amplitude=-0.4, constant=0.1),
+    table("force", on="a", amplitude=0.2, phase=0.7, harmonics=[[2, 0.1, 0.0], [3, 0.1, 1.0]]),
     '[base]\namplitude = 0.2\nstops = "fixed"\n',
     table("cubic_spring", between=("c", "ground"), k1=-0.5, k3=0.5, range=1.0, points=6),
     table("friction", between=("a", "b"), force=0.1, velocity=0.2, speed=0.1),

@@ -91,7 +91,7 @@ UNREAD = (
     ("gravity = 9.81", "a weight"),
 )
 """Keys that no element of format 2 has but those of ``READ``, and what they ask for."""
-READ = {("clearance", "restitution")}
+READ = {("clearance", "restitution"), ("force", "phase"), ("force", "harmonics")}
 
 
 @pytest.mark.parametrize(

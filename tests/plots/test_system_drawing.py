@@ -37,11 +37,12 @@ LAWS = system_text(
     table("law", name="soft", between=("a", "b"), points=[[-1, -2], [1, 2], [2, 3]]),
     table("law", name="mesh", points=[[-1, -2], [1, 2]]) + "of = { a = 1.0, b = -0.5 }\n",
     table("law", name="oil", between=("a", "b"), quantity="velocity", points=[[-1, -2], [1, 2]]),
-    table("force", on="a", amplitude=8.5),
+    table("force", on="a", amplitude=8.5, phase=0.75, harmonics=[[2, 1.625, 0.5]]),
+    table("force", on="b", amplitude=9.5, waveform="square", terms=3),
 )
 IN_THE_TABLE_ALONE = (
     *(".constant", ".depth", ".damping", ".restitution", ".preload_over", ".range", ".velocity"),
-    *"₁₂₃₄",
+    *(".x₁", ".x₂", ".x₃", ".f₁", ".f₂", ".f₃", "φ₁", "P₁.2", "φ₁.2", ".terms"),
 )
 SYSTEMS = {**FILES, "branch": BRANCH, "same mass": SAME_MASS, "laws": LAWS}
 
