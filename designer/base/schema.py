@@ -36,7 +36,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from designer.base.errors import MISSING, InputError
 from designer.base.json_schema import Json, either, listed
-from designer.base.units import parse_quantity
+from designer.base.units import is_bare_milli, parse_quantity
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,8 @@ def number(unit: str, expected: str, fine: Callable[[float], bool] = math.isfini
             raise ValueError
         if isinstance(value, str) and not unit:
             raise ValueError("without quotes")
+        if isinstance(value, str) and unit in MECHANICAL and is_bare_milli(value):
+            raise ValueError(f'"m" alone could be metres or milli: write the unit {unit}')
         result = parse_quantity(value, unit)
         if not fine(result):
             raise ValueError
@@ -172,6 +174,8 @@ def physical_span(unit: str) -> Accepts:
     return span(unit, expected, lambda value: value > 0.0)
 
 
+MECHANICAL = ("kg", "N s/m", "N/m", "N", "m/s")
+"""Units of quantities that nobody writes with a prefix alone."""
 EXAMPLES = {
     "kg": '"2.5 kg"',
     "N s/m": '"55 N s/m"',

@@ -68,6 +68,27 @@ def parse_quantity(value: str | float, unit: str) -> float:
     return result
 
 
+def parse_angle(value: str | float) -> float:
+    """An angle in rad: a number is one, a text may be in rad, deg or °.
+
+    Raises
+    ------
+    ValueError : as ``parse_quantity``.
+    """
+    if isinstance(value, str):
+        degrees = value.strip().removesuffix("°").removesuffix("deg")
+        if degrees != value.strip():
+            return math.radians(parse_quantity(degrees, ""))
+        if is_bare_milli(value):
+            raise ValueError('"m" alone is no unit of an angle')
+    return parse_quantity(value, "rad")
+
+
+def is_bare_milli(text: str) -> bool:
+    """Whether a text is a number and an m alone: milli, where its writer may mean metres."""
+    return re.fullmatch(rf"{_NUMBER}\s*m", text.strip(), re.ASCII) is not None
+
+
 def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     """``value`` with an SI prefix and ``unit``: 22100.0, "Ω" gives "22.1kΩ"; 1e-7, "F" "100nF".
 

@@ -27,6 +27,8 @@ STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
 """Frequencies over the model's own that set the swing of a model file that names no response."""
+LEAST_SHARE = 0.1
+"""Of the widest start of a mass: the least of another, where a law may be all that moves it."""
 DENSE = 1024
 """Points a drive period at which a displacement between two masses is looked at."""
 
@@ -193,6 +195,8 @@ def scale_of(model: MechanicalModel, omega: float) -> Array:
     for wave in (system.quadrature, *(w for h in system.harmonics for w in (h.sine, h.cosine))):
         x = x + np.abs(flexibility @ wave)
     x = x + np.abs(flexibility @ system.constant) + _law_reach(system, "displacement")
+    if system.laws:  # a mass that only a law joins is moved by it, and by nothing that is linear
+        x = np.maximum(x, LEAST_SHARE * x.max())
     v = x * max(omega, system.own_frequency) + _law_reach(system, "velocity")
     return np.stack([x, v], axis=1).ravel()
 

@@ -22,7 +22,7 @@ from designer.base.schema import (
     physical,
     such,
 )
-from designer.base.units import has_unit, parse_quantity
+from designer.base.units import has_unit
 from designer.model.cubic_law import MOST_POINTS, cubic_error, cubic_points, points_for
 from designer.model.element_keys import NAME, signed, two_bodies
 from designer.model.force_law import Quantity
@@ -77,9 +77,7 @@ def _points() -> Accepts:
 
 
 def _finite(value: object, unit: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError
-    return parse_quantity(value, unit)
+    return float(number(unit or "m", "a number").check(value))
 
 
 def _combination() -> Accepts:

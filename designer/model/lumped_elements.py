@@ -5,7 +5,7 @@ All numbers are in the file's own consistent units; texts with units become SI.
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -14,7 +14,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
-from designer.base.units import ACCELERATIONS, has_unit, parse_quantity
+from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.model.element_keys import GROUND, NAME, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
 from designer.model.law_elements import (
@@ -136,11 +136,7 @@ def _angle() -> Accepts:
     def check(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError
-        if isinstance(value, str) and value.rstrip().endswith(("deg", "°")):
-            return math.radians(
-                parse_quantity(value.rstrip().removesuffix("°").removesuffix("deg"), "")
-            )
-        return parse_quantity(value, "rad")
+        return parse_angle(value)
 
     return Accepts(expected, check, json={"type": ["number", "string"]})
 
@@ -196,13 +192,13 @@ class Force(FileTable):
         """(n, amplitude, phase) of all that it is the sum of: amplitude · sin(nωt + phase)."""
         phase = self.phase or 0.0
         shape = [(1, 1.0)] if self.waveform is None else series(self.waveform, self.terms or 1)
-        yield from ((n, self.amplitude * size, n * phase) for n, size in shape)
-        yield from self.harmonics
+        sizes = [(n, self.amplitude * size, n * phase) for n, size in shape]
+        yield from (wave for wave in (*sizes, *self.harmonics) if wave[1])
 
     @property
     def drives(self) -> bool:
         """Whether it changes with time."""
-        return any(size for _, size, _ in self.waves)
+        return any(True for _ in self.waves)
 
 
 BaseStops = Literal["base", "fixed"]
@@ -290,12 +286,16 @@ class Elements:
 
     @property
     def nonlinear(self) -> dict[str, NonlinearElement]:
-        """All elements whose force is a law, by their names."""
-        return {
-            **{law.name: law for law in self.laws},
-            **{f"{'-'.join(each.between)}.cubic": each for each in self.cubic_springs},
-            **{f"{'-'.join(each.between)}.friction": each for each in self.frictions},
-        }
+        """All elements whose force is a law, by their names; a second one between the same bodies
+        has a number."""
+        found: dict[str, NonlinearElement] = {law.name: law for law in self.laws}
+        for kind, elements in (("cubic", self.cubic_springs), ("friction", self.frictions)):
+            met = Counter[str]()
+            for element in elements:
+                name = f"{'-'.join(element.between)}.{kind}"
+                met[name] += 1
+                found[name if met[name] == 1 else f"{name}{met[name]}"] = element
+        return found
 
     @property
     def holding(self) -> tuple[tuple[str, ...], ...]:

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from itertools import chain, pairwise
 from typing import Any, NoReturn
 
 import numpy as np
@@ -45,6 +46,8 @@ DRIFTS = (
 )
 UNDAMPED = 1e-12
 """Least damping ratio of a mode: below it no steady response is reached."""
+STRAIGHT = 1e-12
+"""A sine or a cosine that small is 0."""
 ROUNDED = 1e-12
 """Of the steepest slope: an eigenvalue of a matrix of slopes that small may be 0."""
 
@@ -86,7 +89,7 @@ def _check_names(system: Elements) -> None:
     laws = [law.name for law in system.laws]
     names = [*system.names, *(gap.name for gap in system.gaps), *laws]
     for name, count in Counter(names).items():
-        field = "mass" if name in system.names else "law" if name in laws else "clearance"
+        field = "law" if name in laws else "mass" if name in system.names else "clearance"
         if count > 1:
             _refuse(f"{field}.name", name, "a name that no other mass, clearance or law has")
         if name in RESERVED:
@@ -103,6 +106,13 @@ def _check_names(system: Elements) -> None:
     for force in system.forces:
         if force.on not in system.names:
             _refuse("force.on", force.on, one_of(force.on, system.names))
+
+
+def _turned(phase: float) -> Array:
+    """(2,) cosine and sine of an angle; 0 where that is what was meant, as of the sine of π."""
+    turned = np.array([math.cos(phase), math.sin(phase)])
+    turned[np.abs(turned) < STRAIGHT] = 0.0
+    return turned
 
 
 def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
@@ -167,10 +177,24 @@ def _check_law(law: Law) -> None:
     if law.points.unit not in ("", expected):
         text = f"x in {law.points.unit}"
         _refuse(f"law {law.name}.points", text, f"x in {expected}: the law is of a {law.quantity}")
+    low, high = NUMBERS
+    for value in (*chain.from_iterable(law.corners), *law.factors.values()):
+        if value != 0.0 and not low <= abs(value) <= high:
+            key = "of" if value in law.factors.values() else "points"
+            _refuse(f"law {law.name}.{key}", value, f"numbers from {low:g} to {high:g}")
+    slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(law.corners)]
+    if not max(map(abs, slopes)) <= high:
+        steepest = max(slopes, key=abs)
+        _refuse(f"law {law.name}.points", f"a slope of {steepest:g}", f"slopes up to {high:g}")
 
 
 def _check_cubic(spring: CubicSpring) -> None:
     field = f"cubic_spring {'-'.join(spring.between)}"
+    low, high = NUMBERS
+    for key in ("k1", "k3", "range"):
+        value = getattr(spring, key)
+        if value != 0.0 and not low <= abs(value) <= high:
+            _refuse(f"{field}.{key}", value, f"a number from {low:g} to {high:g}")
     if spring.points is not None and spring.error is not None:
         _refuse(f"{field}.error", spring.error, "none beside points, which decide it")
     if spring.count is None:
@@ -267,10 +291,13 @@ def check_bounded(stiffness: Array, damping: Array, laws: Sequence[ForceLaw]) ->
         lowest = min(own, key=lambda law: min(law.ends))
         text = f"slope {min(lowest.ends):.6g} beyond its points"
         if holds:
-            expected = "a slope there with which springs and laws hold every mass: it would leave"
+            expected = (
+                "a slope there with which springs and laws hold every mass, stops left out: it "
+                "would leave"
+            )
         else:
             expected = "a slope there with which dampers and laws do not drive a motion for ever"
-        _refuse(lowest.name, text, expected)
+        _refuse(f"law {lowest.name}", text, expected)
 
 
 def check_damped(state_matrix: Array) -> None:
@@ -401,7 +428,7 @@ class LumpedSystem(Elements):
             constant[place] += self.b * each.constant
             for order, size, phase in each.waves:
                 wave = waves.setdefault(order, np.zeros((2, n)))
-                wave[:, place] += size * np.array([math.cos(phase), math.sin(phase)])
+                wave[:, place] += size * _turned(phase)
         force, quadrature = waves.pop(1, np.zeros((2, n)))
         damping, stiffness = self.damping_matrix, self.stiffness_matrix
         laws = self._force_laws()

@@ -251,7 +251,7 @@ LIMITS = (
         "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
         tables=r"\w+",
         keys=r"\w+",
-        of=tuple(name for name in (*MODELS, *ELEMENTS) if name not in ("law", "force")),
+        of=(*MODELS, "mass", "spring", "damper", "clearance", "base"),
         value=_is_matrix,
     ),
     ModelLimit(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from designer.base.errors import InputError
 from designer.base.si_unit import Unit, value_text
-from designer.base.units import ACCELERATIONS, has_unit, parse_quantity
+from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.model.mechanics import MechanicalModel, state_names
 from designer.model.model import SiScales
 
@@ -194,6 +194,8 @@ def _acceleration(option: str, text: str, unit: str) -> float:
 def _quantity(option: str, text: str, unit: str) -> float:
     """A text that ends in the unit; a mass may be in g."""
     try:
+        if unit == "rad":
+            return parse_angle(text)
         if not text.rstrip().endswith("g" if unit == "kg" else unit):
             raise ValueError
         return parse_quantity(text, unit)

@@ -73,6 +73,9 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
             raise InputError(None, "circuit.preferred", value, expected)
 
 
+_ONE_GENERATOR = "one generator, with a sine, drives them all"
+
+
 def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     """Refuse what no circuit of ours can do, element by element.
 
@@ -81,14 +84,16 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
-    if not system.driven_by_sine:
-        raise InputError(
-            None,
-            "force.phase",
-            "forces that are not in phase, or no sines",
-            "for a circuit forces in phase or in antiphase, of the drive's frequency: one "
-            "generator with a sine drives them all",
+    if system.harmonics:
+        orders = ", ".join(str(harmonic.order) for harmonic in system.harmonics)
+        found = f"forces at {orders} times the drive's frequency"
+        raise InputError(None, "force", found, "for a circuit sines alone: " + _ONE_GENERATOR)
+    if system.quadrature.any():
+        expected = (
+            f"for a circuit forces in phase or in antiphase: {_ONE_GENERATOR}; a phase that all "
+            "forces have may be left out"
         )
+        raise InputError(None, "force.phase", "forces of another phase than the drive", expected)
     for law in system.laws:
         raise InputError(None, f"law {law.name}", "a force that is not linear", _in_its_place(law))
     for clearance in system.clearances:

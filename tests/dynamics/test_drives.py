@@ -177,6 +177,15 @@ def test_without_stops_every_harmonic_has_its_own_amplitude() -> None:
     assert orbit.symmetric is not True
 
 
+@pytest.mark.parametrize("phase", ["180 deg", math.pi, "360°", "-540 deg", 0.0])
+def test_half_a_turn_is_antiphase(phase: str | float) -> None:
+    """A circuit makes it: nothing is left beside the sine."""
+    force = table("force", on="a", amplitude=1.0, phase=phase, harmonics=[[2, 0.0, 0.0]])
+    system = one_mass(force).model.second_order()
+    assert system.driven_by_sine
+    assert abs(system.force[0]) == 1.0
+
+
 def test_files_without_shapes_keep_their_hashes() -> None:
     told = json.dumps(one_mass(table("force", on="a", amplitude=1.0)).model.as_dict()["forces"])
     assert told == '[{"on": "a", "amplitude": 1.0, "constant": 0.0}]'
@@ -186,6 +195,7 @@ def test_files_without_shapes_keep_their_hashes() -> None:
     ("keys", "field", "expected"),
     [
         ({"phase": "90 kg"}, "force[1].phase", "an angle in rad"),
+        ({"phase": "3 m"}, "force[1].phase", "no unit of an angle"),
         ({"harmonics": [[1, 1.0, 0.0]]}, "force[1].harmonics", "from 2 to 64"),
         ({"harmonics": [[2, 1.0, 0.0], [2, 1.0, 0.0]]}, "force[1].harmonics", "one n twice"),
         ({"harmonics": [[2, 1.0]]}, "force[1].harmonics", "[n, amplitude, phase]"),

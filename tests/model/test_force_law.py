@@ -110,6 +110,19 @@ def test_elements_of_a_file_become_laws() -> None:
     assert system.constant == pytest.approx([-0.3])
 
 
+def test_elements_between_the_same_bodies_add_up() -> None:
+    springs = [table("cubic_spring", between=GROUNDED, k3=k, range=2.0) for k in (1.0, 0.5)]
+    frictions = [
+        table("friction", between=GROUNDED, force=f, velocity=v)
+        for f, v in ((0.3, 0.1), (0.2, 1.0))
+    ]
+    laws = model(*springs, *frictions).second_order().laws
+    x = np.linspace(-3.0, 3.0, 61)
+    alone = [model(one).second_order().laws[0].force(x) for one in (*springs, *frictions)]
+    assert len({law.name for law in laws}) == 4
+    np.testing.assert_allclose(sum(law.force(x) for law in laws), sum(alone), atol=1e-12)
+
+
 def test_static_friction_falls_to_that_of_sliding() -> None:
     friction = {"force": 0.3, "static": 0.5, "velocity": 0.1, "stribeck": 0.4}
     (law,) = model(table("friction", between=GROUNDED, **friction)).second_order().laws
@@ -156,17 +169,35 @@ def law(**keys: object) -> str:
         (law(points=[[1, 2]]), "law[1].points", "two to 64 points"),
         (law(points=[[1, 2], [1, 3]]), "law[1].points", "x does not rise"),
         (law(points=[[0, 0], [1, "2 kg"]]), "law[1].points", "two to 64 points"),
+        (law(points=[[0, 0], [1, "2 m"]]), "law[1].points", "write the unit N"),
+        (law(points=[[-1e300, -1e300], [1e300, 1e300]]), "law L.points", "numbers from"),
+        (law(points=[[0, 0], [1e-59, 1e9]]), "law L.points", "slopes up to"),
+        (
+            table("cubic_spring", between=GROUNDED, k3=1.0, range=1e200),
+            "cubic_spring a-ground.range",
+            "a number from",
+        ),
+        (
+            table("cubic_spring", between=GROUNDED, k3=1.0, range=2.0, points=[[1, 1], [2, 2]]),
+            "cubic_spring[1].points",
+            "an even whole number",
+        ),
+        (
+            table("friction", between=GROUNDED, force=0.3, velocity=0.1, speed="3 m"),
+            "friction[1].speed",
+            "write the unit m/s",
+        ),
         (law(points=[["0 m", 0], ["1 m/s", 2]]), "law[1].points", "x in m and in m/s"),
         (law(points=[["0 m/s", 0], ["1 m/s", 2]]), "law L.points", "x in m: "),
         (law(between=["a", "b"]), "law.between", "one of a, ground"),
-        (law(name="a"), "mass.name", "no other mass, clearance or law"),
+        (law(name="a"), "law.name", "no other mass, clearance or law"),
         (law(of={"a": 1}).replace('{"a": 1}', "{ a = 1 }"), "law L.between", "or of ="),
         (law().replace('between = ["a", "ground"]\n', ""), "law L.between", "between = [A, B]"),
-        (law(points=[[-1, 4], [1, -4]]), "L", "springs and laws hold"),
-        (law(quantity="velocity", points=[[-1, 4], [1, -4]]), "L", "do not drive a motion"),
+        (law(points=[[-1, 4], [1, -4]]), "law L", "springs and laws hold"),
+        (law(quantity="velocity", points=[[-1, 4], [1, -4]]), "law L", "do not drive a motion"),
         (
             table("cubic_spring", between=GROUNDED, k3=-1.0, range=2.0),
-            "a-ground.cubic",
+            "law a-ground.cubic",
             "springs and laws hold",
         ),
         (
