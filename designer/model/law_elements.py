@@ -27,7 +27,7 @@ from designer.model.cubic_law import MOST_POINTS, cubic_error, cubic_points, poi
 from designer.model.element_keys import NAME, signed, two_bodies
 from designer.model.force_law import Quantity
 
-DEFAULT_ERROR = 0.01
+DEFAULT_ERROR = 0.001
 """Of a cubic spring that states neither its points nor their error."""
 
 Points = tuple[tuple[float, float], ...]
@@ -145,7 +145,7 @@ class CubicSpring(FileTable):
     points: Annotated[int | None, _even()] = None
     """How many points the pieces have; or ``error``."""
     error: Annotated[float | None, fraction("0.01 is 1 % of the largest force in the range")] = None
-    """Largest error of the force, over the largest force in the range; 0.01 where neither is
+    """Largest error of the force, over the largest force in the range; 0.001 where neither is
     stated."""
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from tests.shared.system_text import clearance, system_text, table
 
 Law = tuple[tuple[float, ...], bool, tuple[tuple[float, float], ...]]
 GROUNDED = ("a", "ground")
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def settled(text: str, omega: float, start: list[float] | None = None) -> Orbit:
@@ -195,3 +197,20 @@ def test_two_wells_have_the_linear_motion_of_each() -> None:
         assert 0.5 * (high - low) == pytest.approx(amplitude, rel=1e-9)
         assert x0 < abs(low) < x1
         assert not orbit.symmetric
+
+
+def test_the_examples_are_the_systems_that_they_name() -> None:
+    """Den Hartog's block, and Duffing and Holmes' beam in one well by a tight integrator."""
+    block = (EXAMPLES / "dry-friction.toml").read_text("utf-8")
+    V, U = 1.0 / (1.0 - 0.36), math.sin(math.pi / 0.6) / (0.6 * (1.0 + math.cos(math.pi / 0.6)))
+    ideal = math.sqrt(V * V - (0.2 * U) ** 2)
+    assert settled(block, 0.6).extremes[0, 1] == pytest.approx(ideal, abs=2.0 * 0.002)
+    orbit = settled((EXAMPLES / "double-well.toml").read_text("utf-8"), 0.5, [1.0, 0.0])
+
+    def rates(t: float, y: Array) -> list[float]:
+        return [y[1], 0.3 * math.sin(0.5 * t) + y[0] - y[0] ** 3 - 0.25 * y[1]]
+
+    span = 40 * 2.0 * np.pi / 0.5
+    times = np.linspace(0.95 * span, span, 20_001)
+    found = solve_ivp(rates, (0.0, span), [1.0, 0.0], "DOP853", times, rtol=1e-10, atol=1e-11)
+    assert orbit.extremes[0] == pytest.approx([found.y[0].min(), found.y[0].max()], abs=0.01)

@@ -1,4 +1,5 @@
-"""The model files of format 2 in ``examples/``: the response that each wants, by another road."""
+"""The model files of format 2 with clearances in ``examples/``: the response that each wants, by
+another road. Those without are in tests/dynamics/test_force_laws.py."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from tests.shared.mechanism_file import mechanism_of, omega_of
 from tests.shared.mechanisms import absolute
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FILES = sorted(p for p in EXAMPLES.glob("*.toml") if "format = 2" in p.read_text("utf-8"))
+FILES = sorted(p for p in EXAMPLES.glob("*.toml") if "[[clearance]]" in p.read_text("utf-8"))
 TOUCHED = {"backlash": 2.4, "hammer-base": 60.0}
 """Examples and the frequency at which their first touch is looked for: between two masses; under a
 weight on a moving base."""

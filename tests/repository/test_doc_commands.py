@@ -28,6 +28,7 @@ SMALLER = {
     # in a command: instead
     "--out out/paper200": "--out out/paper200 --samples 2",
     "--rung exact --samples 2000": "--rung exact --samples 20",
+    "--rung exact --samples 1000": "--rung exact --samples 20",
     "--steps 121": "--steps 7",
     "--steps 101": "--steps 5",
     "--steps 1801": "--steps 5 --no-points",
@@ -75,6 +76,7 @@ NOT_RUN = {
 }
 LONG = (
     "README.md",
+    "docs/paper-case.md",
     "docs/bifurcations.md",
     "docs/compare.md",
     "docs/tolerance.md",
@@ -106,6 +108,8 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("reader")
     shutil.copytree(ROOT / "examples", path / "examples")
     (path / "examples" / "paper.toml").write_text(SMALL, encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (path / "gap.toml").write_text(readme.split("```toml\n")[1].split("```")[0], encoding="utf-8")
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(path)
         assert entry.status([*DEMO, "-q"]) == 0
@@ -195,12 +199,12 @@ def test_every_command_is_run_or_named_or_stands_for_many() -> None:
 
 
 def test_a_page_is_read_as_a_reader_reads_it() -> None:
-    readme = commands("README.md")
-    texts = [c.text for c in readme]
+    page = commands("docs/paper-case.md")
+    texts = [c.text for c in page]
     assert "tolerance out/paper --tuned --reached --map omega" in texts
     assert "simulate examples/paper.toml --omega 1.55 --omega 0.85" in texts
     assert "new mine.toml" in texts
     study = next(c for c in commands("docs/tolerance.md") if "--until" in c.text)
     assert study.is_pattern
     assert "--resume" in study.options  # on a further line of the pattern
-    assert len(snippets("README.md")) == 2
+    assert len(snippets("docs/paper-case.md")) == 2

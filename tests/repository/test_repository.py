@@ -129,11 +129,11 @@ def test_citation_names_the_version_and_the_licence_of_the_package() -> None:
     assert f"## [{designer.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_the_readme_s_picture_and_table_are_of_the_same_boards() -> None:
+def test_the_paper_s_picture_and_table_are_of_the_same_boards() -> None:
     """``scripts/make-picture`` writes the counts that it draws into the file."""
     with Image.open(ROOT / "docs" / "images" / "paper.png") as picture:
         drawn = picture.info["Yields"].splitlines()
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "paper-case.md").read_text(encoding="utf-8")
     table = text[text.index("Responses, 200 samples") :].split("\n\n", 1)[0].splitlines()[2:]
     told = []
     for line in table:
@@ -165,7 +165,7 @@ def test_the_picture_of_the_model_is_what_the_script_draws() -> None:
     script = _script("make-model-picture")
     assert script.PICTURE.read_text(encoding="utf-8") == script.picture()
     assert script.RIG.read_text(encoding="utf-8") == script.rig()
-    for page in ("README.md", "docs/model-file.md"):
+    for page in ("docs/paper-case.md", "docs/model-file.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
         assert "images/model.svg)" in text
         for line in dimensionless_equations(PAPER):
