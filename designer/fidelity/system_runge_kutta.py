@@ -12,23 +12,25 @@ from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.base.jit import callee, compiled
-from designer.model.mechanics import MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import HarmonicForce, MechanicalModel, SecondOrderSystem
 
 Float = NDArray[np.float64]
 
 
 class SystemRates(NamedTuple):
-    """The numbers of y' = A y + Σ B sin nωt + C cos nωt + d - Σ springs, y = x1, x1', x2, x2', …,
-    for s springs and w multiples n of the drive's frequency."""
+    """The numbers of y' = A y + B sin ωt + Σ (S sin nωt + C cos nωt) + d - Σ springs, y = x1, x1',
+    x2, …, for s springs and w multiples n of the drive's frequency."""
 
     A: Float
     """(2n, 2n) of the open system."""
     B: Float
-    """(w, 2n) of the sines, the drive's own first."""
+    """(2n,) of the drive's sine."""
+    S: Float
+    """(w, 2n) of further sines."""
     C: Float
     """(w, 2n) of the cosines."""
     order: NDArray[np.int64]
-    """(w,) the multiples."""
+    """(w,) the multiples; none where the drive is a sine."""
     d: Float
     """(2n,) of the constant forces."""
     row: Float
@@ -44,13 +46,13 @@ class SystemRates(NamedTuple):
 def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     """The numbers of a system at a drive frequency."""
     size = 2 * system.size
-    orders = [1, *(harmonic.order for harmonic in system.harmonics)]
-    B, C, d = np.zeros((len(orders), size)), np.zeros((len(orders), size)), np.zeros(size)
-    B[:, 1::2] = [system.drive_force(omega), *(each.sine for each in system.harmonics)]
-    C[:, 1::2] = [system.quadrature, *(each.cosine for each in system.harmonics)]
-    d[1::2] = system.constant
-    for part in (B, C, d):
-        part[..., 1::2] /= system.mass
+    B, d = np.zeros(size), np.zeros(size)
+    B[1::2], d[1::2] = system.drive_force(omega) / system.mass, system.constant / system.mass
+    turned = [HarmonicForce(1, np.zeros(system.size), system.quadrature)]
+    waves = [] if system.driven_by_sine else [*turned, *system.harmonics]
+    S, C = np.zeros((len(waves), size)), np.zeros((len(waves), size))
+    for k, wave in enumerate(waves):
+        S[k, 1::2], C[k, 1::2] = wave.sine / system.mass, wave.cosine / system.mass
     rows, places, pushes, drags = [], [], [], []
     for stop in system.clearances:
         along = system.displacement(stop)
@@ -81,8 +83,9 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     return SystemRates(
         system.state_matrix(),
         B,
+        S,
         C,
-        np.array(orders, dtype=np.int64),
+        np.array([wave.order for wave in waves], dtype=np.int64),
         d,
         np.array(rows).reshape(count, size + 1),
         np.array(places, dtype=float),
@@ -95,14 +98,11 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
 def _slope(y: Float, angle: float, rates: SystemRates, out: Float) -> None:
     """out ← y' at the drive's phase ``angle``."""
     size, wave = y.shape[0], np.sin(angle)
-    shaped = rates.order.shape[0] > 1 or rates.C.any()
     for i in range(size):
-        total = rates.B[0, i] * wave + rates.d[i]
-        if shaped:
-            for k in range(rates.order.shape[0]):
-                turn = rates.order[k] * angle
-                total += rates.C[k, i] * np.cos(turn)
-                total += rates.B[k, i] * np.sin(turn) if k else 0.0
+        total = rates.B[i] * wave + rates.d[i]
+        for k in range(rates.order.shape[0]):
+            turn = rates.order[k] * angle
+            total += rates.S[k, i] * np.sin(turn) + rates.C[k, i] * np.cos(turn)
         for j in range(size):
             total += rates.A[i, j] * y[j]
         out[i] = total

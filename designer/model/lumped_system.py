@@ -108,6 +108,12 @@ def _check_names(system: Elements) -> None:
             _refuse("force.on", force.on, one_of(force.on, system.names))
 
 
+def _check_size(field: str, value: float, what: str = "a number") -> None:
+    low, high = NUMBERS
+    if value != 0.0 and not low <= abs(value) <= high:
+        _refuse(field, value, f"{what} from {low:g} to {high:g}")
+
+
 def _turned(phase: float) -> Array:
     """(2,) cosine and sine of an angle; 0 where that is what was meant, as of the sine of π."""
     turned = np.array([math.cos(phase), math.sin(phase)])
@@ -173,28 +179,27 @@ def _check_law(law: Law) -> None:
     if (law.between is None) == (law.of is None):
         found = MISSING if law.of is None else "between and of"
         _refuse(f"law {law.name}.between", found, "between = [A, B], or of = {A = factor, …}")
+    if law.of is not None and GROUND in law.factors:
+        _refuse(f"law {law.name}.of", GROUND, "masses: ground is what their displacements are from")
     expected = {"displacement": "m", "velocity": "m/s"}[law.quantity]
     if law.points.unit not in ("", expected):
         text = f"x in {law.points.unit}"
         _refuse(f"law {law.name}.points", text, f"x in {expected}: the law is of a {law.quantity}")
-    low, high = NUMBERS
-    for value in (*chain.from_iterable(law.corners), *law.factors.values()):
-        if value != 0.0 and not low <= abs(value) <= high:
-            key = "of" if value in law.factors.values() else "points"
-            _refuse(f"law {law.name}.{key}", value, f"numbers from {low:g} to {high:g}")
+    for value in law.factors.values():
+        _check_size(f"law {law.name}.of", value, "numbers")
+    for value in chain.from_iterable(law.corners):
+        _check_size(f"law {law.name}.points", value, "numbers")
     slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(law.corners)]
-    if not max(map(abs, slopes)) <= high:
-        steepest = max(slopes, key=abs)
-        _refuse(f"law {law.name}.points", f"a slope of {steepest:g}", f"slopes up to {high:g}")
+    steepest = max(slopes, key=abs)
+    if not abs(steepest) <= NUMBERS[1]:
+        expected = f"slopes up to {NUMBERS[1]:g}"
+        _refuse(f"law {law.name}.points", f"a slope of {steepest:g}", expected)
 
 
 def _check_cubic(spring: CubicSpring) -> None:
     field = f"cubic_spring {'-'.join(spring.between)}"
-    low, high = NUMBERS
     for key in ("k1", "k3", "range"):
-        value = getattr(spring, key)
-        if value != 0.0 and not low <= abs(value) <= high:
-            _refuse(f"{field}.{key}", value, f"a number from {low:g} to {high:g}")
+        _check_size(f"{field}.{key}", getattr(spring, key))
     if spring.points is not None and spring.error is not None:
         _refuse(f"{field}.error", spring.error, "none beside points, which decide it")
     if spring.count is None:
@@ -407,13 +412,9 @@ class LumpedSystem(Elements):
         check_damped(system.spanning_state_matrix())
 
     def _check_sizes(self) -> None:
-        low, high = NUMBERS
         for name, (table, index, key) in self.places.items():
-            value = self.parameter(name)
-            if value != 0.0 and not low <= abs(value) <= high:
-                place = table if index is None else f"{table}[{index + 1}]"
-                expected = f"a number from {low:g} to {high:g}"
-                raise InputError(None, f"{place}.{key}", value, expected)
+            place = table if index is None else f"{table}[{index + 1}]"
+            _check_size(f"{place}.{key}", self.parameter(name))
 
     def second_order(self) -> SecondOrderSystem:
         """The equations of motion."""

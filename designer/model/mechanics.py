@@ -229,6 +229,16 @@ class SecondOrderSystem:
         """Whether all forces are in phase, or in antiphase, and of one frequency."""
         return not self.quadrature.any() and not self.harmonics
 
+    @property
+    def even(self) -> bool:
+        """Whether the mirror image of a motion, half a period later, is a motion too."""
+        return (
+            all(stop.upper == stop.lower for stop in self.clearances)
+            and all(law.even for law in self.laws)
+            and all(harmonic.order % 2 for harmonic in self.harmonics)
+            and not self.constant.any()
+        )
+
     def _waves(self) -> Array | None:
         """(2n, 1 + 2 h) ``Mode.waves``."""
         if self.driven_by_sine:
@@ -320,9 +330,6 @@ class SecondOrderSystem:
             sides = tuple(int(np.sign(level)) for level in key[:count])
             return Mode(A, B, d, tuple(guards), sides=sides, waves=waves)
 
-        even = all(stop.upper == stop.lower for stop in self.clearances)
-        even = even and all(law.even for law in self.laws)
-        even = even and all(order % 2 for order in orders)
         return PiecewiseLinearSystem(
             states=state_names(n),
             build=build,
@@ -330,7 +337,7 @@ class SecondOrderSystem:
             clearances=tuple(stop.name for stop in self.clearances),
             displacement=tuple(np.append(c.row, [c.on_drive, 0.0]) for c in stops),
             velocity=tuple(np.append(c.rate, c.on_drive) for c in stops),
-            mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
+            mirror=-np.eye(2 * n) if self.even else None,
             continuous=not any(stop.jumps for stop in self.clearances),
             orders=None if waves is None else orders,
         )

@@ -297,17 +297,8 @@ class _SystemFile(_Tables):
     def system(self) -> LumpedSystem:
         """What is computed with."""
         base = None if self.base is None else self.base.motion
-        return LumpedSystem(
-            self.mass,
-            self.spring,
-            self.damper,
-            self.clearance,
-            self.force,
-            base,
-            self.law,
-            self.cubic_spring,
-            self.friction,
-        )
+        linear = self.mass, self.spring, self.damper, self.clearance, self.force
+        return LumpedSystem(*linear, base, self.law, self.cubic_spring, self.friction)
 
     def scales(self, data: Mapping[str, Any]) -> SiScales | None:
         """The file is in SI where a value of its elements is a text with a unit."""

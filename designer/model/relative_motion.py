@@ -148,11 +148,11 @@ def different_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
 
 
 def shown_stops(system: SecondOrderSystem) -> tuple[tuple[int, int], ...]:
-    """(index of the clearance, side) of the stops whose impacts a diagram shows: of one even
-    clearance without a constant force the upper one, since the lower is its mirror image; else
-    every stop."""
+    """(index of the clearance, side) of the stops whose impacts a diagram shows: of the one
+    clearance of an even system the upper one, since the lower is its mirror image; else every
+    stop."""
     stops = system.clearances
-    if len(stops) == 1 and stops[0].upper == stops[0].lower and not system.constant.any():
+    if len(stops) == 1 and system.even:
         return ((0, 1),)
     return tuple((k, side) for k, stop in enumerate(stops) for side in stop.positions)
 

@@ -163,8 +163,8 @@ def _of_law(symbol: str, element: NonlinearElement) -> Iterator[tuple[str, float
     if isinstance(element, Law):
         unit = "m" if element.quantity == "displacement" else "m/s"
         for i, (x, force) in enumerate(element.corners, start=1):
-            yield subscripted(f"{symbol}.x{i}"), x, unit, f"{element.quantity} at point {i}"
-            yield subscripted(f"{symbol}.f{i}"), force, "N", f"force at point {i}"
+            yield f"{symbol}.{subscripted(f'x{i}')}", x, unit, f"{element.quantity} at point {i}"
+            yield f"{symbol}.{subscripted(f'f{i}')}", force, "N", f"force at point {i}"
         return
     where = " to ".join(element.between)
     if isinstance(element, CubicSpring):

@@ -140,8 +140,8 @@ def _in_its_place(law: ForceLaw) -> str:
     """What a file may say in the place of a law that a circuit is to make."""
     if law.quantity == "velocity":
         return "none for a circuit: no stage follows a velocity; a [[damper]] is linear"
-    if {abs(factor) for factor in law.row} - {0.0, 1.0}:
-        return "none for a circuit: no stage follows masses by unequal factors"
+    if sorted(factor for factor in law.row if factor) not in ([-1.0], [1.0], [-1.0, 1.0]):
+        return "none for a circuit: no stage follows but one mass, or the difference of two"
     changes = [change for bends in law.bends.values() for _, change in bends]
     if any(change < 0.0 for change in changes) or law.slope < 0.0 or law.offset:
         return (
@@ -154,7 +154,10 @@ def _in_its_place(law: ForceLaw) -> str:
         for side, bends in law.bends.items()
         for place, change in bends
     ]
-    spring = f"a [[spring]] with stiffness = {law.slope:.6g} and " if law.slope else ""
+    spring = f"a [[spring]] with stiffness = {law.slope:.6g}"
+    if not steps:
+        return f"for a circuit {spring}"
+    spring = f"{spring} and " if law.slope else ""
     return (
         f"for a circuit {spring}a [[clearance]] for each step, at the same place: "
         f"{', '.join(steps)}; n-p-q then counts the entry into each"

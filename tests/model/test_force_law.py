@@ -12,11 +12,14 @@ from scipy.optimize import minimize
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.model.circuit_table import CircuitSpec
 from designer.model.cubic_law import cubic_error, cubic_points, points_for
 from designer.model.force_law import ForceLaw
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import parse_model_file
-from tests.shared.system_text import system_text, table
+from designer.model.relative_motion import shown_stops
+from designer.synthesis.part_checks import check_system
+from tests.shared.system_text import clearance, system_text, table
 
 PLACES = st.lists(st.integers(-40, 40), min_size=2, max_size=9, unique=True).map(sorted)
 FORCES = st.lists(st.integers(-30, 30), min_size=9, max_size=9)
@@ -190,6 +193,13 @@ def law(**keys: object) -> str:
         (law(points=[["0 m", 0], ["1 m/s", 2]]), "law[1].points", "x in m and in m/s"),
         (law(points=[["0 m/s", 0], ["1 m/s", 2]]), "law L.points", "x in m: "),
         (law(between=["a", "b"]), "law.between", "one of a, ground"),
+        (
+            law(of={})
+            .replace("of = {}", "of = { ground = 1.0 }")
+            .replace('between = ["a", "ground"]\n', ""),
+            "law L.of",
+            "masses: ground",
+        ),
         (law(name="a"), "law.name", "no other mass, clearance or law"),
         (law(of={"a": 1}).replace('{"a": 1}', "{ a = 1 }"), "law L.between", "or of ="),
         (law().replace('between = ["a", "ground"]\n', ""), "law L.between", "between = [A, B]"),
@@ -248,3 +258,38 @@ def test_a_law_may_be_all_that_holds_a_mass_or_slows_it() -> None:
         with pytest.raises(InputError) as refused:
             parse_model_file(text + missing)
         assert refused.value.field == f"{what}.between"
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({}, "for a circuit a [[spring]] with stiffness = 2"),
+        ({"points": [[-2, -3], [-1, 0], [1, 0], [3, 8]]}, "upper = 1 with stiffness = 4"),
+        ({"points": [[-2, -9], [-1, 1], [1, -1], [2, 9]]}, "no stage makes a slope that falls"),
+    ],
+)
+def test_what_a_circuit_may_have_in_the_place_of_a_law(
+    keys: dict[str, object], expected: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        check_system(model(law(**keys)), CircuitSpec())
+    assert refused.value.field == "law L"
+    assert expected in refused.value.expected
+
+
+def test_a_sum_of_two_masses_is_no_clearance() -> None:
+    text = system_text({"a": 1.5, "b": 1.0}, {GROUNDED: 2.0, ("b", "ground"): 1.0}, {GROUNDED: 0.1})
+    text += table("damper", between=("b", "ground"), damping=0.1) + FORCE
+    text += table("law", name="L", points=[[-1, 0], [1, 0], [2, 3]]) + "of = { a = 1.0, b = 1.0 }\n"
+    with pytest.raises(InputError) as refused:
+        check_system(parse_model_file(text).model, CircuitSpec())
+    assert "difference of two" in refused.value.expected
+
+
+def test_both_stops_are_shown_where_a_law_or_a_drive_makes_them_differ() -> None:
+    stops = clearance("A", "a", "ground", upper=0.5, lower=0.5, stiffness=8.0)
+    assert shown_stops(model(stops).second_order()) == ((0, 1),)
+    uneven = law(points=[[-1, -2], [1, 2], [2, 3]])
+    assert shown_stops(model(stops, uneven).second_order()) == ((0, 1), (0, -1))
+    second = table("force", on="a", harmonics=[[2, 0.5, 0.0]])
+    assert shown_stops(model(stops, second).second_order()) == ((0, 1), (0, -1))
