@@ -16,7 +16,8 @@ from benchmarks.references import Heyoka, Stops
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 
 SIZES = tuple(product((1, 2, 3), (1, 2)))
 """Masses and clearances."""

@@ -242,6 +242,16 @@ RULES: tuple[DesignRule, ...] = (
         "another one",
         "take resistors of a better grade in the dead zone, or the rectifier, which has none",
     ),
+    _rule(
+        "far-slope",
+        "Error of the slope beyond the bends of a force law that falls, with all that is linear: "
+        "one standard deviation of the resistors' grades, over that slope",
+        0.5, "",
+        "at twice this one board in forty has a slope of the other sign there, and nothing holds "
+        "the mass far out",
+        "take resistors of a better grade, a larger velocity of the [[friction]], or a larger "
+        "[[damper]] beside it",
+    ),
     # The board.
     _rule(
         "part-value",

@@ -85,7 +85,7 @@ def branches(
         now = catalog.opamp(spec.opamp)
         names += [o.name for o in better_opamps(now, spec.supply, catalog)]
     zones: list[str | None] = [None]
-    clearances = base.modelfile.model.second_order().clearances
+    clearances = base.modelfile.model.second_order().dead_zones
     if DEAD_ZONE not in without and clearances:
         other: DeadZone = "rectifier" if spec.dead_zone == "saturation" else "saturation"
         zones += [other] if stage_refusal(clearances, other) is None else []

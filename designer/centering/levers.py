@@ -43,7 +43,7 @@ class DesignChoice:
     def of(cls, modelfile: ModelFile) -> DesignChoice:
         """What the model file says; a stage that it does not state is one that it can have."""
         spec = modelfile.circuit
-        kind = stage_kind(spec, modelfile.model.second_order().clearances)
+        kind = stage_kind(spec, modelfile.model.second_order().dead_zones)
         return cls(spec.opamp, kind, spec.frequency)
 
     def spec(self, base: CircuitSpec) -> CircuitSpec:
@@ -96,7 +96,7 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
             field = "search.opamps" if error.field == "circuit.opamp" else error.field
             raise InputError(None, field, error.found, error.expected) from None
     opamps = spec.opamps or (file_choice.opamp,)
-    clearances = modelfile.model.second_order().clearances
+    clearances = modelfile.model.second_order().dead_zones
     able = [zone for zone in spec.dead_zones if stage_refusal(clearances, zone) is None]
     choices = [
         replace(file_choice, opamp=opamp, dead_zone=zone)

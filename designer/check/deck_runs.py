@@ -135,7 +135,7 @@ def simulator_notes(
 
 def _circuit(synthesis: Synthesis) -> tuple[str, ...]:
     circuit = synthesis.design.circuit
-    stage = synthesis.modelfile.circuit.dead_zone if circuit.stops else "none"
+    stage = synthesis.modelfile.circuit.dead_zone if circuit.dead_zones else "none"
     return (
         f"Circuit: {len(circuit.sections)} op-amps {circuit.opamp} at +-{circuit.supply:g} V, "
         f"{len(circuit.resistors)} resistors, {len(circuit.capacitors)} capacitors, "
@@ -150,9 +150,10 @@ def _nodes(circuit: Circuit) -> tuple[str, ...]:
         f"{net} {'dx' if i % 2 else 'x'}{i // 2 + 1}{'/dt' if i % 2 else ''}"
         for i, net in enumerate(circuit.state_nets)
     ]
+    zones = circuit.dead_zones
     names = {
-        stop.output: f"dead zone {stop.clearance}" if len(circuit.stops) > 1 else "nonlinear stage"
-        for stop in circuit.stops
+        zone.output: f"dead zone {zone.clearance}" if len(zones) > 1 else "nonlinear stage"
+        for zone in zones
     }
     stages = [f"{net} output of the {name}" for net, name in names.items()]
     return (

@@ -100,7 +100,7 @@ def synthesise(
 def with_stage(modelfile: ModelFile, kind: DeadZone | None = None) -> ModelFile:
     """The model file with this stage stated; the kind that is built without one, if None."""
     spec = modelfile.circuit
-    kind = kind or stage_kind(spec, modelfile.model.second_order().clearances)
+    kind = kind or stage_kind(spec, modelfile.model.second_order().dead_zones)
     return replace(modelfile, circuit=replace(spec, dead_zone=kind))
 
 

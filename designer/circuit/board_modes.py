@@ -25,7 +25,7 @@ def first_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
     def moved(key: ModeKey) -> int:
         pairs = zip(circuit.switches, key, circuit.open, strict=True)
         turned = {name for name, here, there in pairs if here != there}
-        return sum(not turned.isdisjoint(stop.switches) for stop in circuit.stops)
+        return sum(not turned.isdisjoint(stop.switches) for stop in circuit.dead_zones)
 
     return tuple(key for key in circuit.working if moved(key) <= 1)
 
@@ -195,7 +195,7 @@ class BoardModes:
             out.guard[:, k, g], out.clearance[k, g] = way.row, way.clearance
 
 
-OF_EACH = ("A", "B", "d", "guard", "past", "good", "displacement", "velocity")
+OF_EACH = ("A", "B", "quadrature", "d", "guard", "past", "good", "displacement", "velocity")
 """What of ``kernel.Modes`` has an axis of boards."""
 
 

@@ -20,7 +20,8 @@ from designer.circuit.reference_rails import RAILS, ReferenceRails
 from designer.circuit.resistors import Composite, Resistors
 from designer.circuit.stop import Stop
 from designer.circuit.terms import Term, inverted_states, terms as input_terms
-from designer.model.mechanics import Clearance, MechanicalModel
+from designer.model.clearance import Clearance
+from designer.model.mechanics import MechanicalModel
 
 GENERATOR = Generator("VM1", "vg")
 INVERSE = f"{GENERATOR.net}n"
@@ -54,16 +55,16 @@ def circuit_of(
     saturation : output limit [V] of every pin in this circuit; None: the op-amp's own, by its load.
     """
     system = model.second_order()
-    force = system.drive_force(system.own_frequency)
-    matrices = system.damping.tolist(), system.stiffness.tolist(), force.tolist()
+    force, wired = system.drive_force(system.own_frequency), system.wired
+    matrices = wired.damping.tolist(), wired.stiffness.tolist(), force.tolist()
     return build(
         input_terms(*matrices),
         values,
         opamp,
         supply=supply,
         saturation=saturation,
-        clearances=system.clearances,
-        constants=system.constant.tolist(),
+        clearances=system.dead_zones,
+        constants=wired.constant.tolist(),
         stage=stage,
         composites=composites,
     )
@@ -86,9 +87,9 @@ def build(
     saturation : as of ``circuit_of``.
     values : ohm and farad by part name; holds R100 … for the inverters and, for each clearance, R50
     and the resistors of the dead-zone stage (``dead_zone_place``).
-    clearances : each gets a nonlinear stage. constants : the constant force on each mass, of which
-    only the sign counts here. stage : of the dead zones. composites : resistors NAME made of two,
-    whose values are those of NAMEA and NAMEB.
+    clearances : each gets a nonlinear stage; bends come last. constants : the constant force on
+    each mass, of which only the sign counts here. stage : of the dead zones. composites : resistors
+    NAME made of two, whose values are those of NAMEA and NAMEB.
 
     Raises
     ------
@@ -127,7 +128,8 @@ def build(
         generator=GENERATOR,
         states=tuple(f"C{i + 1}" for i in range(2 * masses)),
         state_nets=tuple(f"v{i + 1}" for i in range(2 * masses)),
-        stops=tuple(stops),
+        stops=tuple(stop for stop in stops if not stop.bend_of),
+        bends=tuple(stop for stop in stops if stop.bend_of),
         opamp=opamp.name,
         gain=opamp.gain.typ or 1e5,
         bias=opamp.bias.typ or 0.0,
@@ -174,7 +176,8 @@ def _integrator(
         if t.state == state:
             parts += resistors(t.resistor, _source(t), node, _role(t))
     for place in places if state % 2 else ():
-        force = f"stop force on M{mass + 1}"
+        bends = place.clearance.bend_of
+        force = f"force of {bends} on M{mass + 1}" if bends else f"stop force on M{mass + 1}"
         if place.clearance.mass == mass:
             parts += resistors(place.part("R50"), place.output, node, force)
         if place.clearance.other == mass:

@@ -108,7 +108,7 @@ def coefficient_errors(
     """
     reduction = Reduction(circuit, board or nominal_board(circuit, ideal=True))
     rest = reduction.system().mode(circuit.open)
-    zones = [DeadZoneReading.of(reduction, k, c) for k, c in enumerate(model.clearances)]
+    zones = [DeadZoneReading.of(reduction, k, c) for k, c in enumerate(model.dead_zones)]
     realised = rest.A
     for zone in zones:
         realised = realised - zone.leftover
@@ -124,13 +124,13 @@ def coefficient_errors(
     amplitude = 1.0
     if lead is not None:
         side, gap = lead.first_gap
-        amplitude = abs(lead.thresholds[side] / gap) / float(relative[2 * lead.clearance.mass])
+        amplitude = abs(lead.thresholds[side] / gap) / float(relative[lead.clearance.watched])
     elif swing is not None:
         amplitude = swing[0] / float((swing[1] * relative).max())
     for zone in zones:
-        errors |= _flatness(zone, model, wanted, several=len(zones) > 1)
+        errors |= _flatness(zone, model, several=len(zones) > 1)
     scales = _scales(float(np.exp(logs[0])), amplitude * relative, zones)
-    if model.constant.any():
+    if model.wired.constant.any():
         errors |= _constants(rest.d, zones, lead, model, scales)
     drive = -rest.B * scales.seconds / scales.volts
     return CoefficientErrors(
@@ -166,22 +166,24 @@ def _log(value: float, want: float) -> float:
 def _slopes(
     zone: DeadZoneReading, model: SecondOrderSystem, *, several: bool
 ) -> dict[str, _Coefficient]:
-    """The force of each stop on each mass, by each displacement."""
+    """The force of each stop on each mass, by each displacement, or velocity."""
     clearance = zone.clearance
     row = model.displacement(clearance)
     masses = [i for i in (clearance.mass, clearance.other) if i is not None]
     stops = dict(clearance.sides)
-    out = {}
+    out, prime = {}, "'" if clearance.quantity == "velocity" else ""
     for side, slope in zone.slopes.items():
-        words = {0: "stop slope", 1: "upper stop slope", -1: "lower stop slope"}
+        kind = "bend slope" if clearance.bend_of else "stop slope"
+        words = {0: kind, 1: f"upper {kind}", -1: f"lower {kind}"}
         stiffness = (clearance.first if side == 0 else stops[side]).stiffness
         for i in masses:
             for j in masses:
                 own = i == j == clearance.mass
                 name = words[side] + (f" {clearance.name}" if several else "")
-                name += "" if own else f" x{i + 1}' x{j + 1}"
+                name += "" if own else f" x{i + 1}' x{j + 1}{prime}"
                 want = -stiffness * row[i] * row[j] / model.mass[i]
-                out[name] = _entry(2 * i + 1, 2 * j, slope[2 * i + 1, 2 * j], want)
+                column = clearance.watched + 2 * (j - clearance.mass)
+                out[name] = _entry(2 * i + 1, column, slope[2 * i + 1, column], want)
     return out
 
 
@@ -195,14 +197,16 @@ def _gaps(zones: list[DeadZoneReading], lead: DeadZoneReading) -> dict[str, _Coe
     for zone in zones:
         if len(zones) == 1 and zone.clearance.upper == zone.clearance.lower:
             continue
+        own, unit_state = zone.clearance.watched, lead.clearance.watched
         for side, stop in zone.clearance.sides:
             if not stop.gap or (zone is lead and side == first):
                 continue
             ratio = zone.thresholds[side] / abs(lead.thresholds[first])
-            weights = {1 + 2 * zone.clearance.mass: 0.0, 1 + 2 * lead.clearance.mass: 0.0}
-            weights[1 + 2 * zone.clearance.mass] -= 1.0
-            weights[1 + 2 * lead.clearance.mass] += 1.0
-            name = f"gap {zone.clearance.name} {'upper' if side > 0 else 'lower'}"
+            weights = {1 + own: 0.0, 1 + unit_state: 0.0}
+            weights[1 + own] -= 1.0
+            weights[1 + unit_state] += 1.0
+            kind = "bend" if zone.clearance.bend_of else "gap"
+            name = f"{kind} {zone.clearance.name} {'upper' if side > 0 else 'lower'}"
             out[name] = _Coefficient(_log(ratio, stop.gap / abs(unit)), weights)
     return out
 
@@ -232,15 +236,11 @@ def _scale_slopes(
 
 
 def _flatness(
-    zone: DeadZoneReading, model: SecondOrderSystem, wanted: Array, *, several: bool
+    zone: DeadZoneReading, model: SecondOrderSystem, *, several: bool
 ) -> dict[str, float]:
     """What the stage leaves inside its clearance: stiffness and, with one stop, a constant."""
-    mass = zone.clearance.mass
-    own = -wanted[2 * mass + 1, 2 * mass]
-    shares = [
-        stop.stiffness / own / model.mass[mass] * zone.nulls[side]
-        for side, stop in zone.clearance.sides
-    ]
+    own = model.own_slope(zone.clearance) or abs(zone.clearance.first.stiffness)
+    shares = [stop.stiffness / own * zone.nulls[side] for side, stop in zone.clearance.sides]
     end = f" {zone.clearance.name}" if several else ""
     out = {f"dead-zone null{end}": float(max(shares, key=abs))}
     if len(zone.thresholds) == 1 and zone.clearance.first.gap:
@@ -250,7 +250,7 @@ def _flatness(
 
 def _scales(seconds: float, volts: Array, zones: list[DeadZoneReading]) -> Scales:
     """Thresholds of the first clearance are those that the circuit has."""
-    if not zones:
+    if not zones or zones[0].clearance.bend_of:
         return Scales(seconds, volts, float("nan"))
     clearance, thresholds = zones[0].clearance, zones[0].thresholds
     lower, middle = thresholds.get(-1, float("nan")), 0.0
@@ -275,8 +275,8 @@ def _constants(
     if lead is None:
         units = np.full(model.size, np.abs(model.drive_force(model.own_frequency)).max())
     else:
-        units = np.diag(model.stiffness) * abs(lead.first_gap[1])
+        units = np.diag(model.spanning_stiffness) * abs(lead.first_gap[1])
     return {
         f"constant x{i + 1}": float((forces[i] - model.constant[i]) / units[i])
-        for i in np.flatnonzero(model.constant).tolist()
+        for i in np.flatnonzero(model.wired.constant).tolist()
     }

@@ -20,7 +20,8 @@ from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, Refe
 from designer.circuit.resistors import Resistors
 from designer.circuit.stop import Contact, Stop
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import Clearance, MechanicalModel, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.mechanics import MechanicalModel
 
 Kind = Literal["saturation", "rectifier"]
 _RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a file says nothing)'
@@ -52,7 +53,7 @@ class DeadZoneStage:
                 clearance,
                 index,
                 alone,
-                inverts=self.kind == "rectifier" and index not in self.apart,
+                inverts=(self.kind == "rectifier" and index not in self.apart) != clearance.falls,
                 apart=index in self.apart,
             )
             for index, clearance in enumerate(clearances)
@@ -75,18 +76,19 @@ class DeadZoneStage:
             return _saturation(place, resistors)
         if self.diode is None:
             raise InputError(None, "dead zone", "no diode", "a diode, for a rectifier")
+        if place.clearance.limits:
+            return _limiter(place, resistors, rails, diode_model(self.diode))
         return _rectifier(place, resistors, rails, diode_model(self.diode))
 
     def refused(self, clearance: Clearance) -> InputError | None:
         """Why the stage cannot make this clearance; None if it can."""
         name, stops = clearance.name, [stop for _, stop in clearance.sides]
-        for side, stop in clearance.sides:
-            if stop.further:
-                found = "a stop that stiffens in steps"
-                return InputError(None, f"clearance {name}", found, _as_clearances(side, stop))
         if self.kind == "rectifier":
             return None
-        if any(stop.gap <= 0.0 for stop in stops):
+        if clearance.bend_of:
+            found = f'"saturation", with bends of {clearance.bend_of}'
+            expected = f"{_RECTIFIER}; an amplifier that clips makes a clearance alone"
+        elif any(stop.gap <= 0.0 for stop in stops):
             found = f'"saturation", with the stop of clearance {name} in contact at rest'
             expected = f"{_RECTIFIER}; an amplifier that clips is linear where nothing moves"
         elif len(stops) == 2 and stops[0] != stops[1]:
@@ -95,13 +97,6 @@ class DeadZoneStage:
         else:
             return None
         return InputError(None, "circuit.dead_zone", found, expected)
-
-
-def _as_clearances(side: int, stop: Side) -> str:
-    """What to write for a stop that stiffens in steps."""
-    word = "upper" if side > 0 else "lower"
-    steps = ", ".join(f"{word} = {gap:.6g} with stiffness = {k:.6g}" for gap, k in stop.springs)
-    return f"one [[clearance]] for each step, at the same place: {steps}"
 
 
 def stage_kind(spec: CircuitSpec, clearances: Sequence[Clearance]) -> Kind:
@@ -125,13 +120,13 @@ def dead_zone_stage(
     InputError : the catalogue has no such diode or reference.
     """
     system = model.second_order()
-    kind = stage_kind(spec, system.clearances)
+    kind = stage_kind(spec, system.dead_zones)
     if kind == "rectifier":
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-        indices = range(len(system.clearances))
+        indices = range(len(system.dead_zones))
         apart = frozenset(i for i in indices if all(part_of(i, name) in parts for name in SUM))
         return DeadZoneStage(kind, diode, reference, apart)
-    if system.constant.any():
+    if system.wired.constant.any():
         return DeadZoneStage(kind, None, catalog.reference(spec.reference))
     return DeadZoneStage(kind)
 
@@ -249,13 +244,53 @@ def _rectifier(
     """
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    beside = place.clearance.which == "both" and not place.apart
+    beside = place.shared
     for side, stop in place.clearance.sides:
         half = half_names(place, side)
         parts += _half(place, half, side, stop, resistor, rails, model, beside=beside)
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
     # The amplifier that sums is linear, so it is none of the stop's switches.
     return [*parts, *place.summed(resistor)], _stop(place, contacts, parts)
+
+
+def _limiter(
+    place: DeadZonePlace, resistor: Resistors, rails: ReferenceRails, model: DiodeModel
+) -> tuple[list[Part], Stop]:
+    """Two half-wave rectifiers, one behind the other, for a force that rises between two places and
+    stays there: the first gives nothing past the upper place, the second nothing below the lower.
+
+    With G = R202/R200, H = R205/R203 and the places a and b above and below rest the first gives
+    G (a - v) up to a, the second G H (v + b) from -b on and G H (a + b) beyond a. So the output is
+    flat beyond both places whatever the parts, and G H b at rest, which a constant force takes
+    away (``SecondOrderSystem.wired``).
+    """
+    parts: list[Part] = []
+    contacts: dict[int, Contact] = {}
+    between, role = place.net("fu"), "limiter"
+    for side, source, output in ((1, place.displacement, between), (-1, between, place.output)):
+        half = half_names(place, side)
+        word = "upper" if side > 0 else "lower"
+        parts += [
+            _section(half.section, half.node, half.output, f"{word} end of the {role}"),
+            *resistor(half.source, source, half.node, f"{word} end of the {role}"),
+        ]
+        if _limiter_threshold(place.clearance, side):
+            parts += resistor(half.threshold, RAILS[-1], half.node, f"{word} end of the {role}")
+        parts += [
+            *resistor(half.feedback, half.node, output, f"{word} end of the {role}"),
+            _diode(half.series, half.output, output, 1, model, True, f"{word} end of the {role}"),
+            _diode(half.clamp, half.node, half.output, 1, model, False, f"clamp of the {role}"),
+        ]
+        contacts[side] = Contact(half.series, 0, ((half.clamp, 1),))
+    parts += rails(-1, f"reference of the {role}", "feed of the reference, lower half")
+    return parts, _stop(place, contacts, parts)
+
+
+def _limiter_threshold(clearance: Clearance, side: int) -> float:
+    """What the threshold of one half of a limiter is, before the gains, in the model's unit: the
+    place above rest, then the distance of both places."""
+    ends = dict(clearance.sides)
+    return ends[1].gap if side > 0 else ends[1].gap + ends[-1].gap
 
 
 def _half(
@@ -298,7 +333,9 @@ def _half(
 
 def reference_sign(place: DeadZonePlace, side: int, stop: Side) -> int:
     """Sign of the reference that sets a threshold of a rectifier: of the side on which the stage
-    meets the stop, of a preloaded stop the other."""
+    meets the stop, of a preloaded stop the other. Both of a limiter are negative."""
+    if place.clearance.limits:
+        return -1
     return place.acting(side) if stop.gap >= 0.0 else -place.acting(side)
 
 
@@ -306,12 +343,14 @@ def _stop(place: DeadZonePlace, contacts: Mapping[int, Contact], parts: Sequence
     clearance = place.clearance
     return Stop(
         clearance.name,
-        f"C{2 * clearance.mass + 1}",
+        f"C{clearance.watched + 1}",
         contacts.get(1),
         contacts.get(-1),
         place.output,
         tuple(part.name for part in parts if isinstance(part, Section | Diode)),
         place.difference,
+        clearance.bend_of,
+        clearance.limits,
     )
 
 
@@ -326,7 +365,7 @@ def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tupl
     composite's as one. Empty where no clearance has both halves on one output.
     """
     out = {}
-    for index, stop in enumerate(circuit.stops):
+    for index, stop in enumerate(circuit.dead_zones):
         if circuit.diodes and len(stop.contacts) == 2:
             for side in (1, -1):
                 driving, idle = (half_parts(index, end) for end in (side, -side))

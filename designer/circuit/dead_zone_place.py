@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from designer.circuit.netlist import GROUND, Part, Section
 from designer.circuit.resistors import Resistors
-from designer.model.mechanics import Clearance
+from designer.model.clearance import Clearance
 
 OUTPUT = "fv"
 """Net of a stage's output where there is one clearance."""
@@ -40,7 +40,8 @@ class DeadZonePlace:
     alone: bool
     """Whether there is no other."""
     inverts: bool
-    """Whether the stage works on the displacement's negative."""
+    """Whether the stage works on the displacement's negative: a rectifier does, whose output then
+    has the displacement's sign, unless something inverts it or its stiffness takes from a slope."""
     apart: bool = False
     """Whether each half of a rectifier has an output of its own, which an inverting amplifier
     sums: a half then drives nothing of the other one, however unequal they are."""
@@ -66,9 +67,16 @@ class DeadZonePlace:
         """Net that a half of a rectifier drives, 1 upper or -1 lower."""
         return self.net("fu" if side > 0 else "fl") if self.apart else self.output
 
+    @property
+    def shared(self) -> bool:
+        """Whether the two halves of a rectifier drive one output."""
+        clearance = self.clearance
+        return clearance.which == "both" and not (self.apart or clearance.limits)
+
     def acting(self, side: int) -> int:
-        """The side on which the stage meets this stop: the other one where what follows inverts."""
-        return -side if self.apart else side
+        """The side on which the stage meets this stop: the other one where it works on the
+        displacement itself."""
+        return side if self.inverts else -side
 
     @property
     def sum_resistors(self) -> tuple[str, ...]:
@@ -98,7 +106,7 @@ class DeadZonePlace:
     def displacement(self) -> str:
         """Net of the displacement in the clearance, or its negative where the stage inverts."""
         sign = "n" if self.inverts else ""
-        own = f"v{2 * self.clearance.mass + 1}"
+        own = f"v{self.clearance.watched + 1}"
         return own + sign if self.clearance.other is None else self.net(f"z{sign}")
 
     @property
@@ -111,19 +119,19 @@ class DeadZonePlace:
     @property
     def inverted_state(self) -> int | None:
         """Index of the state whose negative the stage needs; None where it needs none."""
-        mass, other = self.clearance.mass, self.clearance.other
+        own, other = self.clearance.watched, self.clearance.watched_other
         if other is None:
-            return 2 * mass if self.inverts else None
-        return 2 * other if self.inverts else 2 * mass
+            return own if self.inverts else None
+        return other if self.inverts else own
 
     def between(self, resistors: Resistors) -> list[Part]:
         """The amplifiers of a clearance between two masses: one subtracts the displacements, one
         turns the stage's output for the other mass. None for a clearance to ground."""
-        if self.clearance.other is None:
+        if self.clearance.watched_other is None:
             return []
-        own, other = (f"v{2 * i + 1}" for i in (self.clearance.mass, self.clearance.other))
+        own, other = f"v{self.clearance.watched + 1}", f"v{self.clearance.watched_other + 1}"
         first, second = (own, f"{other}n") if self.inverts else (f"{own}n", other)
-        role = f"displacement in clearance {self.clearance.name}"
+        role = f"{self.clearance.quantity} in clearance {self.clearance.name}"
         back, node, turned = "reaction on the other mass", self.net("dz"), self.net("df")
         out = self.displacement
         return [

@@ -1,4 +1,7 @@
-"""What the reduction of a board says of one dead-zone stage: slopes, thresholds, what it leaves."""
+"""What the reduction of a board says of one dead-zone stage: slopes, thresholds, what it leaves.
+
+Of a dead zone of velocities what is said of displacements holds of velocities.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.reduction import Reduction
-from designer.model.mechanics import Clearance
+from designer.model.clearance import Clearance
 
 
 class CutShort(ArithmeticError):
@@ -54,9 +57,9 @@ class DeadZoneReading:
         CutShort : the open mode does not hold up to where contact begins.
         """
         c = reduction.circuit
-        stop = c.stops[index]
+        stop = c.dead_zones[index]
         system = reduction.system()
-        state, row = c.states.index(stop.state), c.states.index(stop.state) + 1
+        state, row = c.states.index(stop.state), 2 * clearance.mass + 1
         rest, inside = system.mode(c.open), reduction.solution(c.open).voltage[stop.output]
         flat = float(inside[state])
         slopes: dict[int, Array] = {}
@@ -67,20 +70,20 @@ class DeadZoneReading:
         for side, contact in stop.contacts:
             key = c.carrying(contact)
             steep = float(reduction.solution(key).voltage[stop.output][state])
-            per_gain = (system.mode(key).A - rest.A) / (steep - flat)
-            switch = c.switches.index(contact.switch)
-            guard = next(g for g in rest.guards if g.target[switch] == contact.position)
-            end = -guard.e / float(guard.C[state])
+            change = system.mode(key).A - rest.A
+            per_gain = change / (steep - flat)
+            end = reduction.threshold(stop, contact)
             _stays_linear(reduction, index, end, contact.switch)
-            if not thresholds:
+            if not thresholds and not stop.limits:
                 leftover = flat * per_gain
                 constant = float(inside[-1]) * per_gain[:, state]
                 spring = abs(float((rest.A - leftover)[row, state]))
                 bias = float(inside[-1] * per_gain[row, state]) / (spring * abs(end) or np.inf)
             thresholds[side] = side * end
-            nulls[side] = float(np.log1p(-flat / steep))
             one = stop.shared or len(stop.contacts) == 1
-            slopes.setdefault(0 if one else side, steep * per_gain)
+            left, own = (steep, flat) if stop.limits else (flat, steep)
+            nulls[side] = float(np.log1p(-left / own))
+            slopes.setdefault(0 if one else side, change if stop.limits else steep * per_gain)
         return cls(clearance, leftover, constant, slopes, nulls, bias, thresholds)
 
 
@@ -88,8 +91,9 @@ def _stays_linear(reduction: Reduction, index: int, end: float, ends: str) -> No
     """The open mode has to hold up to where contact begins, at ``end`` [V], whatever the stages of
     other clearances do there."""
     c = reduction.circuit
-    state = c.states.index(c.stops[index].state)
-    others = {name for k, stop in enumerate(c.stops) if k != index for name in stop.switches}
+    zones = c.dead_zones
+    state = c.states.index(zones[index].state)
+    others = {name for k, stop in enumerate(zones) if k != index for name in stop.switches}
     for guard in reduction.system().mode(c.open).guards:
         pairs = zip(c.switches, c.open, guard.target, strict=True)
         switch = next(name for name, here, there in pairs if here != there)

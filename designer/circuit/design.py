@@ -151,16 +151,20 @@ class Design:
         """(clearances,) volts per unit in each clearance, of its first mass and the difference
         amplifier before its stage. volts (masses,) : per unit of each mass."""
         stops = self.model.second_order().clearances
-        return self.clearance_gains * volts[[stop.mass for stop in stops]]
+        return self.dead_zone_gains[: len(stops)] * volts[[stop.mass for stop in stops]]
 
     @cached_property
-    def clearance_gains(self) -> Array:
-        """(clearances,) volts of the displacement in each clearance per volt of its first mass's:
-        the gain of a difference amplifier, 1 without one."""
+    def dead_zone_gains(self) -> Array:
+        """(dead zones,) volts of the displacement in each per volt of its first mass's: the gain
+        of a difference amplifier, 1 without one."""
         reduction = Reduction(self.circuit, nominal_board(self.circuit, ideal=True))
-        rows = reduction.system().displacement
-        places = [self.circuit.states.index(stop.state) for stop in self.circuit.stops]
-        return np.array([float(row[place]) for row, place in zip(rows, places, strict=True)])
+        solved = reduction.solution(self.circuit.open)
+        gains = []
+        for zone in self.circuit.dead_zones:
+            place = self.circuit.states.index(zone.state)
+            net, sign = zone.difference or (self.circuit.state_nets[place], 1)
+            gains.append(sign * float(solved.voltage[net][place]))
+        return np.array(gains)
 
     def thresholds(self, number: int) -> dict[int, float]:
         """The displacement [V] at which contact begins, by side (1 upper, -1 lower), as a distance

@@ -251,6 +251,8 @@ class Circuit:
     """The catalogue's entry of the op-amp, for models above the ideal one."""
     saturation_load: float | None = field(default=None, repr=False)
     """Load that ``saturation`` is reached into [ohm]; None: each output's own, whatever it is."""
+    bends: tuple[Stop, ...] = ()
+    """How the dead zones show that are no clearance (``Clearance.bend_of``)."""
     fittings: tuple[Fitting, ...] = ()
     """Parts of the board and the bill that are not simulated (``board.board_parts``)."""
 
@@ -352,10 +354,15 @@ class Circuit:
         """The rails that a part other than an op-amp is connected to."""
         return tuple(r for r in self.rails if r.net in self.nets)
 
+    @cached_property
+    def dead_zones(self) -> tuple[Stop, ...]:
+        """Every dead zone that has a stage: the clearances, then the others."""
+        return (*self.stops, *self.bends)
+
     @property
     def stage_outputs(self) -> tuple[str, ...]:
-        """Nets of the dead-zone stages' outputs, in the order of the stops."""
-        return tuple(stop.output for stop in self.stops)
+        """Nets of the dead-zone stages' outputs, in the order of ``dead_zones``."""
+        return tuple(stop.output for stop in self.dead_zones)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -381,7 +388,7 @@ class Circuit:
     @cached_property
     def open(self) -> tuple[int, ...]:
         """Position of each switch with every clearance open."""
-        contacts = [contact for stop in self.stops for _, contact in stop.contacts]
+        contacts = [contact for stop in self.dead_zones for _, contact in stop.contacts]
         moved = {
             name: int(position == 0)
             for contact in contacts
@@ -394,10 +401,10 @@ class Circuit:
         return self._moved(self.open, dict([(contact.switch, contact.position), *contact.others]))
 
     def in_contact(self, sides: Sequence[int]) -> tuple[int, ...]:
-        """Position of each switch while each stop carries force on this side, 1 or -1, or is open,
-        0."""
+        """Position of each switch while each dead zone carries force on this side, 1 or -1, or is
+        open, 0; those that are not told are open."""
         moved: dict[str, int] = {}
-        for stop, side in zip(self.stops, sides, strict=True):
+        for stop, side in zip(self.dead_zones, sides, strict=False):
             if side:
                 contact = dict(stop.contacts)[side]
                 moved |= dict([(contact.switch, contact.position), *contact.others])
@@ -411,8 +418,8 @@ class Circuit:
     def working(self) -> tuple[tuple[int, ...], ...]:
         """Position of each switch in the modes between which a good board moves, the open one
         first: each clearance open, or on the way into a contact one switch after the other,
-        whatever the others do."""
-        ways = [[turned for way in stop for turned in way] for stop in self._ways]
+        whatever the others do. The bends of a law, or of a stop, follow each other."""
+        ways = [[turned for way in chain for turned in way] for chain in self._ways]
         return tuple(dict.fromkeys(self._turned(each) for each in product(*ways)))
 
     @cached_property
@@ -426,20 +433,27 @@ class Circuit:
 
     @cached_property
     def _ways(self) -> list[list[list[dict[str, int]]]]:
-        """For each clearance the positions of its switches: open, then on the way into each
-        contact."""
-        out = []
-        for stop in self.stops:
-            ways: list[list[dict[str, int]]] = [[{}]]
-            for _, contact in stop.contacts:
-                turned: dict[str, int] = {}
+        """For each clearance, or each law, the positions of its switches: open, then on the way
+        into each contact, then past each further bend on that side."""
+        chains: dict[str, list[Stop]] = {stop.clearance: [stop] for stop in self.stops}
+        for bend in self.bends:
+            chains.setdefault(bend.bend_of, []).append(bend)
+        return [self._ways_along(chain) for chain in chains.values()]
+
+    @staticmethod
+    def _ways_along(chain: Sequence[Stop]) -> list[list[dict[str, int]]]:
+        """chain : dead zones of one displacement, the first to be met first."""
+        ways: list[list[dict[str, int]]] = [[{}]]
+        for side in (1, -1):
+            turned: dict[str, int] = {}
+            contacts = (dict(stop.contacts).get(side) for stop in chain)
+            for contact in filter(None, contacts):
                 way = []
                 for switch, position in ((contact.switch, contact.position), *contact.others):
                     turned = {**turned, switch: position}
                     way.append(turned)
                 ways.append(way)
-            out.append(ways)
-        return out
+        return ways
 
     def _turned(self, turned: Iterable[Mapping[str, int]]) -> tuple[int, ...]:
         """Position of each switch with every clearance open, but for these."""
@@ -451,7 +465,7 @@ class Circuit:
         one-sided stage would be a second stop that the model does not have."""
         ends = {
             contact.position
-            for stop in self.stops
+            for stop in self.dead_zones
             for _, contact in stop.contacts
             if contact.switch == section.name
         }

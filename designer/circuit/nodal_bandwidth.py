@@ -74,7 +74,7 @@ class LaggingEquations(NodalEquations):
     def mirror(self) -> Array:
         """The outputs of the two halves of a stop change places."""
         out = super().mirror
-        for stop in self.circuit.stops:
+        for stop in self.circuit.dead_zones:
             pair = [self.states.index(s.output) for s in self._swinging if s.name in stop.switches]
             out[pair] = out[pair[::-1]]
         return out

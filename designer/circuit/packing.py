@@ -13,7 +13,7 @@ from dataclasses import replace
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import Circuit, Section
 from designer.circuit.stage_title import dead_zone_titles, section_stages
-from designer.circuit.stop import Contact
+from designer.circuit.stop import Contact, Stop
 
 QUAD = "ABCD"
 """Sections of the packages that the paper's names speak of."""
@@ -35,15 +35,8 @@ def packed(circuit: Circuit, opamp: OpAmp) -> Circuit:
             replace(part, name=names[part.name]) if isinstance(part, Section) else part
             for part in circuit.parts
         ),
-        stops=tuple(
-            replace(
-                stop,
-                upper=_moved(stop.upper, names),
-                lower=_moved(stop.lower, names),
-                switches=tuple(names.get(name, name) for name in stop.switches),
-            )
-            for stop in circuit.stops
-        ),
+        stops=_renamed(circuit.stops, names),
+        bends=_renamed(circuit.bends, names),
     )
 
 
@@ -102,6 +95,19 @@ def _related(circuit: Circuit, size: int) -> list[list[str]]:
 
 def _chunks(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
     return (names[i : i + size] for i in range(0, len(names), size))
+
+
+def _renamed(stops: Sequence[Stop], names: Mapping[str, str]) -> tuple[Stop, ...]:
+    """The same with the new names of their switches."""
+    return tuple(
+        replace(
+            stop,
+            upper=_moved(stop.upper, names),
+            lower=_moved(stop.lower, names),
+            switches=tuple(names.get(name, name) for name in stop.switches),
+        )
+        for stop in stops
+    )
 
 
 def _moved(contact: Contact | None, names: Mapping[str, str]) -> Contact | None:

@@ -19,7 +19,7 @@ from designer.circuit.board_values import Board
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import NodalEquations, Solution
 from designer.circuit.nodal_bandwidth import LaggingEquations
-from designer.circuit.stop import Stop
+from designer.circuit.stop import Contact, Stop
 from designer.dynamics.piecewise_linear import (
     Guard,
     Mode,
@@ -149,9 +149,10 @@ class Reduction:
         that is fed from a rail, are compared by what they do: the flow in contact, and where
         contact begins.
         """
-        if not self.board.mirror_symmetric or (self.circuit.references and not self.circuit.stops):
+        stops = self.circuit.dead_zones
+        if not self.board.mirror_symmetric or (self.circuit.references and not stops):
             return False
-        for stop in self.circuit.stops:
+        for stop in stops:
             if stop.upper is None or stop.lower is None:
                 return False
             if (self.circuit.supplies or not stop.shared) and not self._alike(stop):
@@ -164,15 +165,22 @@ class Reduction:
         c = self.circuit
         rest = self._mode(c.open)
         above, below = (self._mode(c.carrying(contact)) for contact in (stop.upper, stop.lower))
-        ends = sorted(-g.e for g in rest.guards if g.clearance == c.stops.index(stop))
+        ends = [self.threshold(stop, contact) for _, contact in stop.contacts]
         M, largest = self._equations.mirror, float(np.abs(above.d).max())
         return (
             _close(M @ above.A @ M.T, below.A, 0.0)
             and _close(M @ above.d, below.d, largest)
             and _close(M @ rest.d, rest.d, largest)
-            and len(ends) == 2
-            and ends[1] - ends[0] <= EVEN * abs(ends[1])
+            and abs(ends[0] + ends[1]) <= EVEN * abs(ends[0])
         )
+
+    def threshold(self, stop: Stop, contact: Contact) -> float:
+        """Voltage of a dead zone's state at which its contact begins, every other state at zero."""
+        c = self.circuit
+        switch = c.switches.index(contact.switch)
+        guards = self._mode(c.open).guards
+        guard = next(g for g in guards if g.target[switch] == contact.position)
+        return -guard.e / float(guard.C[c.states.index(stop.state)])
 
 
 def _close(a: Array, b: Array, scale: float) -> bool:

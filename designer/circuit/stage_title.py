@@ -12,7 +12,7 @@ SUPPLY, INTERFACE = "supply", "interface"
 REFERENCES = "references"
 """Stage of the references that serve more than one dead zone."""
 DEAD_ZONE = "dead zone"
-"""Stage of the dead zone; where there are several, the clearance's name follows."""
+"""Stage of the dead zone; where there are several, its name follows."""
 
 
 def section_stages(circuit: Circuit) -> dict[str, str]:
@@ -20,17 +20,17 @@ def section_stages(circuit: Circuit) -> dict[str, str]:
     known = {net: f"integrator {i}" for i, net in enumerate(circuit.state_nets, start=1)}
     known |= {f"{net}n": f"inverter {i}" for i, net in enumerate(circuit.state_nets, start=1)}
     out = {s.name: known.get(s.output, s.role or f"amplifier {s.name}") for s in circuit.sections}
-    for title, stop in zip(dead_zone_titles(circuit), circuit.stops, strict=True):
+    for title, stop in zip(dead_zone_titles(circuit), circuit.dead_zones, strict=True):
         inner = _inside(circuit, stop)
         out |= {s.name: title for s in circuit.sections if s.inverting in inner}
     return out
 
 
 def dead_zone_titles(circuit: Circuit) -> tuple[str, ...]:
-    """The stage of each stop's dead zone, in the order of the stops."""
-    if len(circuit.stops) == 1:
+    """The stage of each dead zone, in their order."""
+    if len(circuit.dead_zones) == 1:
         return (DEAD_ZONE,)
-    return tuple(f"{DEAD_ZONE} {stop.clearance}" for stop in circuit.stops)
+    return tuple(f"{DEAD_ZONE} {stop.clearance}" for stop in circuit.dead_zones)
 
 
 def stage_names(circuit: Circuit) -> dict[str, str]:

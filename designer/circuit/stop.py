@@ -26,7 +26,8 @@ class Stop:
     clearance: str
     """Its name."""
     state: str
-    """Name of the capacitor whose voltage is the displacement, or of two masses the first's."""
+    """Name of the capacitor whose voltage is the displacement, or of two masses the first's; of a
+    dead zone of velocities that of the velocity."""
     upper: Contact | None
     """How the upper stop shows; None where there is none."""
     lower: Contact | None
@@ -38,6 +39,10 @@ class Stop:
     difference: tuple[str, int] | None = None
     """Between two masses: the net that carries the difference of their displacements, and the sign
     that it has there, 1 or -1."""
+    bend_of: str = ""
+    """``Clearance.bend_of``."""
+    limits: bool = False
+    """``Clearance.limits``: the output changes between both contacts, and in none of them."""
 
     @cached_property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:

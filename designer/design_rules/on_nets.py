@@ -18,7 +18,7 @@ def feedback(s: RuleSubject) -> Iterator[Finding]:
     contact, for a diode may open the loop."""
     circuit = s.circuit
     keys = dict.fromkeys([circuit.rest, circuit.open])
-    for stop in circuit.stops:
+    for stop in circuit.dead_zones:
         keys |= dict.fromkeys(circuit.carrying(contact) for _, contact in stop.contacts)
     for key in keys:
         for section in circuit.sections:

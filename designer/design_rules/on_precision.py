@@ -12,6 +12,7 @@ from designer.circuit.netlist import Diode
 from designer.design_rules.rule_subject import RuleSubject
 from designer.synthesis.static_shifts import (
     Shifts,
+    far_slope as far_slope_of,
     largest_offset,
     leftovers,
     offset_forces,
@@ -122,7 +123,7 @@ def stiffness(s: RuleSubject) -> Iterator[Finding]:
     The resistors are spread evenly within the grades at which they are bought.
     """
     circuit, grades = s.circuit, s.resistor_grades
-    if not circuit.stops:
+    if not circuit.dead_zones:
         return
     units = _relative_stiffness(s)
     nominal = units * leftovers(circuit)
@@ -132,24 +133,49 @@ def stiffness(s: RuleSubject) -> Iterator[Finding]:
     }
     most = max(grades[name] for name in change)
     bought = " and ".join(f"{100 * g:g}" for g in sorted({grades[name] for name in change}))
-    for k, stop in enumerate(circuit.stops):
+    for k, stop in enumerate(circuit.dead_zones):
         shares = {name: float(c[k]) * (grades[name] / most) for name, c in change.items()}
         deviation = float(np.sqrt(sum(c**2 for c in shares.values()))) * most / np.sqrt(3.0)
         left = abs(float(nominal[k]))
         more = f"nominal {left:.2g}, deviation {deviation:.2g} at {bought} % resistors"
-        if len(circuit.stops) > 1:
-            more = f"clearance {stop.clearance}: {more}"
+        if len(circuit.dead_zones) > 1:
+            more = f"{'bend' if stop.bend_of else 'clearance'} {stop.clearance}: {more}"
         yield Finding(float(left + deviation), _most(shares), more=more)
 
 
+def far_slope(s: RuleSubject) -> Iterator[Finding]:
+    """Of each law that falls, what the parts leave of its last slopes: a standard deviation over
+    the nominal one. Where large slopes cancel, parts of 1 % leave little of it.
+
+    The parts are spread as for ``stiffness``.
+    """
+    circuit, grades = s.circuit, s.resistor_grades
+    zones = s.design.model.second_order().dead_zones
+    for chain in dict.fromkeys(zone.bend_of for zone in zones if zone.bend_of and zone.falls):
+        own = [zone for zone in zones if chain in (zone.bend_of, zone.name)]
+        for side in dict.fromkeys(side for zone in own for side in zone.positions):
+            nominal = far_slope_of(circuit, chain, side)
+            shares = {
+                r.name: (
+                    far_slope_of(circuit, chain, side, {r.name: r.value * (1.0 + STEP)}) - nominal
+                )
+                / STEP
+                * grades[r.name]
+                for r in circuit.resistors
+            }
+            deviation = float(np.sqrt(sum(c**2 for c in shares.values()) / 3.0))
+            relative = deviation / abs(nominal) if nominal else np.inf
+            word = "upper" if side > 0 else "lower"
+            yield Finding(relative, _most(shares), more=f"{chain}, beyond its {word} bends")
+
+
 def _relative_stiffness(s: RuleSubject) -> Array:
-    """(clearances,) stiffness of the stops, the mean of both, over that of the mass's springs."""
+    """(dead zones,) stiffness of the stops, the mean of both, over that of the mass's springs."""
     system = s.design.model.second_order()
     return np.array(
         [
-            np.mean([stop.stiffness for _, stop in clearance.sides])
-            / system.stiffness[clearance.mass, clearance.mass]
-            for clearance in system.clearances
+            np.mean([stop.stiffness for _, stop in zone.sides]) / system.own_slope(zone)
+            for zone in system.dead_zones
         ]
     )
 

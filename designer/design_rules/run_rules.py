@@ -48,6 +48,7 @@ LOOKS: dict[str, Look] = {
     "leakage-force": on_precision.leakage,
     "absorption-force": on_precision.absorption,
     "dead-zone-stiffness": on_precision.stiffness,
+    "far-slope": on_precision.far_slope,
 }
 """By id: yields what was found, one value for each place that the rule looks at."""
 

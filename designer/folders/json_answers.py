@@ -254,16 +254,16 @@ def _conditions(design: Design) -> dict[str, Any]:
 
 
 def _limit(circuit: Circuit) -> float:
-    """Output limit [V] of the section that makes the first stop; of a rectifier as stated."""
-    switches = [contact.switch for _, contact in circuit.stops[0].contacts]
+    """Output limit [V] of the section that makes the first dead zone; of a rectifier as stated."""
+    switches = [contact.switch for _, contact in circuit.dead_zones[0].contacts]
     return circuit.output_limits().get(switches[0], circuit.saturation)
 
 
 def _dead_zone(design: Design) -> dict[str, Any] | None:
-    if not design.circuit.stops:
+    if not design.circuit.dead_zones:
         return None
     errors = design.errors
-    slopes = [error for name, error in errors.errors.items() if "stop slope" in name]
+    slopes = [error for name, error in errors.errors.items() if " slope" in f" {name}"]
     return {
         "kind": "rectifier" if design.circuit.diodes else "saturation",
         "saturation": _limit(design.circuit),

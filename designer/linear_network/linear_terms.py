@@ -42,7 +42,7 @@ class Targets:
     @classmethod
     def of(cls, model: MechanicalModel) -> Targets:
         """Those of a model."""
-        return cls.from_state_matrix(model.second_order().state_matrix())
+        return cls.from_state_matrix(model.second_order().wired.state_matrix())
 
     @cached_property
     def entries(self) -> tuple[tuple[int, int], ...]:

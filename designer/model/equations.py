@@ -7,7 +7,7 @@ stands in a page, in Markdown and in a picture.
 
 from __future__ import annotations
 
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from designer.model.model import Dimensionless, Mechanical
 
 SYMBOLS = (

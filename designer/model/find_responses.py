@@ -17,9 +17,10 @@ from designer.dynamics.attractors import settle, starts, twin
 from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
+from designer.model.clearance import Clearance
 from designer.model.driven import model_flow
 from designer.model.force_law import Quantity
-from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem, check_omega
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem, check_omega
 from designer.model.model import Dimensionless, SiScales
 from designer.model.response_table import Response
 
@@ -158,7 +159,7 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
         unit = model.second_order().own_frequency
         rest = np.zeros(2 * model.second_order().size)
         runs = [(model, w * unit, settle(model_flow(model, w * unit), rest)) for w in SCOUT]
-    clearances = model.second_order().clearances
+    clearances = _watched(model.second_order())
     states, fastest = np.zeros(2 * model.second_order().size), 0.0
     reaches = [Reach() for _ in clearances]
     for variant, omega, orbit in runs:
@@ -173,7 +174,7 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
             spans.append(_Span(flow, orbit.start, extremes, 200))
         fastest = max(fastest, harmonics.fastest(flow, orbit))
         scale = model.b / variant.b  # the generator's amplitude follows b, the threshold stays
-        stops = variant.second_order().clearances
+        stops = _watched(variant.second_order())
         for span in spans:
             states = np.maximum(states, scale * np.abs(span.extremes).max(axis=1))
             reaches = [
@@ -181,6 +182,14 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
                 for j, (reach, stop) in enumerate(zip(reaches, stops, strict=True))
             ]
     return Peaks(states, tuple(reaches), fastest)
+
+
+def _watched(system: SecondOrderSystem) -> tuple[Clearance, ...]:
+    """What a circuit would make a stage of; the clearances where none could make all."""
+    try:
+        return system.dead_zones
+    except InputError:
+        return system.clearances
 
 
 def scale_of(model: MechanicalModel, omega: float) -> Array:
@@ -222,11 +231,16 @@ class _Span:
     periods: int
 
     def within(self, index: int, stop: Clearance) -> tuple[float, float]:
-        """Least and largest displacement in a clearance."""
+        """Least and largest displacement in a clearance, or velocity in a dead zone of those."""
         system = self.flow.system
-        rows = system.contact_rows(index)
-        side, row = next(iter(rows.items()))
-        row = side * row[:-1]  # over the states and the drive, without the gap
+        row = np.zeros(system.size + 1)  # over the states and the drive, without the gap
+        if stop.bend_of:
+            row[stop.watched] = 1.0
+            if stop.watched_other is not None:
+                row[stop.watched_other] = -1.0
+        else:
+            side, past = next(iter(system.contact_rows(index).items()))
+            row = side * past[:-1]
         used = np.flatnonzero(row)
         if len(used) == 1 and used[0] < system.size and row[used[0]] == 1.0:
             return float(self.extremes[used[0], 0]), float(self.extremes[used[0], 1])

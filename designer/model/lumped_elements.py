@@ -15,6 +15,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
+from designer.model.clearance import Side
 from designer.model.element_keys import GROUND, NAME, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
 from designer.model.law_elements import (
@@ -25,7 +26,6 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
-from designer.model.mechanics import Side
 from designer.model.waveforms import Waveform, series
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import one_of
+from designer.model.clearance import Clearance
 from designer.model.cubic_law import MOST_POINTS
 from designer.model.element_keys import GROUND
 from designer.model.force_law import ForceLaw
@@ -33,7 +34,7 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.lumped_elements import Elements, Gap, joined_by
-from designer.model.mechanics import Clearance, HarmonicForce, SecondOrderSystem
+from designer.model.mechanics import HarmonicForce, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")

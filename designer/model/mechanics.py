@@ -11,128 +11,20 @@ with the ground watch z + y.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import accumulate
-from typing import Literal, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.model.clearance import Clearance
+from designer.model.dead_zones import dead_zones
 from designer.model.force_law import ForceLaw, Quantity
-
-Sides = Literal["both", "upper", "lower"]
-POSITIONS: dict[Sides, tuple[int, ...]] = {"both": (1, -1), "upper": (1,), "lower": (-1,)}
-"""Contact positions that exist: 1 for the upper stop, -1 for the lower."""
-
-
-@dataclass(frozen=True)
-class Side:
-    """The stop on one side of a clearance: a spring that pushes back past a gap."""
-
-    gap: float
-    """Distance of the stop from the displacement zero; negative: in contact there."""
-    stiffness: float
-    """Stiffness of the stop."""
-    further: tuple[tuple[float, float], ...] = ()
-    """(depth, stiffness) of springs that join in deeper, by rising depth: a stop that stiffens in
-    steps."""
-    preload: float = 0.0
-    """Force with which it pushes as soon as it is touched: that of a spring that is held short."""
-    rise: float = 0.0
-    """Depth over which that force rises from 0; 0: it is there at once."""
-
-    @property
-    def own_springs(self) -> tuple[tuple[float, float], ...]:
-        """(displacement, stiffness) of every spring of the stop, the first met first."""
-        deeper = ((self.gap + depth, stiffness) for depth, stiffness in self.further)
-        return ((self.gap, self.stiffness), *deeper)
-
-    @property
-    def springs(self) -> tuple[tuple[float, float], ...]:
-        """The same with a preload that rises: a spring that joins in where the stop is touched, and
-        leaves again where the force has risen."""
-        if not self.rise:
-            return self.own_springs
-        joined: dict[float, float] = defaultdict(float)
-        steep = self.preload / self.rise
-        for place, stiffness in (*self.own_springs, (self.gap, steep)):
-            joined[place] += stiffness
-        joined[self.gap + self.rise] -= steep
-        return tuple(sorted(joined.items()))
-
-    @property
-    def jump(self) -> float:
-        """The preload, where it is there at once."""
-        return 0.0 if self.rise else self.preload
-
-    def scaled(self, factor: float) -> Side:
-        """The same with every length and the preload ``factor`` times as large."""
-        further = tuple((factor * depth, stiffness) for depth, stiffness in self.further)
-        lengths = factor * self.gap, self.stiffness, further
-        return Side(*lengths, factor * self.preload, factor * self.rise)
-
-
-@dataclass(frozen=True)
-class Clearance:
-    """A gap between a mass and ground, or between two masses, with stops on one side or both."""
-
-    name: str
-    """Its name, such as "A"."""
-    mass: int
-    """Index of the mass."""
-    other: int | None
-    """Index of the other mass; None for ground."""
-    upper: Side | None
-    """The stop that a positive displacement meets; None where there is none."""
-    lower: Side | None
-    """The stop that a negative displacement meets; None where there is none."""
-    damping: float = 0.0
-    """Of the stops, while they are in contact."""
-
-    @classmethod
-    def even(
-        cls, mass: int, stiffness: float, gap: float, sides: Sides = "both", name: str = "A"
-    ) -> Clearance:
-        """To ground, with the same stop on each side that has one."""
-        stop = Side(gap, stiffness)
-        ends = dict.fromkeys(POSITIONS[sides], stop)
-        return cls(name, mass, None, ends.get(1), ends.get(-1))
-
-    @property
-    def sides(self) -> tuple[tuple[int, Side], ...]:
-        """The sides that have a stop, 1 upper and -1 lower, each with its stop."""
-        pairs = ((1, self.upper), (-1, self.lower))
-        return tuple((position, stop) for position, stop in pairs if stop is not None)
-
-    @property
-    def positions(self) -> tuple[int, ...]:
-        """Sides that have a stop: 1 upper, -1 lower."""
-        return tuple(position for position, _ in self.sides)
-
-    @property
-    def which(self) -> Sides:
-        """The sides that have a stop, in a word."""
-        return next(word for word, ends in POSITIONS.items() if ends == self.positions)
-
-    @property
-    def first(self) -> Side:
-        """The upper stop, or the only one."""
-        return self.sides[0][1]
-
-    @property
-    def jumps(self) -> bool:
-        """Whether the force of a stop begins with a jump: a damper makes one, and a preload that
-        does not rise."""
-        return bool(self.damping) or any(stop.jump for _, stop in self.sides)
-
-    def scaled(self, factor: float) -> Clearance:
-        """The same with every length and preload ``factor`` times as large."""
-        upper, lower = (stop and stop.scaled(factor) for stop in (self.upper, self.lower))
-        return replace(self, upper=upper, lower=lower)
 
 
 @dataclass(frozen=True)
@@ -258,9 +150,27 @@ class SecondOrderSystem:
 
     def relative_stiffness(self, clearance: Clearance) -> float:
         """Stiffness of a clearance's upper stop, or its only one, over that of the springs on its
-        mass; k0/(1 - k0) of the paper's Eq. (5)."""
-        spring_stiffness = self.stiffness[clearance.mass, clearance.mass]
-        return float(clearance.first.stiffness / spring_stiffness)
+        mass; k0/(1 - k0) of the paper's Eq. (5). Of a dead zone of velocities that of the damper
+        over those of the dampers."""
+        own = self.own_slope(clearance)
+        return abs(clearance.first.stiffness) / own if own else np.inf
+
+    def own_slope(self, clearance: Clearance) -> float:
+        """Stiffness of the springs on the mass of a clearance, or damping of the dampers, with the
+        mean slope of every law."""
+        own = self.damping if clearance.quantity == "velocity" else self.stiffness
+        spanning = own + self._spanning(clearance.quantity)
+        return abs(float(spanning[clearance.mass, clearance.mass]))
+
+    @cached_property
+    def dead_zones(self) -> tuple[Clearance, ...]:
+        """Its nonlinear forces as a circuit makes them (``model.dead_zones``).
+
+        Raises
+        ------
+        InputError : a law that depends on more than one mass or the difference of two.
+        """
+        return dead_zones(self.clearances, self.laws)
 
     def natural_frequencies(self, *, closed: bool = False) -> Array:
         """(n,) undamped ones, ascending, in rad per unit of time; of a law its mean slope counts.
@@ -276,6 +186,29 @@ class SecondOrderSystem:
         root = np.sqrt(self.mass)
         squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    @cached_property
+    def wired(self) -> SecondOrderSystem:
+        """What a circuit's integrators and constant forces make of it: the linear part, without
+        what the stages of dead zones that limit (``Clearance.limits``) add to it at rest."""
+        stiffness, damping = self.stiffness.copy(), self.damping.copy()
+        constant = self.constant.copy()
+        for zone in self.dead_zones:
+            if zone.limits:
+                assert zone.lower is not None
+                row = self.displacement(zone)
+                own = damping if zone.quantity == "velocity" else stiffness
+                own += zone.first.stiffness * np.outer(row, row)
+                # The stage gives nothing below its lower end, so at rest it pushes back already.
+                constant -= zone.first.stiffness * zone.lower.gap * row
+        return replace(
+            self,
+            stiffness=_without_rounding(stiffness, self.stiffness),
+            damping=_without_rounding(damping, self.damping),
+            constant=_without_rounding(constant, self.constant),
+            clearances=(),
+            laws=(),
+        )
 
     def state_matrix(self) -> Array:
         """(2n, 2n) A of the open system; states x1, x1', x2, x2', … as in Eq. (10)."""
@@ -341,6 +274,12 @@ class SecondOrderSystem:
             continuous=not any(stop.jumps for stop in self.clearances),
             orders=None if waves is None else orders,
         )
+
+
+def _without_rounding(less: Array, whole: Array) -> Array:
+    """What is left of ``whole``, with zeros where that is rounding."""
+    rounding = 1e-12 * max(np.abs(less).max(initial=0.0), np.abs(whole).max(initial=0.0))
+    return np.where(np.abs(less) > rounding, less, 0.0)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ import numpy as np
 
 from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, check_values, choice, number, physical
-from designer.model.mechanics import Clearance, SecondOrderSystem, Sides
+from designer.model.clearance import Clearance, Sides
+from designer.model.mechanics import SecondOrderSystem
 
 TRIED = {
     "m": (1e-9, 1.0 - 1e-9),

@@ -154,7 +154,7 @@ LIMITS = (
         "friction, but as a [[friction]] of format 2",
         "`friction`, `mu`",
         "[[friction]] of format 2, whose force rises with the velocity until it slides; the force "
-        "is stated, no coefficient of a normal force; no circuit makes it",
+        "is stated, no coefficient of a normal force",
         tables=r"frictions|coulomb|stribeck|dry_friction",
         keys=r"\w*friction\w*|mu|mu_\w+|coulomb\w*|stribeck\w*|stick\w*",
     ),
@@ -169,8 +169,8 @@ LIMITS = (
     ModelLimit(
         "a spring that is not linear, but as a [[law]] or a [[cubic_spring]] of format 2",
         "`cubic`, `k3`, `exponent`",
-        "[[cubic_spring]] of format 2, or a [[law]] point by point; for a circuit a [[clearance]] "
-        "for each step of a stiffness that rises",
+        "[[cubic_spring]] of format 2, or a [[law]] point by point; a circuit makes up to eight "
+        "corners on each side of rest",
         tables=r"laws|cubics?|cubic_?springs|cubicspring|nonlinear\w*|duffing\w*|characteristics?",
         keys=r"cubic\w*|\w*_cubic|[Kk]_?3|[Kk]_?nl|nonlinear\w*|alpha|beta|gamma|duffing\w*|law|"
         r"exponent|power|points|curve|stiffness_?[2-9]",
@@ -279,8 +279,7 @@ LIMITS = (
     ModelLimit(
         "negative stiffness",
         '`stiffness = "-5 kN/m"`',
-        "a [[law]] or a [[cubic_spring]] of format 2, which may fall as long as it rises far out; "
-        "no circuit makes it",
+        "a [[law]] or a [[cubic_spring]] of format 2, which may fall as long as it rises far out",
         keys=r"\w*stiffness|[Kk][0-2]?|constant",
         of=(*MODELS, "spring", "clearance"),
         value=_is_negative,

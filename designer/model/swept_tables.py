@@ -16,7 +16,8 @@ from designer.dynamics.modal_tables import WORST_RESONANCE, Oscillators
 from designer.kernels import kernel_modal as kernel
 from designer.kernels.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
 from designer.kernels.kernel_modal import ModalTables
-from designer.model.mechanics import POSITIONS, MechanicalModel
+from designer.model.clearance import POSITIONS
+from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless
 
 

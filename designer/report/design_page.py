@@ -369,7 +369,7 @@ def _into(circuit: Circuit) -> str:
     if stage.load is None:
         return ""
     limits = circuit.output_limits()
-    meant = [contact.switch for stop in circuit.stops for _, contact in stop.contacts]
+    meant = [contact.switch for stop in circuit.dead_zones for _, contact in stop.contacts]
     own = {f"{name} {limits[name]:.4g} V" for name in meant if name in limits}
     return f" into {stage.load / 1e3:g} kΩ ({', '.join([stage.source, *sorted(own)])})"
 

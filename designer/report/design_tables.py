@@ -157,7 +157,7 @@ def _wanted(design: Design, name: str) -> str:
     if name.startswith(("dead-zone null", "dead-zone bias")):
         return "0"
     if name.endswith("stop slope"):
-        return words.number(system.relative_stiffness(system.clearances[0]))
+        return words.number(system.relative_stiffness(system.dead_zones[0]))
     return words.NONE
 
 

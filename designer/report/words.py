@@ -17,8 +17,10 @@ from designer.yields.yield_count import Yield
 NONE = "–"
 
 TERM = re.compile(r"x(\d+)('{1,2}) x(\d+)('?)")
-_SLOPE = re.compile(r"(?:(upper|lower) )?stop slope(?: (?!x\d+' x)(.+?))?(?: x(\d+)' x(\d+))?")
-_GAP = re.compile(r"gap (.+) (upper|lower)")
+_SLOPE = re.compile(
+    r"(?:(upper|lower) )?(stop|bend) slope(?: (?!x\d+' x)(.+?))?(?: x(\d+)' x(\d+)('?))?"
+)
+_GAP = re.compile(r"(gap|bend) (.+) (upper|lower)")
 _REST = re.compile(r"(dead-zone null|dead-zone bias|constant)(?: (.+))?")
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -63,17 +65,22 @@ def coefficient(name: str, spring: str = "K1") -> str:
         left, right = name.split()
         return f"{_pretty(right)} in the equation of {_pretty(left)}"
     if slope := _SLOPE.fullmatch(name):
-        side, clearance, row, column = slope.groups()
-        stop = f"{'a' if side is None else f'the {side}'} stop{_of(clearance)}"
-        if row is None:
-            return f"stiffness of {stop}, over {spring}"
-        return f"{_pretty(f'x{column}')} in the equation of {_pretty(f'x{row}')}″, by {stop}"
+        side, kind, zone, row, column, rate = slope.groups()
+        end = f"{'a' if side is None else f'the {side}'} {kind}{_of(zone)}"
+        if row is not None:
+            state = _pretty(f"x{column}{rate}")
+            return f"{state} in the equation of {_pretty(f'x{row}')}″, by {end}"
+        if kind == "bend":
+            return f"change of the slope at {end}"
+        return f"stiffness of {end}, over {spring}"
     if gap := _GAP.fullmatch(name):
-        return f"gap to the {gap[2]} stop{_of(gap[1])}, over the gap that sets the amplitude"
+        kind = "gap to the {2} stop" if gap[1] == "gap" else "place of the {2} bend"
+        end = kind.replace("{2}", gap[3]) + _of(gap[2])
+        return f"{end}, over the gap or the bend that sets the amplitude"
     if rest := _REST.fullmatch(name):
         return {
-            "dead-zone null": f"stiffness left inside the clearance{_of(rest[2])}, over {spring}",
-            "dead-zone bias": f"force left inside the clearance{_of(rest[2])}, over {spring} times "
+            "dead-zone null": f"slope left inside the dead zone{_of(rest[2])}, over {spring}",
+            "dead-zone bias": f"force left inside the dead zone{_of(rest[2])}, over {spring} times "
             "the threshold",
             "constant": f"constant force in the equation of {_pretty(rest[2] or '')}″",
         }[rest[1]]

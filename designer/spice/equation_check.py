@@ -154,7 +154,7 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
     rests = static_rests(design, model, responses)
     centre = _resonance(model)
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
-    curve = rests if design.circuit.stops else ()
+    curve = rests if _seen(design) else ()
 
     jobs = [_ac(design, rest, low, high) for rest in rests]
     jobs += [_dc(design, rest) for rest in curve]
@@ -168,7 +168,7 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
 
 
 def transfer(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) -> Complex:
-    """(k,) displacement of M1 per unit of drive at ``omega`` (k,), each clearance in contact with
+    """(k,) displacement of M1 per unit of drive at ``omega`` (k,), each dead zone in contact with
     this side or open (0)."""
     return np.array([_impedance(model, w, sides)[1][0] for w in omega])
 
@@ -182,14 +182,15 @@ def explained(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) ->
     error of its own: with v = x'/κ the equation is x''/κ + d v + … = force.
     """
     out = np.zeros(len(omega))
-    rows = [(model.displacement(c), c.mass) for c in model.clearances]
-    rows = rows or [(np.eye(model.size)[0], 0)]
+    rows = [(model.displacement(z), z.quantity, model.own_slope(z)) for z in model.dead_zones]
+    rows = rows or [(np.eye(model.size)[0], "displacement", float(model.stiffness[0, 0]))]
     for k, w in enumerate(omega):
         terms, right = _impedance(model, w, sides)
         left = np.linalg.inv(sum(terms))[0]
         size = sum(float((np.abs(left)[:, None] * np.abs(t) * np.abs(right)).sum()) for t in terms)
-        for row, mass in rows:
-            size += abs((left @ row) * model.stiffness[mass, mass] * (row @ right))
+        for row, quantity, slope in rows:
+            rate = w if quantity == "velocity" else 1.0
+            size += abs((left @ row) * rate * slope * (row @ right))
         size += float((np.abs(left)[:, None] * np.abs(terms[1]) * np.abs(right)).sum())
         out[k] = size / abs(right[0])
     return out
@@ -218,10 +219,10 @@ def _impedance(
         1j * omega * model.damping.astype(complex),
         model.stiffness.astype(complex),
     ]
-    for stop, side in zip(model.clearances, sides, strict=True):
+    for zone, side in zip(model.dead_zones, sides, strict=True):
         if side:
-            row = model.displacement(stop)
-            stiffness = dict(stop.sides)[side].stiffness
+            row = model.displacement(zone)
+            stiffness = dict(zone.sides)[side].stiffness
             terms.append((stiffness * np.outer(row, row)).astype(complex))
     return terms, np.linalg.solve(sum(terms), drive_of(model).astype(complex))
 
@@ -229,7 +230,7 @@ def _impedance(
 def _resonance(model: SecondOrderSystem) -> float:
     """ω at which the open system's M1 moves most, near the model's own frequency."""
     omega = model.own_frequency * np.geomspace(1e-2, 1e2, 4001)
-    still = (0,) * len(model.clearances)
+    still = (0,) * len(model.dead_zones)
     return float(omega[np.argmax(np.abs(transfer(model, omega, still)))])
 
 
@@ -274,7 +275,8 @@ def _deck(
         elif word == ".tran":
             line = "\n".join([*resting, analysis])
         elif word == ".save":
-            between = [stop.difference[0] for stop in circuit.stops if stop.difference is not None]
+            zones = circuit.dead_zones
+            between = [zone.difference[0] for zone in zones if zone.difference is not None]
             line = " ".join([line, *(f"v({net})" for net in between)])
         lines.append(line)
     return "\n".join(lines) + "\n"
@@ -330,7 +332,8 @@ def _dc(design: Design, resting: StaticRest) -> SpiceJob[Waveforms]:
     step = (last - first) / POINTS
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
-    pairs = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
+    zones = design.circuit.dead_zones
+    pairs = [(_moving(design, zones[k]), zones[k].output) for k in _seen(design)]
     nets = tuple(dict.fromkeys(net for pair in pairs for net in pair))
     text = _deck(design, "DC 0", card, near, resting.sides, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
@@ -368,21 +371,24 @@ def _curve(
 ) -> list[EquationFinding]:
     """Slope, threshold, leftover slope from straight lines through the stretches."""
     bound = design.errors.max_error + FLOOR
-    still: list[tuple[float, float]] = []
+    zones, seen = design.circuit.dead_zones, _seen(design)
+    still: dict[int, tuple[float, float]] = {}
     out: list[EquationFinding] = []
     for resting, sweep in sweeps:
         if isinstance(sweep, SimulationFailed):
             name = f"curve, {resting.place(model)}"
             out.append(EquationFinding(name, float("nan"), bound, sweep.reason))
-        elif resting.clearance is None:
-            still = [_line(design, stop, sweep) for stop in design.circuit.stops]
+        elif resting.zone is None:
+            still = {k: _line(design, zones[k], sweep) for k in seen}
         elif still:
-            out += _contact(design, model, resting, sweep, still[resting.clearance], bound)
-    for index, (leftover, _) in enumerate(still):
-        stop = model.clearances[index]
-        share = abs(leftover / _wanted_slope(design, model, index, stop.sides[0][0]))
-        name = "leftover slope" + ("" if len(still) == 1 else f" {stop.name}")
-        deviation = float(share * model.relative_stiffness(stop))
+            out += _contact(design, model, resting, sweep, still[resting.zone], bound)
+    for index, (leftover, _) in still.items():
+        zone = model.dead_zones[index]
+        if zone.limits:  # the contacts say it
+            continue
+        share = abs(leftover / _wanted_slope(design, model, index, zone.sides[0][0]))
+        name = "leftover slope" + ("" if len(zones) == 1 else f" {zone.name}")
+        deviation = float(share * model.relative_stiffness(zone))
         out.append(EquationFinding(name, deviation, bound))
     return out
 
@@ -396,25 +402,26 @@ def _contact(
     bound: float,
 ) -> list[EquationFinding]:
     """Slope and threshold of one contact. inside : the line through the dead zone."""
-    index, side = resting.clearance, resting.side
+    index, side = resting.zone, resting.side
     assert index is not None
     leftover, level = inside
-    slope, offset = _line(design, design.circuit.stops[index], sweep, inside)
+    slope, offset = _line(design, design.circuit.dead_zones[index], sweep, inside)
     wanted = _wanted_slope(design, model, index, side)
     place = resting.place(model)
-    error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
+    share = (slope - leftover if design.circuit.dead_zones[index].limits else slope) / wanted
+    error = abs(np.log(share)) if share > 0.0 else np.inf
     findings = [EquationFinding(f"slope, {place}", float(error), bound)]
-    clearance = model.clearances[index]
-    gap = dict(clearance.sides)[side].gap
+    zone = model.dead_zones[index]
+    gap = dict(zone.sides)[side].gap
     if gap:
         threshold = side * (level - offset) / (slope - leftover)
-        volts = gap * design.errors.scales.volts[2 * clearance.mass]
+        volts = gap * design.errors.scales.volts[zone.watched]
         # Both stops of an even clearance alone need not lie at the same distance: an offset of the
         # generator centres them.
         stated = design.errors.scales.threshold_lower if side < 0 else float("nan")
-        alone = len(model.clearances) == 1 and clearance.upper == clearance.lower
+        alone = len(model.dead_zones) == 1 and zone.upper == zone.lower
         volts = stated if alone and np.isfinite(stated) else volts
-        deviation = float(abs(threshold / (volts * design.clearance_gains[index]) - 1.0))
+        deviation = float(abs(threshold / (volts * design.dead_zone_gains[index]) - 1.0))
         findings.append(EquationFinding(f"threshold, {place}", deviation, bound))
     return findings
 
@@ -439,6 +446,12 @@ def _line(
     return float(slope), float(level)
 
 
+def _seen(design: Design) -> tuple[int, ...]:
+    """Indices of the dead zones that a constant force moves: those of displacements."""
+    zones = design.model.second_order().dead_zones
+    return tuple(k for k, zone in enumerate(zones) if zone.quantity == "displacement")
+
+
 def _moving(design: Design, stop: Stop) -> str:
     """The net that carries the displacement in a clearance, or its negative."""
     circuit = design.circuit
@@ -450,11 +463,11 @@ def _moving(design: Design, stop: Stop) -> str:
 def _wanted_slope(design: Design, model: SecondOrderSystem, index: int, side: int) -> float:
     """fv per volt of displacement in contact: the model's stop at the design's scales, through the
     force resistor."""
-    circuit, scales, stop = design.circuit, design.errors.scales, model.clearances[index]
+    circuit, scales, stop = design.circuit, design.errors.scales, model.dead_zones[index]
     velocity = 2 * stop.mass + 1
     capacitor = next(c for c in circuit.capacitors if c.name == circuit.states[velocity])
     rate = dict(stop.sides)[side].stiffness / model.mass[stop.mass] / scales.seconds
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
-    output = circuit.stops[index].output
+    output = circuit.dead_zones[index].output
     force = conductance(circuit, output, capacitor.minus)
-    return float(rate * per_volt * capacitor.value / force) / float(design.clearance_gains[index])
+    return float(rate * per_volt * capacitor.value / force) / float(design.dead_zone_gains[index])

@@ -1,4 +1,7 @@
-"""Where constant forces of the drive hold the masses: all clearances open, or in each contact."""
+"""Where constant forces of the drive hold the masses: all dead zones open, or in each contact.
+
+A dead zone of velocities is open wherever the masses are held.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,9 @@ class StaticRest:
     """Where the masses rest over a stretch of constant forces."""
 
     sides: tuple[int, ...]
-    """For each clearance the side that is in contact, 1 or -1, or 0."""
-    clearance: int | None
-    """Index of the clearance whose contact is looked at; None where all are open."""
+    """For each dead zone the side that is in contact, 1 or -1, or 0."""
+    zone: int | None
+    """Index of the dead zone whose contact is looked at; None where all are open."""
     near: float
     """The least force, over the drive's amplitude."""
     far: float
@@ -42,14 +45,14 @@ class StaticRest:
     @property
     def side(self) -> int:
         """The side of the contact that is looked at; 0 where all are open."""
-        return 0 if self.clearance is None else self.sides[self.clearance]
+        return 0 if self.zone is None else self.sides[self.zone]
 
     def place(self, model: SecondOrderSystem) -> str:
-        """In words: "open", "upper contact", of several clearances "upper contact A"."""
+        """In words: "open", "upper contact", of several dead zones "upper contact A"."""
         word = {0: "open", 1: "upper contact", -1: "lower contact"}[self.side]
-        if self.clearance is None or len(model.clearances) == 1:
+        if self.zone is None or len(model.dead_zones) == 1:
             return word
-        return f"{word} {model.clearances[self.clearance].name}"
+        return f"{word} {model.dead_zones[self.zone].name}"
 
 
 def drive_of(model: SecondOrderSystem) -> Array:
@@ -62,14 +65,15 @@ def static_rests(
 ) -> tuple[StaticRest, ...]:
     """The dead zone and each contact, with constant forces that hold the masses there. A contact
     that no such force reaches, or a state that it would drive too far, is left out."""
-    if not design.circuit.stops:
+    if not design.circuit.dead_zones:
         return (StaticRest((), None, 0.0, 0.0),)
     statics = _Statics(design, model, peaks(design.model, responses).reaches)
     still = statics.open()
     contacts = [
         statics.contact(k, side)
-        for k, clearance in enumerate(model.clearances)
-        for side in clearance.positions
+        for k, zone in enumerate(model.dead_zones)
+        for side in zone.positions
+        if zone.quantity == "displacement"
     ]
     return tuple(rest for rest in (still, *contacts) if rest is not None)
 
@@ -86,18 +90,18 @@ class _Statics:
         """(n,) displacements per unit of drive and without it, in these contacts."""
         model = self.model
         closed, push = model.stiffness.copy(), model.constant.copy()
-        for clearance, side in zip(model.clearances, sides, strict=True):
+        for zone, side in zip(model.dead_zones, sides, strict=True):
             if side:
-                row, stop = model.displacement(clearance), dict(clearance.sides)[side]
+                row, stop = model.displacement(zone), dict(zone.sides)[side]
                 closed += stop.stiffness * np.outer(row, row)
                 push = push + side * stop.stiffness * stop.gap * row
         by_force = np.asarray(np.linalg.solve(closed, drive_of(model)))
         return by_force, np.asarray(np.linalg.solve(closed, push))
 
-    def force(self, sides: tuple[int, ...], clearance: int, side: int, depth: float) -> float:
+    def force(self, sides: tuple[int, ...], zone: int, side: int, depth: float) -> float:
         """The force at which a displacement is so far past a stop, in these contacts."""
-        row = self.model.displacement(self.model.clearances[clearance])
-        gap = dict(self.model.clearances[clearance].sides)[side].gap
+        row = self.model.displacement(self.model.dead_zones[zone])
+        gap = dict(self.model.dead_zones[zone].sides)[side].gap
         by_force, without = self.displaced(sides)
         return float((side * (gap + depth) - row @ without) / (row @ by_force))
 
@@ -106,10 +110,10 @@ class _Statics:
         by_force, without = self.displaced(sides)
         x = force * by_force + without
         out = []
-        for clearance in self.model.clearances:
-            z = float(self.model.displacement(clearance) @ x)
-            met = [side for side, stop in clearance.sides if side * z > stop.gap]
-            out.append(met[0] if met else 0)
+        for zone in self.model.dead_zones:
+            z = float(self.model.displacement(zone) @ x)
+            met = [side for side, stop in zone.sides if side * z > stop.gap]
+            out.append(met[0] if met and zone.quantity == "displacement" else 0)
         return tuple(out)
 
     def clipped(self, sides: tuple[int, ...], force: float) -> bool:
@@ -132,14 +136,14 @@ class _Statics:
         return max(tops) > 1.0
 
     def open(self) -> StaticRest | None:
-        """All clearances open: up to near the force that closes the first one, either way."""
-        sides = (0,) * len(self.model.clearances)
+        """All dead zones open: up to near the force that closes the first one, either way."""
+        sides = (0,) * len(self.model.dead_zones)
         ends = []
-        for k, clearance in enumerate(self.model.clearances):
-            row = self.model.displacement(clearance)
-            if row @ self.displaced(sides)[0] == 0.0:
+        for k, zone in enumerate(self.model.dead_zones):
+            row = self.model.displacement(zone)
+            if zone.quantity == "velocity" or row @ self.displaced(sides)[0] == 0.0:
                 continue
-            for side, _ in clearance.sides:
+            for side, _ in zone.sides:
                 own = tuple(side * (j == k) for j in range(len(sides)))
                 turn = side * np.sign(row @ self.displaced(sides)[0])
                 ends.append((float(turn), self.force(own, k, side, 0.0)))
@@ -156,37 +160,38 @@ class _Statics:
             return None
         return StaticRest(sides, None, middle - INSIDE * half, middle + INSIDE * half)
 
-    def contact(self, clearance: int, side: int) -> StaticRest | None:
+    def contact(self, zone: int, side: int) -> StaticRest | None:
         """In contact with one stop, and with whichever others that takes."""
-        stop = dict(self.model.clearances[clearance].sides)[side]
+        zones = self.model.dead_zones
+        stop = dict(zones[zone].sides)[side]
         size = abs(stop.gap) or max(reach.peak for reach in self.reaches)
-        reach = self.reaches[clearance].penetration
+        reach = self.reaches[zone].penetration
         wanted = min(DEPTH * size, reach) if reach > 0.0 else NEAR * size
-        sides = tuple(side * (j == clearance) for j in range(len(self.model.clearances)))
+        sides = tuple(side * (j == zone) for j in range(len(zones)))
         for _ in range(ROUNDS):
-            row = self.model.displacement(self.model.clearances[clearance])
+            row = self.model.displacement(zones[zone])
             if row @ self.displaced(sides)[0] == 0.0:
                 return None
-            depth = self._held_back(sides, clearance, side, wanted)
-            near, far = (self.force(sides, clearance, side, d) for d in (NEAR * depth, depth))
+            depth = self._held_back(sides, zone, side, wanted)
+            near, far = (self.force(sides, zone, side, d) for d in (NEAR * depth, depth))
             ends = {self.holds(sides, near), self.holds(sides, far)}
             if ends == {sides} and not self.clipped(sides, far):
-                return StaticRest(sides, clearance, near, far)
+                return StaticRest(sides, zone, near, far)
             sides = self.holds(sides, far)
-            if sides[clearance] != side:
+            if sides[zone] != side:
                 return None
             if len(ends) > 1 or ends == {sides}:
                 wanted = 0.5 * depth  # on the way another contact changes, or an output clips
         return None
 
-    def _held_back(self, sides: tuple[int, ...], clearance: int, side: int, depth: float) -> float:
+    def _held_back(self, sides: tuple[int, ...], zone: int, side: int, depth: float) -> float:
         """A depth at which no state is pushed past its room."""
         volts = self.design.errors.scales.volts
         limit = ROOM * self.design.circuit.saturation
         by_force, without = self.displaced(sides)
 
         def pushed(depth: float) -> float:
-            force = self.force(sides, clearance, side, depth)
+            force = self.force(sides, zone, side, depth)
             return float((np.abs(force * by_force + without) * volts[0::2]).max())
 
         if pushed(depth) > limit > pushed(0.0):

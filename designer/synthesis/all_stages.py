@@ -21,8 +21,9 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts, reference_sign
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.model.circuit_table import CircuitSpec
+from designer.model.clearance import Clearance
 from designer.model.find_responses import Peaks
-from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.synthesis import further_stages, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, target_of
 from designer.synthesis.further_stages import CircuitScales, Difference
@@ -62,10 +63,11 @@ def size(question: StageQuestion, values: Mapping[str, float]) -> DeadZone | str
     """The resistors of all stages beside this linear block, or the name of the condition that
     leaves none; None where the model needs no such part. values : of the linear block by part."""
     system = question.model.second_order()
-    if not system.clearances and not system.constant.any():
+    zones = system.dead_zones
+    if not zones and not system.wired.constant.any():
         return None
     sizing = _Sizing(question, system, values)
-    if len(system.clearances) == 1 and alike(system.clearances[0]):
+    if len(zones) == 1 and alike(zones[0]):
         return sizing.searched()
     return sizing.enumerated()
 
@@ -85,7 +87,7 @@ def with_levels(
 def alike(clearance: Clearance) -> bool:
     """Whether the stops of a clearance are alike, or only one, away from rest."""
     stops = [stop for _, stop in clearance.sides]
-    return all(stop == stops[0] for stop in stops) and stops[0].gap > 0.0
+    return all(stop == stops[0] for stop in stops) and stops[0].gap > 0.0 and not clearance.limits
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class _Sizing:
 
     @property
     def places(self) -> tuple[DeadZonePlace, ...]:
-        return self.question.stage.places(self.system.clearances)
+        return self.question.stage.places(self.system.dead_zones)
 
     @property
     def heavy(self) -> Array:
@@ -139,7 +141,7 @@ class _Sizing:
         errors = {**stage.errors, **amplifier.errors}
         threshold = stage.threshold / amplifier.gain
         scales = CircuitScales.of(
-            self.system, self.linear, clearance.mass, threshold / clearance.first.gap
+            self.system, self.linear, clearance.watched, threshold / clearance.first.gap
         )
         own |= stage.values
         if clearance.other is not None:
@@ -232,7 +234,7 @@ class _Sizing:
     def _differences(self, place: DeadZonePlace, scales: CircuitScales) -> tuple[Difference, ...]:
         """Difference amplifiers that the stage may have, the largest gain first."""
         peak = self.question.peaks.reach(place.index).peak
-        volts = float(scales.volts[2 * place.clearance.mass])
+        volts = float(scales.volts[place.clearance.watched])
         most = self.question.limits.swing / (volts * peak) if peak > 0.0 else 1.0
         return further_stages.differences(place, scales.volts, most, self.heavy)
 
@@ -273,7 +275,7 @@ class _Sizing:
     ) -> dict[str, float] | str:
         """The stages' values with those of constant forces and feeds; what leaves none."""
         reference, out = self.question.stage.reference, dict(chosen)
-        if self.system.constant.any():
+        if self.system.wired.constant.any():
             assert reference is not None
             out |= further_stages.constants(self.system, scales, reference.voltage, self.heavy)
         return self.with_feeds(out)
@@ -293,6 +295,8 @@ class _Sizing:
 
     def lifts(self, place: DeadZonePlace, chosen: Mapping[str, float]) -> dict[str, float]:
         """The clamps' resistors of a rectifying stage, beside its other resistors."""
+        if not place.shared:
+            return {}
         reference = self.question.stage.reference
         assert reference is not None
         sources, thresholds = {}, {}
@@ -317,7 +321,7 @@ class _Sizing:
         ]
         ends += [
             (-1 if force > 0.0 else 1, constant_resistor(mass))
-            for mass, force in enumerate(self.system.constant.tolist())
+            for mass, force in enumerate(self.system.wired.constant.tolist())
             if force
         ]
         for sign, name in ends:

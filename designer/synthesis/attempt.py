@@ -137,8 +137,14 @@ class Order:
     def stiffness(self) -> str:
         """Name of the resistor of the stiffness of the first stop's mass by itself (R4)."""
         system = self.model.second_order()
-        mass = system.clearances[0].mass if system.clearances else 0
+        mass = system.dead_zones[0].mass if system.dead_zones else 0
         return entry_resistor(system.size, 2 * mass + 1, 2 * mass)
+
+    @property
+    def lead(self) -> int:
+        """Index of the state that the first dead zone watches, whose signal counts."""
+        zones = self.model.second_order().dead_zones
+        return zones[0].watched if zones else 0
 
     def build(
         self, values: Mapping[str, float], composites: Mapping[str, Composite] | None = None
@@ -223,8 +229,8 @@ def linear_question(
     """What is asked of the linear block within these limits; of all resistors, those outside the
     range of the side condition too. most_values, between : as of ``linear_block``."""
     system = order.model.second_order()
-    mu = max((system.relative_stiffness(stop) for stop in system.clearances), default=0.0)
-    mass = system.clearances[0].mass if system.clearances else 0
+    mu = max((system.relative_stiffness(stop) for stop in system.dead_zones), default=0.0)
+    mass = system.dead_zones[0].mass if system.dead_zones else 0
     bounds = limits.bounds(mu, order.peaks, order.resistors, mass)
     bounds = replace(bounds, stop=max(bounds.stop, between[0]), stop_most=between[1])
     return LinearQuestion(

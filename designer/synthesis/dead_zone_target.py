@@ -18,8 +18,9 @@ from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_terms import Targets
+from designer.model.clearance import Sides
 from designer.model.find_responses import Peaks, Reach
-from designer.model.mechanics import MechanicalModel, Sides
+from designer.model.mechanics import MechanicalModel
 from designer.synthesis.limits import ConditionLimits, depth
 
 LEAST_GAIN = 1.25
@@ -154,8 +155,8 @@ def target_of(
     index : of the clearance.
     """
     system = model.second_order()
-    stop = system.clearances[index]
-    own, wanted = 2 * stop.mass, stop.first.stiffness / float(system.mass[stop.mass])
+    stop = system.dead_zones[index]
+    own, wanted = stop.watched, abs(stop.first.stiffness) / float(system.mass[stop.mass])
     targets, mu = Targets.of(model), system.relative_stiffness(stop)
     errors = errors_of(values, targets)
     relative = np.exp(errors.volts @ minimax(errors.offsets, errors.columns))
@@ -173,7 +174,7 @@ def target_of(
     more = 1.0 if "swing" in limits.conditions else output.limit / limits.swing
     return DeadZoneTarget(
         mu=mu,
-        slope=slope_interval(values, targets, wanted, stop.mass),
+        slope=slope_interval(values, targets, wanted, stop.mass, own),
         output=output,
         threshold=min(gap * top, output.limit / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
@@ -191,18 +192,25 @@ def target_of(
 
 
 def slope_interval(
-    values: Mapping[str, float], targets: Targets, wanted: float, mass: int = 0
+    values: Mapping[str, float],
+    targets: Targets,
+    wanted: float,
+    mass: int = 0,
+    by: int | None = None,
 ) -> tuple[float, float]:
     """Least and largest (fv slope)/R50 [1/ohm] that make a stop's slope right while no error of
     the linear block exceeds its least largest one.
 
     wanted : the stop's stiffness over the mass, in the state matrix. mass : that carries the stop.
+    by : the state that the stage watches; the mass's displacement, if None.
     The slope's error is ln(fv slope/R50) + rate - ln wanted, with the mass's rate of
-    ``LinearErrors``; so the extremes of the rate over all scales with |errors| <= error are two
-    linear programs.
+    ``LinearErrors`` for its displacement; so the extremes of the rate over all scales with
+    |errors| <= error are two linear programs.
     """
     errors = errors_of(values, targets)
-    h, D, rate = errors.offsets, errors.columns, errors.rates[mass]
+    state = 2 * mass if by is None else by
+    h, D = errors.offsets, errors.columns
+    rate = errors.rates[mass] + errors.volts[state] - errors.volts[2 * mass]
     best = minimax(h, D)
     error = float(np.abs(h + D @ best).max())
     limit = np.concatenate([error - h, error + h]) + 1e-12

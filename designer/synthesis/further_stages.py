@@ -18,8 +18,9 @@ from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_terms import Targets
+from designer.model.clearance import Clearance
 from designer.model.find_responses import Reach
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.mechanics import SecondOrderSystem
 from designer.synthesis.dead_zone_target import REFERENCE_MARGIN, DeadZoneTarget
 from designer.synthesis.stop_halves import (
     ChosenHalves,
@@ -55,20 +56,20 @@ class CircuitScales:
 
     @classmethod
     def of(
-        cls, system: SecondOrderSystem, values: Mapping[str, float], mass: int, volts: float
+        cls, system: SecondOrderSystem, values: Mapping[str, float], state: int, volts: float
     ) -> CircuitScales:
-        """Of these parts, by name, when a unit of displacement of this mass is so many volts."""
-        errors = errors_of(values, Targets.from_state_matrix(system.state_matrix()))
+        """Of these parts, by name, when a unit of this state is so many volts."""
+        errors = errors_of(values, Targets.from_state_matrix(system.wired.state_matrix()))
         scales = minimax(errors.offsets, errors.columns)
         relative = np.exp(errors.volts @ scales)
         rates = np.exp(errors.rates @ scales + errors.rate_offsets)
-        return cls(volts * relative / relative[2 * mass], rates)
+        return cls(volts * relative / relative[state], rates)
 
     def siemens(self, system: SecondOrderSystem, stiffness: float, mass: int, by: int) -> float:
-        """Conductance from the displacement of mass ``by`` into the velocity of ``mass`` that
-        makes this stiffness [1/ohm]."""
+        """Conductance from the state ``by`` into the velocity of ``mass`` that makes this
+        stiffness, or damping [1/ohm]."""
         rate = stiffness / float(system.mass[mass] * self.rates[mass])
-        return rate * float(self.volts[2 * mass] / self.volts[2 * by])
+        return rate * float(self.volts[2 * mass] / self.volts[by])
 
     def current(self, system: SecondOrderSystem, force: float, mass: int) -> float:
         """Current into the velocity of a mass that makes this force [A]."""
@@ -112,9 +113,9 @@ def differences(
     The output is (R222/R220) v_i - (R222/R221) v_j, so R221/R220 is that of the masses' volts.
     """
     clearance = place.clearance
-    if clearance.other is None:
+    if clearance.watched_other is None:
         return (Difference({}, 1.0, {}),)
-    ratio = float(volts[2 * clearance.other] / volts[2 * clearance.mass])
+    ratio = float(volts[clearance.watched_other] / volts[clearance.watched])
     inputs = resistors[(resistors >= 1e4 / min(ratio, 1.0)) & (resistors <= 1e5 / max(ratio, 1.0))]
     inputs = inputs if len(inputs) else resistors
     others = nearest_to(resistors, ratio * inputs)
@@ -154,12 +155,13 @@ class RectifierQuestion:
     def halves(self) -> list[HalfTarget]:
         """What each half has to do."""
         clearance, gain = self.place.clearance, self.amplifier.gain
-        mass, own = clearance.mass, float(self.scales.volts[2 * clearance.mass])
+        mass, own = clearance.mass, float(self.scales.volts[clearance.watched])
         return [
             HalfTarget(
                 side,
                 abs(stop.gap) * own * gain,
-                self.scales.siemens(self.system, stop.stiffness, mass, mass) / gain,
+                self.scales.siemens(self.system, abs(stop.stiffness), mass, clearance.watched)
+                / gain,
             )
             for side, stop in clearance.sides
         ]
@@ -217,7 +219,7 @@ def reaction(
     clearance = place.clearance
     assert clearance.other is not None
     one, two = (
-        scales.siemens(system, 1.0, mass, clearance.mass)
+        scales.siemens(system, 1.0, mass, clearance.watched)
         for mass in (clearance.mass, clearance.other)
     )
     wanted = one / two * force
@@ -251,7 +253,7 @@ def lifts(
     the stop is in contact at rest. shares : of ``idle_shares``. limit : of an output [V].
     resistors : that an output may drive, ascending [ohm].
     """
-    if len(sources) < 2 or place.apart:
+    if not place.shared:
         return {}
     total = sum(thresholds.values())
     out = {}
@@ -285,10 +287,12 @@ def constants(
         constant_resistor(mass): float(
             nearest_to(
                 resistors,
-                np.array([reference / abs(scales.current(system, system.constant[mass], mass))]),
+                np.array(
+                    [reference / abs(scales.current(system, system.wired.constant[mass], mass))]
+                ),
             )[0]
         )
-        for mass in np.flatnonzero(system.constant).tolist()
+        for mass in np.flatnonzero(system.wired.constant).tolist()
     }
 
 

@@ -6,7 +6,7 @@ A refusal names the parts or values of the catalogue that would do.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -22,8 +22,8 @@ from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, sta
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
-from designer.model.force_law import ForceLaw
-from designer.model.mechanics import Clearance, MechanicalModel
+from designer.model.clearance import Clearance
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 
 _SECTION = re.compile("[A-OQ-Z]")
 """Names that sections may have: U1P is the supply of U1."""
@@ -45,10 +45,11 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         expected = f"above 0 and up to {spec.supply:g} V"
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
     system = model.second_order()
-    rectifies = stage_kind(spec, system.clearances) == "rectifier" and bool(system.clearances)
+    zones = system.dead_zones
+    rectifies = stage_kind(spec, zones) == "rectifier" and bool(zones)
     if rectifies:
         diode_of(spec.diode, catalog)
-    if rectifies or system.constant.any():
+    if rectifies or system.wired.constant.any():
         _reference_of(spec, catalog)
     if spec.objective == "yield":
         raise InputError(
@@ -73,6 +74,8 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
             raise InputError(None, "circuit.preferred", value, expected)
 
 
+MOST_DEAD_ZONES = 8
+"""On one board."""
 _ONE_GENERATOR = "one generator, with a sine, drives them all"
 
 
@@ -94,8 +97,6 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "forces have may be left out"
         )
         raise InputError(None, "force.phase", "forces of another phase than the drive", expected)
-    for law in system.laws:
-        raise InputError(None, f"law {law.name}", "a force that is not linear", _in_its_place(law))
     for clearance in system.clearances:
         if clearance.damping:
             raise InputError(
@@ -105,15 +106,14 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "none for a circuit, restitution neither: a force that jumps at the contact has no "
                 "stage; the dissipation of short contacts is near that of larger [[damper]] values",
             )
-        preloads = [stop.preload for _, stop in clearance.sides if stop.preload]
-        if preloads:
+        jumps = [stop.jump for _, stop in clearance.sides if stop.jump]
+        if jumps:
             raise InputError(
                 None,
                 f"clearance {clearance.name}.preload",
-                preloads[0],
-                "0 for a circuit: a force that jumps at the contact, or whose slope falls where it "
-                "has risen, has no stage; a negative gap is a stop in contact at rest, which the "
-                "rectifier makes",
+                jumps[0],
+                "preload_over beside it for a circuit, the depth over which it rises: a force that "
+                "jumps at the contact has no stage; a negative gap is a stop in contact at rest",
             )
         if system.fixed_stops and system.ground_moves and clearance.other is None:
             raise InputError(
@@ -131,37 +131,25 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "no base, or no force with an amplitude: one generator drives both, and their ratio "
             "changes with the frequency",
         )
-    refusal = stage_refusal(system.clearances, stage_kind(spec, system.clearances))
+    zones = system.dead_zones
+    if len(zones) > MOST_DEAD_ZONES:
+        raise InputError(None, "circuit", *_too_many(system))
+    refusal = stage_refusal(zones, stage_kind(spec, zones))
     if refusal is not None:
         raise refusal
 
 
-def _in_its_place(law: ForceLaw) -> str:
-    """What a file may say in the place of a law that a circuit is to make."""
-    if law.quantity == "velocity":
-        return "none for a circuit: no stage follows a velocity; a [[damper]] is linear"
-    if sorted(factor for factor in law.row if factor) not in ([-1.0], [1.0], [-1.0, 1.0]):
-        return "none for a circuit: no stage follows but one mass, or the difference of two"
-    changes = [change for bends in law.bends.values() for _, change in bends]
-    if any(change < 0.0 for change in changes) or law.slope < 0.0 or law.offset:
-        return (
-            "none for a circuit: no stage makes a slope that falls away from rest, or a force "
-            "at rest; steps that stiffen are [[clearance]]s at rising gaps"
-        )
-    words = {1: "upper", -1: "lower"}
-    steps = [
-        f"{words[side]} = {place:.6g} with stiffness = {change:.6g}"
-        for side, bends in law.bends.items()
-        for place, change in bends
-    ]
-    spring = f"a [[spring]] with stiffness = {law.slope:.6g}"
-    if not steps:
-        return f"for a circuit {spring}"
-    spring = f"{spring} and " if law.slope else ""
-    return (
-        f"for a circuit {spring}a [[clearance]] for each step, at the same place: "
-        f"{', '.join(steps)}; n-p-q then counts the entry into each"
+def _too_many(system: SecondOrderSystem) -> tuple[str, str]:
+    """What was found and what is expected where there are too many dead zones for a board."""
+    zones = system.dead_zones
+    bends = Counter(zone.bend_of for zone in zones if zone.bend_of)
+    listed = ", ".join(f"{count} for {name}" for name, count in bends.items())
+    found = f"{len(zones)} dead zones, of them {listed or 'none for a law'}"
+    expected = (
+        f"at most {MOST_DEAD_ZONES}, each with an op-amp for either side: fewer points, or a "
+        "larger error of a [[cubic_spring]] or of a Hertz contact"
     )
+    return found, expected
 
 
 def stage_refusal(clearances: Sequence[Clearance], kind: DeadZone) -> Refusal:
@@ -223,7 +211,7 @@ def equal_resistors(circuit: Circuit) -> tuple[frozenset[str], ...]:
     """Groups of resistors that are equal and only set a level: the two of an amplifier that neither
     integrates nor belongs to a dead zone, and the three that sum the halves of one."""
     stored = {net for capacitor in circuit.capacitors for net in capacitor.nets}
-    sums = {stop.output for stop in circuit.stops}
+    sums = {stop.output for stop in circuit.dead_zones}
     out = []
     for s in circuit.sections:
         at = frozenset(r.name for r in circuit.resistors if s.inverting in r.nets)

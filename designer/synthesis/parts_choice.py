@@ -204,7 +204,10 @@ class _Search:
     @cached_property
     def by_scales(self) -> bool:
         """Whether scales are chosen before values: for all but one clearance of two masses that
-        joins search as a whole, unless the least error or the fewest values are asked for."""
+        joins search as a whole, unless the least error or the fewest values are asked for. What
+        limits is always chosen so."""
+        if any(zone.limits for zone in self.order.model.second_order().dead_zones):
+            return True
         return self.order.spec.objective != "match" and not (self.whole_by_joins or self._asked)
 
     @property
@@ -216,13 +219,11 @@ class _Search:
     def whole_by_joins(self) -> bool:
         """Whether joins and one even stage to ground on the first mass are the whole circuit."""
         system = self.order.model.second_order()
-        plain = not system.clearances or (
-            len(system.clearances) == 1
-            and alike(system.clearances[0])
-            and system.clearances[0].other is None
-            and system.clearances[0].mass == 0
+        zones = system.dead_zones
+        plain = not zones or (
+            len(zones) == 1 and alike(zones[0]) and zones[0].other is None and not zones[0].watched
         )
-        return self.by_joins and plain and not system.constant.any()
+        return self.by_joins and plain and not system.wired.constant.any()
 
     @cached_property
     def by_joins(self) -> bool:
@@ -374,10 +375,10 @@ class _Search:
 
     def _in_box(self, conditions: frozenset[str]) -> _Verified | _Missed:
         """Scales first, then parts; verify, tighten what is not kept, and again."""
-        for place in self.order.stage.places(self.order.model.second_order().clearances):
+        for place in self.order.stage.places(self.order.model.second_order().dead_zones):
             shares = idle_shares(place.clearance, self.order.peaks.reach(place.index))
             least = min(shares.values(), default=1.0)
-            if self.order.stage.kind == "rectifier" and not place.apart and least < LEAST_IDLE:
+            if self.order.stage.kind == "rectifier" and place.shared and least < LEAST_IDLE:
                 return _apart(place.index)
         within = stated = self._limits(conditions)
         names: tuple[str, ...] = ()
@@ -450,7 +451,7 @@ class _Search:
         """The clearance, by its place in the order, whose steeper half drives fv further than its
         other half can idle, which no amplitude mends; None without one."""
         where = {check.where for check in broken if check.quantity == "rectifier_fv_v"}
-        for index, clearance in enumerate(self.order.model.second_order().clearances):
+        for index, clearance in enumerate(self.order.model.second_order().dead_zones):
             stops = [stop for _, stop in clearance.sides]
             diodes = {half_parts(index, side).series for side, _ in clearance.sides}
             if where & diodes and len({stop.stiffness for stop in stops}) > 1:
@@ -621,7 +622,7 @@ def best_beside(
     for number in range(most):
         if (
             not left
-            or not order.model.second_order().clearances
+            or not order.model.second_order().dead_zones
             or _error(best) <= max(linear.least, EXACT)
         ):
             break

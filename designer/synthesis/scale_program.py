@@ -26,8 +26,9 @@ from designer.circuit.dead_zone_parts import HalfNames, half_parts
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.netlist import Circuit, Section
 from designer.linear_network.linear_terms import Targets
+from designer.model.clearance import Clearance
 from designer.model.find_responses import Reach
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.mechanics import SecondOrderSystem
 from designer.synthesis.attempt import BASE, Order
 from designer.synthesis.further_stages import LIFT, MOST_DIFFERENCE, idle_shares
 from designer.synthesis.limits import (
@@ -214,9 +215,9 @@ class _Maker:
         self.targets = Targets.of(order.model)
         self.states = 2 * self.system.size
         rectifies = order.stage.kind == "rectifier"
-        every = order.stage.places(self.system.clearances)
+        every = order.stage.places(self.system.dead_zones)
         self.places: tuple[DeadZonePlace, ...] = every if rectifies else ()
-        self.constants = np.flatnonzero(self.system.constant).tolist() if rectifies else []
+        self.constants = np.flatnonzero(self.system.wired.constant).tolist() if rectifies else []
         self.heavy = order.resistors[order.resistors >= within.load]
         peaks = order.peaks.states
         self.peaks = np.log(np.maximum(peaks, STILL * peaks.max()))
@@ -236,7 +237,10 @@ class _Maker:
         gaps = [stop.gap for place in self.places for _, stop in place.clearance.sides if stop.gap]
         self.lead = abs(gaps[0]) if gaps else None
         for place in self.places:
-            self._stage(place)
+            if place.clearance.limits:
+                self._limiter(place)
+            else:
+                self._rectifier(place)
         for mass in self.constants:
             self._constant(mass)
         self._generator()
@@ -266,8 +270,14 @@ class _Maker:
             free([f"C{state + 1}"], self.order.capacitors)
         for place in self.places:
             free([place.part("R50")], self.heavy)
-            for sides in halves(place.clearance):
-                free([half_parts(place.index, side).source for side in sides], inputs)
+            if place.clearance.limits:
+                first, second = (half_parts(place.index, side) for side in (1, -1))
+                free([first.source], inputs)
+                free([second.source], inputs)
+                free([first.feedback], self.heavy)
+            else:
+                for sides in halves(place.clearance):
+                    free([half_parts(place.index, side).source for side in sides], inputs)
             if place.clearance.other is not None:
                 free([place.part("R220")], inputs)
                 free([place.part("R222")], self.heavy)
@@ -316,7 +326,7 @@ class _Maker:
         swing = StatedLimit("swing", "peak of a state", self.within.swing, "V")
         ratio = StatedLimit("level", "ratio of two peaks", self.within.level)
         share = StatedLimit("level", "ratio of a peak to that at the clearance", self.within.share)
-        own = 2 * self.system.clearances[0].mass if self.system.clearances else 0
+        own = self.order.lead
         for level in levels:
             self._keep(level, swing)
             self._keep(level - levels[own], share)
@@ -371,48 +381,102 @@ class _Maker:
         for (a, b), name, wanted in terms:
             log = self.time + self.volts(b) - self.volts(a) - self.part(f"C{a + 1}")
             self._row([name], log - float(wanted), signal=self.within.signal)
-        if not self.places and self.system.clearances:
+        if not self.places and self.system.dead_zones:
             self._leave_room()
 
     def _leave_room(self) -> None:
         """For the stop's resistor beside that of its mass's stiffness, where the stage is sized
         afterwards."""
-        clearance = self.system.clearances[0]
-        mu = max(self.system.relative_stiffness(stop) for stop in self.system.clearances)
+        clearance = self.system.dead_zones[0]
+        mu = max(self.system.relative_stiffness(stop) for stop in self.system.dead_zones)
         bounds = self.within.bounds(mu, self.order.peaks, self.order.resistors, clearance.mass)
         log = next(row.log for row in self.rows if row.names == (self.order.stiffness,))
         self._keep(log, StatedLimit("load", "the stop's resistor", bounds.stop, "Ω", least=True))
 
-    def _stage(self, place: DeadZonePlace) -> None:
-        """The rectifier of one clearance, with the amplifiers around it."""
+    def _gain(self, place: DeadZonePlace) -> Affine:
+        """Of the difference amplifier in front of a stage; 1 without one."""
+        if place.clearance.other is None:
+            return Affine(np.zeros(len(self.lists)))
+        return self._difference(place, self.order.peaks.reach(place.index))
+
+    @property
+    def _reference(self) -> float:
+        """Logarithm of its voltage."""
+        assert self.order.stage.reference is not None
+        return float(np.log(self.order.stage.reference.voltage))
+
+    @property
+    def _drop(self) -> float:
+        """Of a diode [V]."""
+        assert self.order.stage.diode is not None
+        return diode_model(self.order.stage.diode).drop
+
+    @property
+    def _highest_output(self) -> float:
+        """What a stage's output may reach [V]: an op-amp stands a diode's drop beyond it."""
+        strict = "swing" in self.within.conditions
+        return (self.within.swing if strict else self.order.output.limit) - self._drop
+
+    def _slope(self, clearance: Clearance, stiffness: float) -> Affine:
+        """Conductance into the velocity that makes this stiffness, or damping, by the state that
+        the dead zone watches [1/ohm]."""
+        mass = clearance.mass
+        slope = float(np.log(abs(stiffness) / self.system.mass[mass]))
+        return self.volts(2 * mass) - self.volts(clearance.watched) - self.rate(mass) + slope
+
+    def _limiter(self, place: DeadZonePlace) -> None:
+        """Two rectifiers, one behind the other (``circuit.dead_zone_parts``)."""
         clearance, index = place.clearance, place.index
-        mass, stops = clearance.mass, dict(clearance.sides)
-        swing, peaks = self.within.swing, self.order.peaks
-        reach = peaks.reach(index)
-        gain = Affine(np.zeros(len(self.lists)))
+        assert clearance.upper is not None
+        assert clearance.lower is not None
+        first, second = (half_parts(index, side) for side in (1, -1))
+        gain, force = self._gain(place), self.part(place.part("R50"))
+        own = self.volts(clearance.watched) + gain
+        above, span = clearance.upper.gap, clearance.upper.gap + clearance.lower.gap
+        steep = self.part(first.feedback) - self.part(first.source)
+        peak = max(self.order.peaks.reach(index).peak, span)
+        limit, put_out = self._highest_output, own + steep
+        self._keep(
+            put_out + float(np.log(above + peak)),
+            StatedLimit("swing", f"output of {first.section} of {place.output}", limit, "V"),
+        )
+        slope = self._slope(clearance, clearance.upper.stiffness) - gain
+        feedback = self.part(second.source) + force + slope - steep
+        self._row([second.feedback], feedback)
+        fv = put_out + float(np.log(span)) + feedback - self.part(second.source)
+        self.outputs.append(fv)
+        self._keep(fv, StatedLimit("swing", f"output of {place.output}", limit, "V"))
+        thresholds = [(first, own + float(np.log(above)))] if above else []
+        for half, threshold in (*thresholds, (second, put_out + float(np.log(span)))):
+            self.thresholds.append(threshold)
+            what, most = f"threshold of {half.threshold}", HIGHEST * self.order.output.limit
+            self._keep(threshold, StatedLimit("swing", what, most, "V"))
+            log = self.part(half.source) - threshold + self._reference
+            self._row([half.threshold], log, held=True)
         if clearance.other is not None:
-            gain = self._difference(place, reach)
-        force = self.part(place.part("R50"))
-        more = 1.0 if "swing" in self.within.conditions else self.order.output.limit / swing
-        diode, reference = self.order.stage.diode, self.order.stage.reference
-        assert diode is not None
-        assert reference is not None
-        drop = diode_model(diode).drop
-        idle = {} if place.apart else idle_shares(clearance, reach)
+            self._reaction(place)
+
+    def _rectifier(self, place: DeadZonePlace) -> None:
+        """The halves of one clearance, with the amplifiers around them."""
+        clearance, index = place.clearance, place.index
+        stops = dict(clearance.sides)
+        reach = self.order.peaks.reach(index)
+        gain, force = self._gain(place), self.part(place.part("R50"))
+        drop = self._drop
+        idle = idle_shares(clearance, reach) if place.shared else {}
         room = sum(stop.gap for stop in stops.values())
-        own = self.volts(2 * mass) + gain
+        own = self.volts(clearance.watched) + gain
         for sides in halves(clearance):
             side, stop = sides[0], stops[sides[0]]
             names = [half_parts(index, each) for each in sides]
             source = self.part(names[0].source)
             # Slope of fv over the force resistor that makes the stop's stiffness.
-            stiffness = -self.rate(mass) + float(np.log(stop.stiffness / self.system.mass[mass]))
-            feedback = source + force + stiffness - gain
+            feedback = source + force + self._slope(clearance, stop.stiffness) - gain
             self._row([n.feedback for n in names], feedback)
             deepest = max(penetration(reach, each, reach.peak) for each in sides)
             fv = feedback - source + own + float(np.log(deepest))
             self.outputs.append(fv)
-            limit = more * swing - drop
+            limit = self._highest_output
             self._keep(fv, StatedLimit("swing", f"output of {place.output}", limit, "V"))
             if side in idle:
                 lifted = LIFT * self.order.output.limit * min(idle[side], 1.0) + 2.0 * drop
@@ -423,7 +487,7 @@ class _Maker:
                 self.thresholds.append(threshold)
                 what, most = f"threshold of {names[0].threshold}", HIGHEST * self.order.output.limit
                 self._keep(threshold, StatedLimit("swing", what, most, "V"))
-                log = source - threshold + float(np.log(reference.voltage))
+                log = source - threshold + self._reference
                 self._row([n.threshold for n in names], log, held=True)
             if len(idle) > 1:
                 self._lift(names, sides, own + float(np.log(room)), idle)
@@ -446,8 +510,8 @@ class _Maker:
     def _difference(self, place: DeadZonePlace, reach: Reach) -> Affine:
         """The amplifier of a clearance between two masses; its gain."""
         clearance = place.clearance
-        assert clearance.other is not None
-        x, y = 2 * clearance.mass, 2 * clearance.other
+        assert clearance.watched_other is not None
+        x, y = clearance.watched, clearance.watched_other
         source, feedback = (self.part(place.part(name)) for name in ("R220", "R222"))
         gain = feedback - source
         self._row([place.part("R221")], source + self.volts(y) - self.volts(x))
@@ -475,12 +539,11 @@ class _Maker:
 
     def _constant(self, mass: int) -> None:
         """A constant force."""
-        force, reference = float(self.system.constant[mass]), self.order.stage.reference
-        assert reference is not None
+        force = float(self.system.wired.constant[mass])
         unit = np.abs(self.system.drive_force(self.system.own_frequency)).max()
         if self.lead is not None:
-            unit = self.system.stiffness[mass, mass] * self.lead
-        log = -self._current(force, mass) + float(np.log(reference.voltage))
+            unit = self.system.spanning_stiffness[mass, mass] * self.lead
+        log = -self._current(force, mass) + self._reference
         size = abs(force) / float(unit) if unit > 0.0 else 1.0
         self._row([constant_resistor(mass)], log, size, held=True, constant=True)
 

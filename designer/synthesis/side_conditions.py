@@ -123,7 +123,7 @@ def _swing(
 
 def saturating(circuit: Circuit) -> frozenset[str]:
     """Sections that reach their limits in contact: the stops' switches and what drives them."""
-    ends = {contact.switch for stop in circuit.stops for _, contact in stop.contacts}
+    ends = {contact.switch for stop in circuit.dead_zones for _, contact in stop.contacts}
     nodes = {s.inverting for s in circuit.sections if s.name in ends}
     feeding = {net for r in circuit.resistors if nodes & set(r.nets) for net in r.nets}
     return frozenset(
@@ -133,8 +133,8 @@ def saturating(circuit: Circuit) -> frozenset[str]:
 
 def _level(design: Design, opamp: OpAmp, peaks: Peaks) -> list[ConditionCheck]:
     volts = design.errors.scales.volts * peaks.states
-    clearances = design.model.second_order().clearances
-    own = 2 * clearances[0].mass if clearances else 0
+    zones = design.model.second_order().dead_zones
+    own = zones[0].watched if zones else 0
     pairs = [*zip(volts[0::2], volts[1::2], strict=True), *combinations(volts[1::2], 2)]
     ratio = max(float(max(one / other, other / one)) for one, other in pairs)
     share = float(volts.max() / volts[own])

@@ -15,7 +15,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.entries import OpAmp
-from designer.circuit.board_values import nominal_board
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import GROUND, Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.dynamics.piecewise_linear import ModeKey
@@ -169,29 +169,54 @@ def thermal(ohms: float) -> float:
     return float(np.sqrt(4.0 * BOLTZMANN * KELVIN / ohms))
 
 
+def far_slope(
+    circuit: Circuit, chain: str, side: int, values: Mapping[str, float] | None = None
+) -> float:
+    """Slope beyond every bend of a law, or of a stop, on one side: what the velocity of its mass
+    loses by what it depends on [1/s² or 1/s], with all that is linear.
+
+    chain : ``Stop.bend_of``. values : as of ``leftovers``.
+    """
+    zones = [zone for zone in circuit.dead_zones if chain in (zone.bend_of, zone.clearance)]
+    sides = [side * (zone in zones and side in dict(zone.contacts)) for zone in circuit.dead_zones]
+    state = circuit.states.index(zones[0].state)
+    board = _with(circuit, values)
+    equations, key = NodalEquations(circuit, board), circuit.in_contact(sides)
+    G, right = equations.of(key)
+    solved = equations.solution(np.asarray(np.linalg.solve(G, right), dtype=np.float64))
+    return -float(equations.rates(key, solved)[state | 1, state])
+
+
+def _with(circuit: Circuit, values: Mapping[str, float] | None) -> Board:
+    """The nominal board with these values."""
+    board = nominal_board(circuit)
+    return board if values is None else replace(board, values={**circuit.values, **values})
+
+
 def leftovers(circuit: Circuit, values: Mapping[str, float] | None = None) -> Array:
-    """(stops,) stiffness that each dead zone leaves inside its clearance, over that of its stops.
+    """(dead zones,) stiffness that each leaves inside its clearance, over that of its stops; of one
+    that limits, beyond its ends over that between them.
 
     From the slope of the stage's output against the displacement, open and in contact: the output
     is the only path that differs. Of unequal stops the mean counts. values : ohm and farad in the
     place of the circuit's.
     """
-    board = nominal_board(circuit)
-    if values is not None:
-        board = replace(board, values={**circuit.values, **values})
-    equations = NodalEquations(circuit, board)
+    equations = NodalEquations(circuit, _with(circuit, values))
 
     def slopes(key: ModeKey) -> Array:
-        """(stops,) of each output against the displacement of its mass."""
+        """(dead zones,) of each output against the state that it watches."""
         G, right = equations.of(key)
         solved = equations.solution(np.asarray(np.linalg.solve(G, right), dtype=np.float64))
-        places = (circuit.states.index(stop.state) for stop in circuit.stops)
-        pairs = zip(circuit.stops, places, strict=True)
+        places = (circuit.states.index(stop.state) for stop in circuit.dead_zones)
+        pairs = zip(circuit.dead_zones, places, strict=True)
         return np.array([solved.voltage[stop.output][place] for stop, place in pairs])
 
     inside = slopes(circuit.open)
     contact = [
         np.mean([slopes(circuit.carrying(c))[k] for _, c in stop.contacts])
-        for k, stop in enumerate(circuit.stops)
+        for k, stop in enumerate(circuit.dead_zones)
     ]
-    return np.asarray(inside / (np.array(contact) - inside))
+    beyond = np.array(contact)
+    limits = np.array([stop.limits for stop in circuit.dead_zones], dtype=bool)
+    left, own = np.where(limits, beyond, inside), np.where(limits, inside, beyond)
+    return np.asarray(left / (own - left))

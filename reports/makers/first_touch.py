@@ -20,8 +20,9 @@ from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import Complex, Orbit
+from designer.model.clearance import Clearance
 from designer.model.driven import model_flow
-from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.swept_model import of_model
 
 

@@ -23,7 +23,8 @@ from designer.bifurcations.points import PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 
 PIECES = 100
 """Pieces of a drive period: two events on one stop never lie in the same."""

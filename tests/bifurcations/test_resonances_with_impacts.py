@@ -25,7 +25,8 @@ from designer.bifurcations.points import PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 
 STIFFNESS, GAP = 3.0, 0.1
 

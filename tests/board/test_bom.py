@@ -11,7 +11,7 @@ from designer.board.component import components
 from designer.circuit.netlist import Circuit
 from designer.model.board_table import BoardChoice
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from tests.shared.stages import CATALOG, rectifier, stage
 
 VALUES = {**rectifier(5.0), "R50": 4.7e3, "R202": 24.9e3, "R205": 24.9e3}

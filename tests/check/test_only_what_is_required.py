@@ -21,7 +21,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance
+from designer.model.clearance import Clearance
 from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 from designer.spice import numerics_gate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -20,12 +21,15 @@ from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.force_law import ForceLaw
+from designer.model.mechanics import SecondOrderSystem
 from tests.shared.exact_circuits import STAGE, Scale, exact_circuit, unit_volts
 
 
 def random_system(seed: int) -> SecondOrderSystem:
-    """1 to 3 masses, 0 to 2 clearances of any kind, forces of both signs or a moving base."""
+    """1 to 3 masses, 0 to 2 clearances of any kind, some of them in steps, 0 to 2 laws that rise
+    and fall, forces of both signs or a moving base."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 4))
     mass = rng.uniform(0.5, 2.0, n)
@@ -55,18 +59,84 @@ def random_system(seed: int) -> SecondOrderSystem:
                 None if shape == 3 else sides[1],
             )
         )
+    clearances = [_in_steps(stop) if rng.integers(0, 4) == 0 else stop for stop in clearances]
+    laws = tuple(_random_law(f"L{k}", n, rng) for k in range(max(int(rng.integers(-2, 3)), 0)))
     moving = bool(rng.integers(0, 2))
     force = np.zeros(n) if moving else rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 0.0, 1.0], n)
     force[0] += 0.0 if moving else 1.5
+    matrices = {"displacement": chain(0.8, 2.0), "velocity": chain(0.05, 0.3)}
+    constant = rng.uniform(-0.3, 0.3, n) * rng.integers(0, 2, n)
+    for law in laws:
+        row = np.array(law.row)
+        matrices[law.quantity] += law.slope * np.outer(row, row)
+        constant -= law.offset * row
     return SecondOrderSystem(
         mass=mass,
-        damping=chain(0.05, 0.3),
-        stiffness=chain(0.8, 2.0),
+        damping=matrices["velocity"],
+        stiffness=matrices["displacement"],
         force=force,
         clearances=tuple(clearances),
-        constant=rng.uniform(-0.3, 0.3, n) * rng.integers(0, 2, n),
+        constant=constant,
         base=0.4 if moving else 0.0,
+        laws=laws,
     )
+
+
+def _random_law(name: str, n: int, rng: np.random.Generator) -> ForceLaw:
+    """2 to 4 bends about rest, slopes of both signs, on one mass or between two."""
+    row = np.zeros(n)
+    row[int(rng.integers(0, n))] = rng.choice([-1.0, 1.0])
+    if n > 1 and rng.integers(0, 2):
+        row = np.zeros(n)
+        row[:2] = rng.permutation([1.0, -1.0])
+    x = np.sort(rng.choice([-1.0, 1.0], 4) * rng.uniform(0.05, 0.6, 4))[: int(rng.integers(2, 5))]
+    x = np.concatenate([[x[0] - 0.5], x, [x[-1] + 0.5]])
+    velocity = bool(rng.integers(0, 2))
+    force = np.cumsum(rng.uniform(-0.05 if velocity else -0.3, 0.4, len(x)) * np.diff(x, prepend=0))
+    points = tuple(zip(x.tolist(), force.tolist(), strict=True))
+    return ForceLaw(name, tuple(row.tolist()), "velocity" if velocity else "displacement", points)
+
+
+def _in_steps(stop: Clearance) -> Clearance:
+    """A further spring on each side, and a preload that rises on the upper one."""
+    upper = stop.upper and replace(stop.upper, further=((0.2, 1.5),), preload=0.2, rise=0.1)
+    lower = stop.lower and replace(stop.lower, further=((0.15, 2.5),))
+    return replace(stop, upper=upper, lower=lower)
+
+
+def engaged(system: SecondOrderSystem, levels: Sequence[int]) -> tuple[int, ...]:
+    """The side of each dead zone that carries, where so many springs of each clearance, and bends
+    of each law, are met; negative on the lower side."""
+    chains: dict[str, tuple[int, float]] = {}
+    for stop, level in zip(system.clearances, levels, strict=False):
+        springs = dict(stop.sides)[int(np.sign(level))].springs if level else ()
+        chains[stop.name] = (int(np.sign(level)), springs[abs(level) - 1][0] if level else 0.0)
+    for law, level in zip(system.laws, levels[len(system.clearances) :], strict=True):
+        side = int(np.sign(level))
+        place = law.bends[side][abs(level) - 1][0] if level else 0.0
+        turned = sum(law.row) or 1.0  # of -x alone the upper bends lie below rest
+        chains[law.name] = (side * int(turned), place)
+    out = []
+    for zone in system.dead_zones:
+        side, place = chains[zone.bend_of or zone.name]
+        met = side in zone.positions and dict(zone.sides)[side].gap <= place + 1e-12
+        out.append(side if met else 0)
+    return tuple(out)
+
+
+def all_levels(system: SecondOrderSystem) -> list[tuple[int, ...]]:
+    """Each number of springs and bends that can be met at once."""
+    ranges = [
+        range(-len(low), len(high) + 1)
+        for high, low in [
+            *(
+                tuple(dict(stop.sides)[s].springs if s in dict(stop.sides) else () for s in (1, -1))
+                for stop in system.clearances
+            ),
+            *(tuple(law.bends.get(s, ()) for s in (1, -1)) for law in system.laws),
+        ]
+    ]
+    return list(product(*ranges))
 
 
 def random_scale(system: SecondOrderSystem, seed: int) -> Scale:
@@ -75,9 +145,9 @@ def random_scale(system: SecondOrderSystem, seed: int) -> Scale:
 
 
 def keys(circuit: Circuit, sides: tuple[int, ...]) -> ModeKey:
-    """The circuit's mode with each stop in contact with this side, or open."""
+    """The circuit's mode with each dead zone in contact with this side, or open."""
     moved = dict(zip(circuit.switches, circuit.open, strict=True))
-    for stop, side in zip(circuit.stops, sides, strict=True):
+    for stop, side in zip(circuit.dead_zones, sides, strict=True):
         if side:
             contact = dict(stop.contacts)[side]
             moved |= dict([(contact.switch, contact.position), *contact.others])
@@ -85,8 +155,9 @@ def keys(circuit: Circuit, sides: tuple[int, ...]) -> ModeKey:
 
 
 def both_sided(system: SecondOrderSystem) -> frozenset[int]:
-    """Clearances with two stops, whose halves can be apart."""
-    return frozenset(i for i, c in enumerate(system.clearances) if len(c.sides) == 2)
+    """Dead zones with two stops, whose halves can be apart."""
+    zones = enumerate(system.dead_zones)
+    return frozenset(i for i, zone in zones if len(zone.sides) == 2 and not zone.limits)
 
 
 @settings(max_examples=60)
@@ -100,10 +171,10 @@ def test_every_mode_has_the_model_s_matrices(seed: int, apart: bool) -> None:
     reduced = Reduction(circuit, board).system()
     model = system.piecewise_linear(system.own_frequency)
     volts, seconds = scale.volts, scale.seconds
-    for sides in product(*([0, *c.positions] for c in system.clearances)):
-        key = keys(circuit, sides)
-        ours, wanted = reduced.mode(key), model.mode(sides)
-        assert ours.sides == sides
+    for levels in all_levels(system):
+        key = keys(circuit, engaged(system, levels))
+        ours, wanted = reduced.mode(key), model.mode(levels)
+        assert ours.sides == wanted.sides
         size = np.abs(wanted.A).max()
         assert seconds * ours.A / volts[:, None] * volts == pytest.approx(wanted.A, abs=1e-9 * size)
         drive = -ours.B * scale.generator * seconds / volts
@@ -132,13 +203,16 @@ def test_exact_values_have_no_error(seed: int) -> None:
     assert found.max_error < 1e-8
     for i in np.flatnonzero(system.constant).tolist():
         assert f"constant x{i + 1}" in found.errors
-    if len(system.clearances) == 2:
+    zones = system.dead_zones
+    if len(zones) > 1:
         assert {n for n in found.errors if n.startswith("dead-zone null")} == {
-            "dead-zone null A", "dead-zone null B"
-        }  # fmt: skip
-    gaps = sum(len(c.positions) for c in system.clearances) - 1
-    assert sum(name.startswith("gap ") for name in found.errors) == max(gaps, 0)
-    if system.clearances:
+            f"dead-zone null {zone.name}" for zone in zones
+        }
+    places = sum(len(zone.positions) for zone in zones) - 1
+    assert sum(n.startswith(("gap ", "bend ")) and "slope" not in n for n in found.errors) == max(
+        places, 0
+    )
+    if zones:
         assert found.scales.volts == pytest.approx(scale.volts, rel=1e-7)
         wanted = system.drive_force(system.own_frequency) / scale.generator
         assert found.drive_gain == pytest.approx(wanted, rel=1e-7, abs=1e-9)
@@ -173,7 +247,7 @@ def test_orbits_agree(seed: int, apart: bool) -> None:
         assert moved * scale.volts / unit[0] == pytest.approx(theirs_moved, abs=1e-4)
         assert moving * scale.volts / unit[1] == pytest.approx(theirs_moving, abs=1e-4)
     uneven = any(c.upper and c.lower and c.upper.stiffness != c.lower.stiffness
-                 for c in system.clearances)  # fmt: skip
+                 for c in system.dead_zones)  # fmt: skip
     if apart or not uneven:
         assert ours.strobes / scale.volts == pytest.approx(theirs.strobes, abs=2e-4 * peak)
 
@@ -271,7 +345,7 @@ def test_each_error_is_named() -> None:
     [
         (Clearance("A", 0, None, Side(0.3, 5.0), Side(0.4, 5.0)), "unequal stops"),
         (Clearance("A", 0, None, Side(-0.1, 5.0), None), "in contact at rest"),
-        (Clearance("A", 0, None, Side(0.3, 5.0, ((0.1, 2.0),)), None), "stiffens in steps"),
+        (Clearance("A", 0, None, Side(0.3, 5.0), None, bend_of="L"), "bends of L"),
     ],
 )
 def test_what_the_saturating_stage_cannot_make_is_refused(clearance: Clearance, text: str) -> None:

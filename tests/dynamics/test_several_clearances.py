@@ -22,7 +22,7 @@ from designer.dynamics.lyapunov_exponent import lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import TransientSettings, by_flow
-from designer.model.mechanics import Side
+from designer.model.clearance import Side
 from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
 

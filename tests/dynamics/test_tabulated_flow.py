@@ -12,7 +12,8 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.mechanics import SecondOrderSystem
 
 PERIODS = 4
 

@@ -19,8 +19,8 @@ from designer.circuit.netlist import Circuit
 from designer.folders import design_files
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
+from designer.model.clearance import Sides
 from designer.model.find_responses import find
-from designer.model.mechanics import Sides
 from designer.model.model_file import ModelFile, read_model_file
 from designer.report.data import ReportData
 from designer.report.write import render_html, render_markdown

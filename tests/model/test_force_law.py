@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.cubic_law import cubic_error, cubic_points, points_for
 from designer.model.force_law import ForceLaw
 from designer.model.lumped_system import LumpedSystem
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import shown_stops
 from designer.synthesis.part_checks import check_system
@@ -260,21 +262,40 @@ def test_a_law_may_be_all_that_holds_a_mass_or_slows_it() -> None:
         assert refused.value.field == f"{what}.between"
 
 
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        ({}, "for a circuit a [[spring]] with stiffness = 2"),
-        ({"points": [[-2, -3], [-1, 0], [1, 0], [3, 8]]}, "upper = 1 with stiffness = 4"),
-        ({"points": [[-2, -9], [-1, 1], [1, -1], [2, 9]]}, "no stage makes a slope that falls"),
-    ],
-)
-def test_what_a_circuit_may_have_in_the_place_of_a_law(
-    keys: dict[str, object], expected: str
-) -> None:
-    with pytest.raises(InputError) as refused:
-        check_system(model(law(**keys)), CircuitSpec())
-    assert refused.value.field == "law L"
-    assert expected in refused.value.expected
+@given(PLACES, FORCES, st.sampled_from([1.0, -1.0]))
+def test_dead_zones_make_the_force(places: list[int], forces: list[int], sign: float) -> None:
+    """Each dead zone is a spring past its gap, one that limits with the slope at rest a ramp that
+    stays: with the line that is wired they are the law."""
+    points = tuple((x / 8.0, f / 4.0) for x, f in zip(places, forces, strict=False))
+    law = ForceLaw("a-b.L", (sign,), "displacement", points)
+    one = np.ones(1)
+    system = SecondOrderSystem(
+        one, 0.1 * one[:, None], (7.0 + law.slope) * one[:, None], one, (),
+        constant=np.array([-sign * law.offset]), laws=(law,),
+    )  # fmt: skip
+    x = np.linspace(-7.0, 7.0, 113)
+    total = system.wired.stiffness[0, 0] * x - system.wired.constant[0] - 7.0 * x
+    for zone in system.dead_zones:
+        ends = {side: (stop.gap, stop.stiffness) for side, stop in zone.sides}
+        if zone.limits:
+            (above, steep), (below, same) = ends[1], ends[-1]
+            assert steep == same < 0.0
+            total += -steep * (np.clip(x, -below, above) + below)
+        else:
+            for side, (gap, stiffness) in ends.items():
+                total += side * stiffness * np.maximum(side * x - gap, 0.0)
+    wanted = np.array([sign * straight_on(points, sign * each) for each in x])
+    assert total == pytest.approx(wanted, abs=1e-8 * (1.0 + np.abs(wanted).max()))
+    names = [zone.name for zone in system.dead_zones]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"\w+", name, re.ASCII) for name in names)
+
+
+def test_names_of_dead_zones_meet_no_clearance_s() -> None:
+    stops = clearance("L_1", "a", "ground", upper=0.5, stiffness=8.0)
+    bent = law(points=[[-1, -2], [1, 2], [2, 3]])
+    zones = model(stops, bent).second_order().dead_zones
+    assert [zone.name for zone in zones] == ["L_1", "L_2"]
 
 
 def test_a_sum_of_two_masses_is_no_clearance() -> None:

@@ -13,7 +13,8 @@ from hypothesis import given, strategies as st
 from designer.base.errors import InputError
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless, Mechanical
 from tests.shared.oracles import Plain, model_matrix
 

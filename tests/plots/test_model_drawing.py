@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 
 from designer.base import figure_style
 from designer.model.ascii_sketch import sketch
+from designer.model.clearance import Sides
 from designer.model.equations import (
     dimensionless_equations,
     equations_with_numbers,
     mechanical_equations,
 )
-from designer.model.mechanics import Sides
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.template import TEXT
 from designer.plots.model_drawing import model_drawing

@@ -28,7 +28,7 @@ from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.folders.origin import provenance
 from designer.model.ascii_sketch import sketch
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.report import design_tables, words
 from designer.report.data import ReportData
@@ -545,9 +545,18 @@ def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) 
         ("lower stop slope B", "stiffness of the lower stop of B, over K1"),
         ("stop slope x2' x1", "x₁ in the equation of x₂″, by a stop"),
         ("stop slope A x12' x1", "x₁ in the equation of x₁₂″, by a stop of A"),
-        ("dead-zone null", "stiffness left inside the clearance, over K1"),
-        ("dead-zone bias B", "force left inside the clearance of B, over K1 times the threshold"),
-        ("gap B upper", "gap to the upper stop of B, over the gap that sets the amplitude"),
+        ("dead-zone null", "slope left inside the dead zone, over K1"),
+        ("dead-zone bias B", "force left inside the dead zone of B, over K1 times the threshold"),
+        (
+            "gap B upper",
+            "gap to the upper stop of B, over the gap or the bend that sets the amplitude",
+        ),
+        ("upper bend slope L_1", "change of the slope at the upper bend of L_1"),
+        ("bend slope L_1 x2' x1'", "x₁′ in the equation of x₂″, by a bend of L_1"),
+        (
+            "bend L_1 lower",
+            "place of the lower bend of L_1, over the gap or the bend that sets the amplitude",
+        ),
         ("constant x2", "constant force in the equation of x₂″"),
     ],
 )

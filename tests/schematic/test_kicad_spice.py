@@ -17,7 +17,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from designer.schematic.kicad_project import files
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings

@@ -13,7 +13,8 @@ from designer.circuit import build
 from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import terms
-from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.clearance import Clearance
+from designer.model.mechanics import SecondOrderSystem
 from tests.shared.stages import CATALOG, VREF
 
 FARAD = 10e-9
@@ -21,6 +22,8 @@ IDLE = 8.0
 """Volts at which a half's output stands, a drop beside it, where the other half begins to drive."""
 DIFFERENCE = 1.5
 """Gain of the difference amplifiers."""
+FIRST, SECOND = 2.0, 0.7
+"""Gains of the halves of a limiter."""
 STAGE = DeadZoneStage("rectifier", CATALOG.diode("1N4148"), CATALOG.reference("LM4040C50"))
 
 
@@ -35,10 +38,10 @@ class Scale:
 
 
 def unit_volts(clearance: Clearance, scale: Scale) -> float:
-    """Volts of a unit of displacement in a clearance: of its first mass, or behind the difference
-    amplifier."""
+    """Volts of a unit of displacement in a clearance, or of velocity: of its first mass, or behind
+    the difference amplifier."""
     gain = 1.0 if clearance.other is None else DIFFERENCE
-    return gain * float(scale.volts[2 * clearance.mass])
+    return gain * float(scale.volts[clearance.watched])
 
 
 def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
@@ -48,6 +51,7 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
     values = {f"C{i + 1}": C for i in range(2 * n)}
     values |= {f"R{k}": 10e3 for k in (*range(100, 100 + 4 * n), 190, 191, 206, 207)}
     force = system.drive_force(system.own_frequency)
+    zones, system = system.dead_zones, _linear_part(system)
     for t in terms(system.damping.tolist(), system.stiffness.tolist(), force.tolist()):
         kind, i, j = t.quantity
         if kind == "mass":
@@ -63,9 +67,10 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
         if constant:
             velocity = volts[2 * i + 1]
             values[f"R{160 + i}"] = VREF * system.mass[i] / (abs(constant) * velocity * ramp)
-    for k, clearance in enumerate(system.clearances):
+    for k, clearance in enumerate(zones):
         own = unit_volts(clearance, scale)
-        base, small = 200 + 100 * k, 50 + 10 * k
+        beyond = 2000 if k > 4 else 0
+        base, small = 200 + 100 * k + beyond, 50 + 10 * k + beyond
         gain, reference = 1.0, clearance.first.stiffness
         for side, stop in clearance.sides:
             first = base + (0 if side > 0 else 3)
@@ -74,33 +79,68 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
             if stop.gap:
                 values[f"R{first + 1}"] = 10e3 * VREF / (abs(stop.gap) * own)
         values |= {f"R{base + k}": 10e3 for k in (10, 11, 12)}
-        if len(clearance.sides) == 2:
+        if clearance.limits:
+            gain = FIRST * SECOND
+            values |= _limiter(clearance, base, own)
+        elif len(clearance.sides) == 2:
             span = own * sum(stop.gap for _, stop in clearance.sides)
             values |= dict.fromkeys((f"R{base + 8}", f"R{base + 9}"), 10e3 * IDLE / span)
         masses = [(small, clearance.mass)]
         if clearance.other is not None:
             masses.append((small + 1, clearance.other))
-            ratio = volts[2 * clearance.mass] / volts[2 * clearance.other]
+            rate = clearance.quantity == "velocity"
+            ratio = volts[2 * clearance.mass + rate] / volts[2 * clearance.other + rate]
             values |= {f"R{base + 20}": 20e3, f"R{base + 21}": 20e3 / ratio}
             values |= {f"R{base + 22}": DIFFERENCE * 20e3}
             values |= {f"R{base + 24}": 10e3, f"R{base + 25}": 10e3}
         for number, mass in masses:
-            rate = reference / system.mass[mass] * volts[2 * mass + 1] * ramp
+            rate = abs(reference) / system.mass[mass] * volts[2 * mass + 1] * ramp
             values[f"R{number}"] = gain * own / rate
     return values
 
 
+def _limiter(clearance: Clearance, base: int, own: float) -> dict[str, float]:
+    """The two halves of a limiter, one behind the other; own : volts of a unit in front of them."""
+    assert clearance.upper is not None
+    assert clearance.lower is not None
+    above, span = clearance.upper.gap, clearance.upper.gap + clearance.lower.gap
+    values = dict.fromkeys((f"R{base}", f"R{base + 3}"), 10e3)
+    values |= {f"R{base + 2}": FIRST * 10e3, f"R{base + 5}": SECOND * 10e3}
+    values[f"R{base + 4}"] = 10e3 * VREF / (FIRST * span * own)
+    if above:
+        values[f"R{base + 1}"] = 10e3 * VREF / (above * own)
+    return values
+
+
+def _linear_part(system: SecondOrderSystem) -> SecondOrderSystem:
+    """Without the slope between the ends of a limiter, which its stage makes, and with a constant
+    that takes away what the stage gives at rest."""
+    stiffness, damping = system.stiffness.copy(), system.damping.copy()
+    constant = system.constant.copy()
+    for zone in system.dead_zones:
+        if zone.limits:
+            assert zone.lower is not None
+            steep = -zone.lower.stiffness
+            ends = [(zone.mass, 1.0)] + ([] if zone.other is None else [(zone.other, -1.0)])
+            for i, a in ends:
+                constant[i] += a * steep * zone.lower.gap
+                for j, b in ends:
+                    matrix = damping if zone.quantity == "velocity" else stiffness
+                    matrix[i, j] -= a * b * steep
+    return replace(system, stiffness=stiffness, damping=damping, constant=constant)
+
+
 def exact_circuit(system: SecondOrderSystem, scale: Scale, stage: DeadZoneStage = STAGE) -> Circuit:
     """The circuit of these values, its op-amps out of reach of their limits."""
-    force = system.drive_force(system.own_frequency).tolist()
+    force, linear = system.drive_force(system.own_frequency).tolist(), _linear_part(system)
     circuit = build.build(
-        terms(system.damping.tolist(), system.stiffness.tolist(), force),
+        terms(linear.damping.tolist(), linear.stiffness.tolist(), force),
         exact_values(system, scale),
         CATALOG.opamp("TL074C"),
         supply=15.0,
         saturation=13.0,
-        clearances=system.clearances,
-        constants=system.constant.tolist(),
+        clearances=system.dead_zones,
+        constants=linear.constant.tolist(),
         stage=stage,
     )
     return replace(circuit, saturation=1e4)

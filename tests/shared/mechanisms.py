@@ -6,7 +6,8 @@ import numpy as np
 
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.mechanics import SecondOrderSystem
 from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism
 
 

@@ -7,10 +7,12 @@ needs; where it is the tool's own, the circuit is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
+
+import numpy as np
 
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
@@ -34,6 +36,7 @@ from designer.design_rules.rule_subject import RuleSubject
 from designer.model.find_responses import find
 from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file
+from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.stages import CATALOG, PAPER, bought, rectifier, stage
 
@@ -232,17 +235,60 @@ def _grade(grade: float) -> RuleSubject:
     from tests.circuit.test_reduction import EXACT
 
     circuit = stage("saturation", "both", EXACT)
-    bought = [
+    return RuleSubject(made, circuit, _of_grade(base().components, grade))
+
+
+BENT = """
+format = 2
+[[mass]]
+name = "a"
+mass = 1.0
+[[spring]]
+between = ["a", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["a", "ground"]
+damping = 0.2
+[[law]]
+name = "K"
+between = ["a", "ground"]
+points = [[-1.0, -6.0], [0.5, 3.0], [1.0, 3.0]]
+[[force]]
+on = "a"
+amplitude = 1.0
+[[response]]
+omega = 1.55
+[circuit]
+dead_zone = "rectifier"
+"""
+"""A law that is six times as stiff as the spring beside it, and past 0.5 no more."""
+
+
+@cache
+def bent(grade: float) -> RuleSubject:
+    """The exact circuit of ``BENT``, of resistors of this grade."""
+    model = parse_model_file(BENT).model
+    circuit = exact_circuit(model.second_order(), Scale(1e-3, np.array([4.0, 3.0]), 2.0))
+    circuit = valued(replace(circuit, saturation=13.0), bought(circuit.values))
+    subject = subject_of(circuit, model, BENT)
+    return RuleSubject(subject.synthesis, subject.circuit, _of_grade(subject.components, grade))
+
+
+def _of_grade(parts: Iterable[Component], grade: float) -> list[Component]:
+    return [
         replace(c, bought=replace(c.bought, grade=grade))
         if c.kind == "resistor" and c.bought
         else c
-        for c in base().components
+        for c in parts
     ]
-    return RuleSubject(made, circuit, bought)
 
 
 def _deviation() -> float:
     return look("dead-zone-stiffness", _grade(0.01)).value / 0.01
+
+
+def _bent_deviation() -> float:
+    return look("far-slope", bent(0.01)).value / 0.01
 
 
 def _watts(rule: str, share: float) -> RuleSubject:
@@ -378,6 +424,10 @@ PAIRS: dict[str, tuple[Look, Look]] = {
     "dead-zone-stiffness": (
         lambda: look("dead-zone-stiffness", _grade(0.51 / _deviation())),
         lambda: look("dead-zone-stiffness", _grade(0.49 / _deviation())),
+    ),
+    "far-slope": (
+        lambda: look("far-slope", bent(0.51 / _bent_deviation())),
+        lambda: look("far-slope", bent(0.49 / _bent_deviation())),
     ),
 }
 """By id: what breaks the rule, and what just keeps it."""

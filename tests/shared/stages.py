@@ -12,7 +12,7 @@ from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT
 

@@ -18,7 +18,8 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.jobs.study_stage import satisfied
-from designer.model.mechanics import MechanicalModel, SecondOrderSystem, Sides
+from designer.model.clearance import Sides
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.spice.equation_check import (

@@ -15,7 +15,8 @@ from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.model.clearance import Clearance, Side
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
 from designer.spice.read_orbit import (
     BRIEF,

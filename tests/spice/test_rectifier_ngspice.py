@@ -14,7 +14,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Sides
+from designer.model.clearance import Sides
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.worker import open_simulator

@@ -121,8 +121,8 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
         (("stiffness = 4.0", "stiffness = 4.0\npreload = 0.1"), "clearance B.preload", "jumps"),
         (("[[response]]", "[base]\namplitude = 0.1\n[[response]]"), "base.amplitude", "ratio"),
         (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
-        (("stiffness = 4.0", 'law = "hertz"\nconstant = 9.0\ndepth = 0.2'),
-         "clearance B", "at the same place: upper = 0.3 with stiffness = "),
+        (("[[response]]", '[[cubic_spring]]\nbetween = ["one", "ground"]\nk1 = 0.1\nk3 = 1.0\n'
+          "range = 1.0\n[[response]]"), "circuit", "12 for one-ground.cubic"),
     ],
 )  # fmt: skip
 def test_what_no_circuit_can_do_is_refused(change: tuple[str, str], field: str, text: str) -> None:
