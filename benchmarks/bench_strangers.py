@@ -6,6 +6,7 @@ on the exact engine, and what was refused is sought by another search (``strange
 system is a line of ``systems.jsonl``, on disk as soon as it is done; an interrupted run goes on.
 
     python -m benchmarks strangers --seed 1 --count 100 --seconds 120 --out reports/strangers
+    python -m benchmarks strangers --laws --count 60 --out reports/strangers-laws
 """
 
 from __future__ import annotations
@@ -220,28 +221,31 @@ def population(
     search: float,
     work: Path,
     say: Callable[[str], object] = print,
+    *,
+    laws: bool = False,
 ) -> list[Row]:
     """A row for each number, of the file where it is there; each is written as it is done. The last
     line of a number counts: the other search may come later."""
-    rows = {row["number"]: row for row in _read(out / LINES, seed, seconds)}
+    rows = {row["number"]: row for row in _read(out / LINES, seed, seconds, laws=laws)}
     with (out / LINES).open("a", encoding="utf-8") as file:
         for number in numbers:
             row = rows.get(number)
             if row is not None and not (search and _to_seek(row)):
                 continue
-            stranger = draw(seed, number)
+            stranger = draw(seed, number, laws=laws)
             (work / f"{stranger.name}.toml").write_text(stranger.text, encoding="utf-8")
             row = dict(row or measure(stranger, work, seconds, boards))
             if search and _to_seek(row):
                 row["sought"] = sought(work / f"{stranger.name}.toml", search)
-            rows[number] = {"seed": seed, "limit": seconds, **row}
+            own = {"seed": seed, "limit": seconds, **({"laws": True} if laws else {})}
+            rows[number] = {**own, **row}
             file.write(json.dumps(rows[number]) + "\n")
             file.flush()
             say(_line(rows[number]))
     return [rows[number] for number in numbers if number in rows]
 
 
-def _read(path: Path, seed: int, seconds: float) -> Iterator[Row]:
+def _read(path: Path, seed: int, seconds: float, *, laws: bool) -> Iterator[Row]:
     """Rows that are there; a line that was cut off is none."""
     if not path.exists():
         return
@@ -251,8 +255,9 @@ def _read(path: Path, seed: int, seconds: float) -> Iterator[Row]:
         path.write_text(whole, encoding="utf-8")
     for line in whole.splitlines():
         row = json.loads(line)
-        if (row["seed"], row["limit"]) != (seed, seconds):
+        if (row["seed"], row["limit"], row.get("laws", False)) != (seed, seconds, laws):
             found = f"systems of seed {row['seed']} with a limit of {row['limit']:g} s"
+            found += " and laws" if row.get("laws") else ""
             raise SystemExit(f"{path}: {found}; take another --out for another population")
         yield row
 
@@ -381,6 +386,7 @@ def why(rows: Sequence[Row]) -> Iterator[str]:
 def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     """README.md."""
     f = figures(rows)
+    laws = any(row.get("laws") for row in rows)
     header = ["what", "systems", "below 1 %", "parts ≤ 20 s", "all ≤ 20 s", "all ≤ 60 s"]
     header += [
         "above 1 %",
@@ -399,9 +405,9 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         "",
         filled(
             f"Made by `python -m benchmarks strangers --seed {seed} --count {len(rows)} "
-            f"--seconds {seconds:g}`; systems that stand in `{LINES}` are taken as they are, so "
-            "take the folder away to measure anew. Every system can be had again from the seed "
-            "and its number."
+            f"--seconds {seconds:g}{' --laws' if laws else ''}`; systems that stand in `{LINES}` "
+            "are taken as they are, so take the folder away to measure anew. Every system can be "
+            "had again from the seed and its number."
         ),
         "",
         f"- Commit: {commit()}",
@@ -433,6 +439,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
             "circuit reduced and checked) has parts."
         ),
         "",
+        *([_OF_LAWS, ""] if laws else []),
         "![Largest coefficient error over CPU seconds](strangers.png)",
         "",
         *table(header, list(_shape_rows(rows))),
@@ -455,8 +462,13 @@ def filled(text: str) -> str:
     return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)
 
 
+_OF_LAWS = filled(
+    "Each of these systems has a force that is no linear spring, damper or stop: a hardening cubic "
+    "spring, two wells, dry friction, also with a static force above the sliding one, a law of two "
+    "to four corners with slopes of both signs, a Hertz contact, or a preload that rises."
+)
 COLOURS = {1: "#0072b2", 2: "#009e73", 3: "#d55e00", 4: "#cc79a7"}
-MARKERS = {1: "o", 2: "s", 3: "^"}
+MARKERS = {0: "D", 1: "o", 2: "s", 3: "^"}
 NO_ERROR = 1e-7
 """Where an error below it is drawn."""
 
@@ -491,7 +503,7 @@ def picture(rows: Sequence[Row], seconds: float) -> Figure:
         axes.text(mark, NO_ERROR, f" {mark:g} s", va="bottom")
     handles = [
         *(_mark(f"{n} mass{'es' * (n > 1)}", color=c) for n, c in COLOURS.items()),
-        *(_mark(f"{n} clearance{'s' * (n > 1)}", marker=m) for n, m in MARKERS.items()),
+        *(_mark(f"{n} clearance{'s' * (n != 1)}", marker=m) for n, m in MARKERS.items()),
         _mark("nominal circuit shows another response", markerfacecolor="none"),
         _mark("refused, but there are parts", markeredgecolor="black", markeredgewidth=1.8),
     ]
@@ -528,6 +540,9 @@ def options(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="number of the first system")
     parser.add_argument("--count", type=int, default=COUNT, help="how many systems")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="CPU limit of synthesise")
+    parser.add_argument(
+        "--laws", action="store_true", help="each with a force that is no linear spring or stop"
+    )
     parser.add_argument("--boards", type=int, default=BOARDS, help="boards of each circuit")
     parser.add_argument(
         "--search", type=float, default=SEARCHED, help="CPU seconds of the other search; 0: none"
@@ -545,7 +560,7 @@ def main(words: Sequence[str] = ()) -> str:
     if chosen.files is not None:
         chosen.files.mkdir(parents=True, exist_ok=True)
         for number in numbers:
-            stranger = draw(chosen.seed, number)
+            stranger = draw(chosen.seed, number, laws=chosen.laws)
             (chosen.files / f"{stranger.name}.toml").write_text(stranger.text, encoding="utf-8")
         return f"{len(numbers)} model files in {chosen.files}"
     chosen.out.mkdir(parents=True, exist_ok=True)
@@ -561,6 +576,7 @@ def main(words: Sequence[str] = ()) -> str:
                 chosen.boards,
                 chosen.search,
                 work,
+                laws=chosen.laws,
             )
         except KeyboardInterrupt:
             said = f"{chosen.out / LINES} has what was done; the same command goes on"

@@ -165,7 +165,7 @@ def _recorded(
 
 def _nets(circuit: Circuit, rng: np.random.Generator) -> tuple[str, ...]:
     """What is on the channels, in any order: mostly what docs/bench.md asks for."""
-    first, stages = circuit.displacements[0], [stop.output for stop in circuit.stops]
+    first, stages = circuit.displacements[0], list(circuit.stage_outputs)
     generator, others = circuit.generator.net, list(circuit.outputs)
     choices: list[list[str]] = [
         [first, *stages, generator],

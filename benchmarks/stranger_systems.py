@@ -3,6 +3,8 @@
 What is drawn is without units: masses and springs within a factor of 4, damping ratios of joints
 0.04 to 0.3, gaps of 0.1 to 0.6 of what the drive moves the masses by, stops of 4 to 30 of the
 springs. Then it is written in plain numbers, or in the SI units of a size that machines have.
+With laws, each system has a force that is no linear spring, damper or stop, in the place of one
+clearance or in it.
 """
 
 from __future__ import annotations
@@ -35,6 +37,13 @@ MOST_PERIODS, APERIODIC = 8, 0.15
 """Longest period of a wanted response; share of the aperiodic motions that are taken, with any
 n-p-q wanted."""
 WORD = {True: "upper", False: "lower"}
+LAWS = (
+    ("hardening", 2), ("two wells", 2), ("friction", 2), ("Stribeck friction", 1),
+    ("points", 1), ("stop in steps", 1), ("rising preload", 1),
+)  # fmt: skip
+"""Kinds of laws, and how often of ten."""
+IN_A_CLEARANCE = ("stop in steps", "rising preload")
+"""Those that are stops."""
 Joint = tuple[str, str]
 T = TypeVar("T")
 
@@ -80,16 +89,19 @@ class Stranger:
         return f"{self.number:04d}"
 
 
-def draw(seed: int, number: int) -> Stranger:
-    """The system of this number; every number is drawn for itself."""
+def draw(seed: int, number: int, *, laws: bool = False) -> Stranger:
+    """The system of this number; every number is drawn for itself. laws : whether it has one."""
+    law = None
+    if laws:
+        law = _one_of(LAWS, np.random.default_rng([seed, number // 10, 3]), number % 10)
     shape = _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
     size = _one_of(SIZES, np.random.default_rng([seed, number // 10, 2]), number % 10)
     rng = np.random.default_rng([seed, number])
     while True:  # a drawn system may be refused as a model, or never meet a stop
-        drawn = _Drawn(rng, *shape, size)
+        drawn = _Drawn(rng, *shape, size, law)
         text = drawn.with_response(f"Stranger {seed}-{number}")
         if text is not None:
-            return Stranger(number, *shape, drawn.kinds, size.name, text)
+            return Stranger(number, *drawn.shape, drawn.kinds, size.name, text)
 
 
 def _one_of(choices: Sequence[tuple[T, int]], rng: np.random.Generator, place: int) -> T:
@@ -101,10 +113,19 @@ def _one_of(choices: Sequence[tuple[T, int]], rng: np.random.Generator, place: i
 class _Drawn:
     """One draw of the elements, without a response yet."""
 
-    def __init__(self, rng: np.random.Generator, masses: int, clearances: int, size: Size) -> None:
-        self._rng, self._size = rng, size
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        masses: int,
+        clearances: int,
+        size: Size,
+        law: str | None = None,
+    ) -> None:
+        self._rng, self._size, self._law = rng, size, law
+        clearances -= law is not None and law not in IN_A_CLEARANCE
+        self.shape = masses, clearances
         self.kinds: tuple[str, ...] = ()
-        self._kinds: set[str] = set()
+        self._kinds: set[str] = set() if law is None else {law}
         self._names = [f"m{i + 1}" for i in range(masses)]
         self._mass = np.exp(rng.uniform(-math.log(2.0), math.log(2.0), masses))
         self._springs = dict(self._joints(0.4))
@@ -117,6 +138,11 @@ class _Drawn:
         self._flexibility = np.linalg.inv(self._matrix(self._springs))
         self._reach = np.abs(self._flexibility) @ np.maximum(self._force, 0.0)
         self._gaps = [self._gap(k) for k in range(clearances)]
+        self._laws: list[tuple[str, dict[str, tuple[object, str]]]] = []
+        if law in IN_A_CLEARANCE:
+            self._bend_a_stop(law == "rising preload")
+        elif law is not None:
+            self._laws.append(self._drawn_law(law))
         self.kinds = tuple(sorted(self._kinds))
         length, mass = (_log_uniform(rng, *span) for span in (size.length, size.mass))
         second = 1.0
@@ -124,7 +150,9 @@ class _Drawn:
             second = 1.0 / (2.0 * math.pi * _log_uniform(rng, *size.hertz))
         self._units = {
             "kg": mass, "m": length, "N": mass * length / second**2,
-            "N/m": mass / second**2, "N s/m": mass / second,
+            "N/m": mass / second**2, "N s/m": mass / second, "m/s": length / second,
+            "": 1.0, "N/m³": mass / second**2 / length**2,
+            "N/m^1.5": mass / second**2 / length**0.5,
         }  # fmt: skip
         self._second = second
 
@@ -205,6 +233,55 @@ class _Drawn:
         out |= {"upper": gap(), "lower": gap(), "upper_stiffness": stop()}
         return out | {"lower_stiffness": stop()}
 
+    def _bend_a_stop(self, preload: bool) -> None:
+        """The first clearance with a Hertz contact in the place of its stiffness, or with a preload
+        that rises."""
+        rng, gap = self._rng, self._gaps[0]
+        stiffness = float(gap.pop("stiffness", None) or gap.pop("upper_stiffness"))  # type: ignore[arg-type]
+        gap.pop("lower_stiffness", None)
+        depth = float(self._reach.max()) * float(rng.uniform(0.2, 0.5))
+        if preload:
+            gap |= {"stiffness": stiffness, "preload": stiffness * depth * rng.uniform(0.2, 1.0)}
+            gap["preload_over"] = depth * float(rng.uniform(0.1, 0.3))
+        else:
+            gap |= {"law": "hertz", "constant": stiffness / math.sqrt(depth), "depth": depth}
+            gap["pieces"] = int(rng.integers(2, 5))
+
+    def _drawn_law(self, law: str) -> tuple[str, dict[str, tuple[object, str]]]:
+        """Its table and its keys, each with the unit of its value."""
+        rng, n = self._rng, len(self._names)
+        i = int(rng.integers(n))
+        other = "ground"
+        if n > 1 and rng.uniform() < 0.35:
+            other = self._names[int(rng.choice([j for j in range(n) if j != i]))]
+            self._kinds.add("between masses")
+        own, reach = float(self._matrix(self._springs)[i, i]), float(self._reach.max())
+        fast = reach * math.sqrt(own / self._mass[i])
+        force = float(self._force.max())
+        keys: dict[str, tuple[object, str]] = {"between": ([self._names[i], other], "")}
+        if "friction" in law:
+            slow, slides = fast * rng.uniform(0.03, 0.15), force * rng.uniform(0.05, 0.3)
+            keys |= {"force": (slides, "N"), "velocity": (slow, "m/s")}
+            if law == "Stribeck friction":
+                keys["static"] = slides * rng.uniform(1.2, 1.6), "N"
+                keys["stribeck"] = slow * rng.uniform(3.0, 8.0), "m/s"
+            return "friction", keys
+        if law == "points":
+            count = int(rng.integers(2, 5))
+            x = np.sort(reach * rng.uniform(-0.8, 0.8, count + 2))
+            slopes = own * rng.uniform(-0.8, 2.0, count + 1)
+            slopes[[0, -1]] = np.abs(slopes[[0, -1]])
+            f = np.concatenate([[0.0], np.cumsum(slopes * np.diff(x))])
+            f -= np.interp(0.0, x, f) + force * rng.uniform(-0.1, 0.1)
+            points = [[(a, "m"), (b, "N")] for a, b in zip(x.tolist(), f.tolist(), strict=True)]
+            return "law", {"name": ("K", ""), **keys, "points": (points, "points")}
+        k1 = 0.0 if law == "hardening" else -own * float(rng.uniform(1.2, 1.8))
+        wide = own * _log_uniform(rng, 0.3, 3.0) / reach**2
+        if law == "two wells":  # where spring and law together hold it
+            wide = -(own + k1) / (reach * float(rng.uniform(0.3, 0.8))) ** 2
+        keys |= {"k1": (k1, "N/m"), "k3": (wide, "N/m³"), "range": (1.6 * reach, "m")}
+        return "cubic_spring", keys | {"error": (0.02, "")}
+
     def with_response(self, title: str) -> str | None:
         """The file with a response that the model shows from rest, in which a stop is hit; None
         where there is none, or where the model is refused."""
@@ -221,7 +298,8 @@ class _Drawn:
             except InputError:
                 return None
             orbit = _from_rest(modelfile)
-            if orbit.status is OrbitStatus.PERIODIC and orbit.n <= MOST_PERIODS and _hits(orbit):
+            met = _hits(orbit) or not self._gaps
+            if orbit.status is OrbitStatus.PERIODIC and orbit.n <= MOST_PERIODS and met:
                 return elements + _table("[[response]]", [key, ("expect", str(orbit.counts))])
             if orbit.status is OrbitStatus.APERIODIC and rng.uniform() < APERIODIC:
                 return elements + response
@@ -242,6 +320,9 @@ class _Drawn:
         for gap in self._gaps:
             keys = [(k, self._of_gap(k, value)) for k, value in gap.items()]
             lines.append(_table("[[clearance]]", keys))
+        for kind, own in self._laws:
+            keys = [(k, self._value_of(value, unit)) for k, (value, unit) in own.items()]
+            lines.append(_table(f"[[{kind}]]", keys))
         for name, *values in zip(self._names, self._amplitude, self._constant, strict=True):
             forces = zip(("amplitude", "constant"), values, strict=True)
             keys = [(k, self._value(float(v), "N")) for k, v in forces if v]
@@ -254,8 +335,21 @@ class _Drawn:
 
     def _of_gap(self, key: str, value: object) -> object:
         if isinstance(value, float):
-            return self._value(value, "N/m" if key.endswith("stiffness") else "m")
+            units = {"preload": "N", "constant": "N/m^1.5"}
+            unit = "N/m" if key.endswith("stiffness") else units.get(key, "m")
+            return self._value_of(value, unit)
         return list(value) if isinstance(value, tuple) else value
+
+    def _value_of(self, value: object, unit: str) -> object:
+        """As ``_value``; points by their own units, and plain numbers where a file has these."""
+        if unit == "points":
+            assert isinstance(value, list)
+            return [[self._value(a, "m"), self._value(b, "N")] for (a, _), (b, _) in value]
+        if not isinstance(value, float) or not unit:
+            return value
+        if unit in ("N/m³", "N/m^1.5"):
+            return float(f"{value * self._units[unit]:.3g}")
+        return self._value(value, unit)
 
     def _value(self, drawn: float, unit: str) -> object:
         """As a file has it: three digits, with a unit where it is of a size."""

@@ -89,11 +89,16 @@ class DeadZoneReading:
 
 def _stays_linear(reduction: Reduction, index: int, end: float, ends: str) -> None:
     """The open mode has to hold up to where contact begins, at ``end`` [V], whatever the stages of
-    other clearances do there."""
+    other clearances do there, and the amplifiers in front of them. Between two masses ``end`` is
+    where one would be with the other one at rest, so only the stage's own amplifiers count."""
     c = reduction.circuit
     zones = c.dead_zones
-    state = c.states.index(zones[index].state)
+    state, own = c.states.index(zones[index].state), zones[index].difference
     others = {name for k, stop in enumerate(zones) if k != index for name in stop.switches}
+    fronts = {zone.difference[0] for zone in zones if zone.difference not in (None, own)}
+    others |= {section.name for section in c.sections if section.output in fronts}
+    if own is not None:
+        others |= {s.name for s in c.sections if s.output != own[0]} - set(zones[index].switches)
     for guard in reduction.system().mode(c.open).guards:
         pairs = zip(c.switches, c.open, guard.target, strict=True)
         switch = next(name for name, here, there in pairs if here != there)

@@ -104,6 +104,18 @@ def _fits(record: BenchedRecord) -> bool:
     return record.named.counts is not None
 
 
+def check_fits(
+    prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
+) -> None:
+    """InputError where boards with laws are to be fitted: the fit knows contacts alone."""
+    laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
+    asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
+    for option, wanted in asked.items():
+        if wanted and laws:
+            expected = "a board whose forces are those of clearances; records alone are named"
+            raise InputError(None, option, f"a board with bends of {laws}", expected)
+
+
 def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:
     """InputError for a record with the generator off of a board that has no other."""
     known = {board_name(file, several) for file in files}

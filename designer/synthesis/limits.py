@@ -105,10 +105,12 @@ class ConditionLimits:
         the dead zone's stages, which costs nothing where it can be had.
         """
         out = self
+        # The swing of a design that is well inside it is lowered from where the design is.
+        top = max((c.found for c in design.checks if c.quantity == "swing_v"), default=np.inf)
         for check in broken:
             by = check.excess * (1.0 + MARGIN)
             if check.quantity in VOLTAGES:
-                out = replace(out, swing=out.swing / min(by, STEEP))
+                out = replace(out, swing=min(out.swing, top) / min(by, STEEP))
             elif check.quantity == "signal_level_ratio":
                 out = replace(out, level=out.level / by)
             elif check.quantity == "signal_share_ratio":

@@ -417,6 +417,11 @@ class _Maker:
         strict = "swing" in self.within.conditions
         return (self.within.swing if strict else self.order.output.limit) - self._drop
 
+    def _highest_end(self, clearance: Clearance) -> float:
+        """Of a gap, or of a bend, which no wanted response may reach: highest voltage [V]."""
+        highest = HIGHEST * self.order.output.limit
+        return min(highest, self.within.swing) if clearance.bend_of else highest
+
     def _slope(self, clearance: Clearance, stiffness: float) -> Affine:
         """Conductance into the velocity that makes this stiffness, or damping, by the state that
         the dead zone watches [1/ohm]."""
@@ -433,6 +438,10 @@ class _Maker:
         gain, force = self._gain(place), self.part(place.part("R50"))
         own = self.volts(clearance.watched) + gain
         above, span = clearance.upper.gap, clearance.upper.gap + clearance.lower.gap
+        if clearance.lower.gap:
+            what, most = f"lower end of {clearance.name}", self._highest_end(clearance)
+            end = own + float(np.log(clearance.lower.gap))
+            self._keep(end, StatedLimit("swing", what, most, "V"))
         steep = self.part(first.feedback) - self.part(first.source)
         peak = max(self.order.peaks.reach(index).peak, span)
         limit, put_out = self._highest_output, own + steep
@@ -449,7 +458,7 @@ class _Maker:
         thresholds = [(first, own + float(np.log(above)))] if above else []
         for half, threshold in (*thresholds, (second, put_out + float(np.log(span)))):
             self.thresholds.append(threshold)
-            what, most = f"threshold of {half.threshold}", HIGHEST * self.order.output.limit
+            what, most = f"threshold of {half.threshold}", self._highest_end(clearance)
             self._keep(threshold, StatedLimit("swing", what, most, "V"))
             log = self.part(half.source) - threshold + self._reference
             self._row([half.threshold], log, held=True)
@@ -485,7 +494,7 @@ class _Maker:
             if stop.gap:
                 threshold = own + float(np.log(abs(stop.gap)))
                 self.thresholds.append(threshold)
-                what, most = f"threshold of {names[0].threshold}", HIGHEST * self.order.output.limit
+                what, most = f"threshold of {names[0].threshold}", self._highest_end(clearance)
                 self._keep(threshold, StatedLimit("swing", what, most, "V"))
                 log = source - threshold + self._reference
                 self._row([n.threshold for n in names], log, held=True)

@@ -156,6 +156,7 @@ def bench(
     catalog = load_catalog()
     synthesis = read_design(path, catalog, progress)
     prediction = BoardPrediction(synthesis)
+    bench_job.check_fits(prediction, fit=fit, boards=boards, decays=decays)
     scales = synthesis.design.errors.scales
     frequency = None if omega is None else scales.frequency(omega)
     bench_job.check_decays(files, decays, boards)

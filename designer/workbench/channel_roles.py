@@ -119,6 +119,10 @@ def recorded_motion(
         channel, output = other
         doubt = f"{channel}, which is cut off where {output} rests, may be {output}"
         remedy = _example({**{n: c for n, c in nets.items() if c != channel}, output: channel})
+    if not told and not doubt and prediction.circuit.bends:
+        laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
+        doubt = f"its channels were recognised without the spread of the bends of {laws}"
+        remedy = _example(nets)
     motion = _motion(record, samples, shown, nets, prediction.generator, drive)
     return replace(motion, doubt=doubt, remedy=remedy)
 

@@ -107,7 +107,7 @@ class ForceBalance:
         generator = of.get(self._prediction.generator)
         tests: dict[str, _Test] = {}
         frequency = math.nan
-        for stop in self._prediction.stops:
+        for stop in self._prediction.zones:
             if stop.output in of and all(net in of for net in stop.displacement):
                 zone = self._zone(stop, of)
                 if zone is not None:
@@ -116,12 +116,12 @@ class ForceBalance:
             frequency, left = self.sine(generator)
             tests[self._prediction.generator] = _Test(left, SINE, left)
         moving = [net for net in self._states if net in of and self._tells(of[net])]
-        forces = tuple(f for stop in self._prediction.stops if (f := self._force(stop, of)))
-        if moving and len(forces) == len(self._prediction.stops):
+        forces = tuple(f for stop in self._prediction.zones if (f := self._force(stop, of)))
+        if moving and len(forces) == len(self._prediction.zones):
             recorded = all(force[0] == "output" for force in forces)
             allowed = BY_OUTPUT if recorded else BY_DISPLACEMENT
             if generator is None:
-                near = [n for s in self._prediction.stops for n in s.displacement if n in of]
+                near = [n for s in self._prediction.zones for n in s.displacement if n in of]
                 first = (near or moving)[0]
                 frequency, left, power = self._line(forces, of[first], first)
                 tests[first] = _Test(left / power, allowed, left / self._power(of[first]))
@@ -239,13 +239,17 @@ class ForceBalance:
     def _force(self, stop: PredictedStop, of: Mapping[str, int]) -> tuple[object, ...] | None:
         """What the force of a stop is known by: a key of ``_answers``; None where it is cut off.
 
-        Where the output is, the displacement says it.
+        Where the output is, or has what the linear part has too, the displacement says it.
         """
-        index, place = self._prediction.stops.index(stop), of.get(stop.output)
+        index, place = self._prediction.zones.index(stop), of.get(stop.output)
         moved = all(net in of for net in stop.displacement)
         key: tuple[object, ...] = ("displacement", index, *map(of.get, stop.displacement), place)
         sides = np.zeros(0) if place is None else self._sides(place, stop)
-        if place is not None and not sides.any():
+        if stop.limits:
+            if not (moved and self._uncut(stop, of).all()):
+                return None
+            wave = stop.force_of(self._displacement(stop, of))
+        elif place is not None and not sides.any():
             key, wave = ("output", index, place), self._values[:, place]
         elif moved and self._uncut(stop, of).all():
             wave = stop.output_of(self._displacement(stop, of))
@@ -369,7 +373,7 @@ def _linear(prediction: BoardPrediction) -> _LinearPart:
     system = reduction.system()
     rest, n = system.mode(circuit.open), system.size
     columns = []
-    for stop in circuit.stops:
+    for stop in circuit.dead_zones:
         _, contact = stop.contacts[0]
         key = circuit.carrying(contact)
         change = system.mode(key).A - rest.A

@@ -156,7 +156,9 @@ def identify_response(motion: RecordedMotion, prediction: BoardPrediction) -> Na
     asymmetry, error = _asymmetry(curve, nets, prediction)
     names, by_board = list(_names(n, counted)), False
     if len(names) > 1 and not doubt and not limits:
-        evidence = board_evidence(curve, samples, motion, nets, prediction, zones)
+        evidence = {}
+        if not prediction.circuit.bends:  # boards with laws are not fitted
+            evidence = board_evidence(curve, samples, motion, nets, prediction, zones)
         instead = [_by_board(sides, k, evidence) for k, sides in enumerate(counted)]
         by_board = instead != counted
         counted, names = instead, list(_names(n, instead))
@@ -470,14 +472,14 @@ def _limits(motion: RecordedMotion, prediction: BoardPrediction) -> dict[str, tu
 
     The output of a dead zone that rests on its level inside the clearance, with no noise, is not.
     """
-    inside = {stop.output: stop for stop in prediction.stops}
+    inside = {stop.output: stop for stop in prediction.zones}
     out = {}
     for net, channel in motion.channels.items():
         low, high = motion.record.limits[channel]
         if net in inside:
-            level, room = inside[net].inside[0], LEVEL * motion.record.span[channel]
-            low = low if abs(low - level) > room else -math.inf
-            high = high if abs(high - level) > room else math.inf
+            levels, room = inside[net].levels, LEVEL * motion.record.span[channel]
+            low = low if all(abs(low - level) > room for level in levels) else -math.inf
+            high = high if all(abs(high - level) > room for level in levels) else math.inf
         if net != motion.generator and not (math.isinf(low) and math.isinf(high)):
             out[net] = low, high
     return out

@@ -42,14 +42,15 @@ LEVEL = 0.05
 
 @dataclass(frozen=True)
 class PredictedStop:
-    """The stage of a clearance as the nominal board has it."""
+    """The stage of a clearance, or of another dead zone, as the nominal board has it."""
 
     clearance: str
     """Its name."""
     output: str
     """Net of its output."""
     displacement: Mapping[str, float]
-    """Net by net what the displacement is made of: {"v1": 1.0}, or {"v1": 1.0, "v3": -1.0}."""
+    """Net by net what the displacement, or the velocity, is made of: {"v1": 1.0}, or {"v1": 1.0,
+    "v3": -1.0}."""
     ends: Mapping[int, float]
     """Where the stops are, by side, 1 upper and -1 lower [V of the displacement]."""
     inside: tuple[float, float]
@@ -65,10 +66,30 @@ class PredictedStop:
             value = value + self.gains[side] * beyond
         return np.asarray(value)
 
+    @property
+    def limits(self) -> bool:
+        """Whether the output changes inside, and not beyond the ends."""
+        return abs(self.inside[1]) > LEVEL * max(map(abs, self.gains.values()))
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Where the output rests [V]: inside the clearance, or beyond the ends of a limiter."""
+        if not self.limits:
+            return (self.inside[0],)
+        return tuple(float(self.output_of(np.array(end))) for end in self.ends.values())
+
+    def force_of(self, displacement: Array) -> Array:
+        """(k,) the output [V] at displacements (k,) [V] less what it has inside the clearance,
+        which the linear part of the board has too."""
+        inside = self.inside[0] + self.inside[1] * displacement
+        return np.asarray(self.output_of(displacement) - inside)
+
     def resting(self, output: Array) -> Mask:
-        """(k,) whether an output (k,) [V] is on its level inside the clearance, where many of its
-        values pile up though nothing cuts it off."""
-        return np.asarray(np.abs(output - self.inside[0]) <= LEVEL * np.ptp(output))
+        """(k,) whether an output (k,) [V] is on a level where many of its values pile up though
+        nothing cuts it off."""
+        room = LEVEL * np.ptp(output)
+        near = [np.abs(output - level) <= room for level in self.levels]
+        return np.asarray(np.any(near, axis=0), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -100,7 +121,12 @@ class BoardPrediction:
     def __init__(self, synthesis: Synthesis) -> None:
         self.synthesis = synthesis
         self.reduction = nominal_reduction(synthesis.design)
-        self.stops = _stops(self.reduction)
+        self.zones = _zones(self.reduction)
+
+    @property
+    def stops(self) -> tuple[PredictedStop, ...]:
+        """The stages of the clearances, the first of ``zones``, which has every dead zone."""
+        return self.zones[: len(self.circuit.stops)]
 
     @property
     def circuit(self) -> Circuit:
@@ -137,7 +163,7 @@ class BoardPrediction:
     @property
     def twins(self) -> bool:
         """Whether every clearance has stops on both sides, so that orbits have mirror twins."""
-        return all(len(stop.ends) == 2 for stop in self.stops)
+        return all(len(zone.ends) == 2 for zone in self.zones)
 
     def _starts(self, orbit: Orbit, waves: Mapping[str, Array]) -> tuple[Array, ...]:
         if not self.twins:
@@ -154,7 +180,7 @@ class BoardPrediction:
         angle = 2.0 * np.pi * np.arange(len(states)) / POINTS
         waves = dict(zip(self.circuit.state_nets, states.T, strict=True))
         waves[self.generator] = -setting.amplitude_v_peak * np.sin(angle)
-        for stop in self.stops:
+        for stop in self.zones:
             moved = sum(factor * waves[net] for net, factor in stop.displacement.items())
             waves[stop.output] = stop.output_of(np.asarray(moved))
         return waves
@@ -194,39 +220,40 @@ class BoardPrediction:
         spread [V], by side."""
         spread = spread_of(self.synthesis.modelfile, self.circuit, self.synthesis.catalog)
         boards = draw_many(self.circuit, spread, DRAWN_WITH, range(DRAWN))
-        drawn = [_stops(Reduction(self.circuit, boards.board(k))) for k in range(DRAWN)]
+        drawn = [_zones(Reduction(self.circuit, boards.board(k))) for k in range(DRAWN)]
         return tuple(
             {side: float(np.std([each[k].ends[side] for each in drawn])) for side in stop.ends}
             for k, stop in enumerate(self.stops)
         )
 
 
-def _stops(reduction: Reduction) -> tuple[PredictedStop, ...]:
+def _zones(reduction: Reduction) -> tuple[PredictedStop, ...]:
     """The stages of a board."""
-    system, circuit = reduction.system(), reduction.circuit
-    stops = []
-    for index, stop in enumerate(circuit.stops):
-        row = system.displacement[index]
-        largest = int(np.argmax(np.abs(row[:-1])))
+    circuit, still = reduction.circuit, reduction.solution(reduction.circuit.open)
+    zones = []
+    for stop in circuit.dead_zones:
+        largest = circuit.states.index(stop.state)
+        net, sign = stop.difference or (circuit.state_nets[largest], 1)
+        row = sign * still.voltage[net]
         made_of = {
             net: float(row[k]) for k, net in enumerate(circuit.state_nets) if abs(row[k]) > 0.01
         }
         ends = {
-            side: float(-contact[-1] * row[largest] / contact[largest])
-            for side, contact in system.contact_rows(index).items()
+            side: float(row[-1] + row[largest] * reduction.threshold(stop, contact))
+            for side, contact in stop.contacts
         }
-        opened = reduction.solution(circuit.open).voltage[stop.output]
+        opened = still.voltage[stop.output]
         slope = float(opened[largest] / row[largest])
         gains = {}
         for side, contact in stop.contacts:
             carried = reduction.solution(circuit.carrying(contact)).voltage[stop.output]
             gains[side] = float(carried[largest] / row[largest]) - slope
-        stops.append(
+        zones.append(
             PredictedStop(
                 stop.clearance, stop.output, made_of, ends, (float(opened[-1]), slope), gains
             )
         )
-    return tuple(stops)
+    return tuple(zones)
 
 
 def nearest(responses: Sequence[PredictedResponse], frequency: float) -> list[PredictedResponse]:

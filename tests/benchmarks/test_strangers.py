@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import __main__ as command, bench_strangers, stranger_parts, stranger_systems
 from benchmarks.bench_strangers import ANSWERED, INEXACT, REFUSED, SILENT
-from benchmarks.stranger_systems import SHAPES, draw
+from benchmarks.stranger_systems import LAWS, SHAPES, draw
 from designer.model.find_responses import find
 from designer.model.model_file import parse_model_file
 
@@ -49,6 +49,20 @@ def test_thirty_in_a_row_have_every_shape(monkeypatch: pytest.MonkeyPatch) -> No
     for first in (0, 30):
         drawn = Counter((s.masses, s.clearances) for s in (draw(3, first + k) for k in range(30)))
         assert drawn == dict(SHAPES)
+
+
+def test_ten_in_a_row_have_every_law() -> None:
+    kinds: Counter[str] = Counter()
+    for number in range(10):
+        stranger = draw(5, number, laws=True)
+        modelfile = parse_model_file(stranger.text)
+        system = modelfile.model.second_order()
+        assert (system.size, len(system.clearances)) == (stranger.masses, stranger.clearances)
+        assert any(zone.bend_of for zone in system.dead_zones)
+        kinds.update(kind for kind in stranger.kinds if kind in dict(LAWS))
+        if number < 4:
+            assert all(r.found for r in find(modelfile.model, modelfile.responses))
+    assert kinds == dict(LAWS)
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.board_arrays import Boards
-from designer.circuit.board_modes import at_rest
+from designer.circuit.board_modes import BoardModes, at_rest
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
@@ -383,3 +383,20 @@ def test_a_preloaded_board_rests_against_its_stop() -> None:
     assert rest[0] == pytest.approx(x1 * SCALE.volts[0], rel=1e-5)
     assert ends[1][0] == pytest.approx(-0.1 * SCALE.volts[0], rel=1e-5)
     assert ends[-1][0] == pytest.approx(-0.4 * SCALE.volts[0], rel=1e-5)
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 10**6))
+def test_modes_that_some_boards_enter_are_those_of_all(seed: int) -> None:
+    """Taken from many boards and added to, they are what those boards have for themselves."""
+    system = random_system(seed)
+    circuit = exact_circuit(system, random_scale(system, seed))
+    parts = nominal_board(circuit)
+    boards = Boards.of(circuit, [replace(parts, inverse_gain=g) for g in (1e-5, 1e-6, 1e-7)])
+    which = np.array([0, 2])
+    some, alone = BoardModes(boards).take(which), BoardModes(boards.take(which))
+    for modes in (some, alone):
+        modes.enter_all()
+    assert some.targets.keys == alone.targets.keys
+    for ours, theirs in zip(some.modes, alone.modes, strict=True):
+        np.testing.assert_array_equal(ours, theirs)

@@ -257,7 +257,7 @@ points = [[-1.0, -6.0], [0.5, 3.0], [1.0, 3.0]]
 on = "a"
 amplitude = 1.0
 [[response]]
-omega = 1.55
+omega = 2.3
 [circuit]
 dead_zone = "rectifier"
 """

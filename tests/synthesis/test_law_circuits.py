@@ -1,0 +1,103 @@
+"""Circuits of systems with laws, from drawn model files to what the nominal board does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.stranger_systems import draw
+from designer.base.errors import InputError
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
+from designer.design_rules import run_rules
+from designer.jobs.bench_job import check_fits
+from designer.model.find_responses import matches
+from designer.model.model_file import parse_model_file
+from designer.synthesis.limits import limits
+from designer.workbench.prediction import POINTS, BoardPrediction
+from tests.shared.rule_cases import bent
+from tests.shared.system_text import system_text, table
+
+ONE = system_text({"a": 1.0}, {("a", "ground"): 1.0}, {("a", "ground"): 0.05})
+FORCE = table("force", on="a", amplitude=1.0) + table("response", omega=1.2)
+FRICTION = table("friction", between=["a", "ground"], force=0.2, velocity=0.05)
+
+
+def shows_what_the_model_does(made: Synthesis) -> None:
+    """Within a hundredth of the peaks, for an error of the coefficients that is smaller."""
+    design = made.design
+    assert design.errors.max_error < 0.01
+    assert all(check.holds for check in design.checks)
+    (response,) = made.model_responses
+    orbit = on_circuit(nominal_reduction(design).system(), design, response)
+    assert matches(orbit, response.spec)
+    wanted = response.orbit.extremes
+    found = orbit.extremes / design.volts(response.b)[:, None]
+    assert found == pytest.approx(wanted, abs=0.02 * np.abs(wanted).max())
+
+
+def test_friction_is_made_by_a_limiter() -> None:
+    made = synthesise(parse_model_file(ONE + FRICTION + FORCE))
+    shows_what_the_model_does(made)
+    (zone,) = made.design.circuit.dead_zones
+    assert zone.limits
+    # Past both ends the stage gives the same whatever its parts are.
+    board = nominal_reduction(made.design)
+    for _, contact in zone.contacts:
+        row = board.solution(board.circuit.carrying(contact)).voltage[zone.output]
+        assert np.abs(row[:-1]).max() < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [11, 12, 16, 17, 19, 26])
+def test_drawn_systems_that_a_search_gave_up_on_have_circuits(number: int) -> None:
+    """Bends that no response reaches, bends between masses, a swing that was lowered in steps too
+    small: each of these was refused once."""
+    shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, laws=True).text), jobs=2))
+
+
+def test_a_swing_is_lowered_from_where_the_design_is() -> None:
+    """Not from a limit that it is well inside."""
+    made = synthesise(parse_model_file(ONE + FRICTION + FORCE)).design
+    spec = parse_model_file(ONE + FRICTION + FORCE).circuit
+    assert made.circuit.figures is not None
+    within = limits(spec, frozenset({"swing"}), made.circuit.figures, 13.5, 100.0)
+    top = next(check for check in made.checks if check.quantity == "swing_v")
+    lower = [replace(c, found=0.8 * within.swing) if c == top else c for c in made.checks]
+    broken = replace(top, quantity="guaranteed_swing_v", limit=8.0, found=8.2)
+    tighter = within.tightened([broken], replace(made, checks=tuple(lower)), slower=False)
+    assert tighter.swing == pytest.approx(0.8 * within.swing * 8.0 / 8.2, rel=2e-3)
+
+
+def test_what_a_scope_shows_of_a_bend_is_what_the_nodes_say() -> None:
+    made = bent(0.01).synthesis
+    prediction = BoardPrediction(made)
+    (shown,) = prediction.responses
+    setting = shown.setting
+    flow = circuit_flow(prediction.reduction.system(), made.design, made.model_responses[0])
+    run = flow.run(shown.orbit.start, shown.orbit.n, mode=shown.orbit.mode or None, points=POINTS)
+    (zone,) = prediction.circuit.bends
+    contact = dict(zone.contacts)[1]
+    (place,) = (end for stop in prediction.zones for end in stop.ends.values())
+    keys = [prediction.circuit.open, prediction.circuit.carrying(contact)]
+    angle = 2.0 * np.pi * np.arange(len(run.strobes) - 1) / POINTS
+    generator = -setting.amplitude_v_peak * np.sin(angle)
+    for k in range(0, len(generator), 7):
+        x = run.strobes[k]
+        volts = prediction.reduction.output(
+            keys[int(x[0] > place)], zone.output, x[None], generator[k : k + 1]
+        )
+        assert shown.waves[zone.output][k] == pytest.approx(volts[0], abs=2e-3)
+    assert np.ptp(shown.waves[zone.output]) > 0.5
+    with pytest.raises(InputError, match="bends of K") as refused:
+        check_fits(prediction, fit=True, boards=False, decays=[])
+    assert refused.value.field == "--fit"
+
+
+def test_a_law_keeps_every_rule_that_a_clearance_keeps() -> None:
+    subject = bent(0.01)
+    found = {o.rule.id: o for o in run_rules.on_circuit(subject, {})}
+    assert found["far-slope"].status == "pass"
+    assert found["dead-zone-stiffness"].value < 1e-3
