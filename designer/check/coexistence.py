@@ -149,15 +149,18 @@ def of_flow(
     seed: int,
     orbits: Sequence[Orbit] = (),
     unit: Array | None = None,
+    *,
+    even: bool = True,
 ) -> Coexistence:
     """Where the starts end under a flow.
 
     box : (states,) half-widths in model units. orbits : attractors that are listed first, in this
     order. unit : (states,) size of a model unit in the states of a circuit, whose twins are those
-    that look like mirror images; None for a model.
+    that look like mirror images; None for a model. even : of a circuit, whether its model has
+    mirror twins.
     """
     states = random_starts(box, starts, seed) * (1.0 if unit is None else unit)
-    tally = _Tally(flow, orbits, alike=unit is not None)
+    tally = _Tally(flow, orbits, alike=unit is not None and even)
     run, unsettled = tally.take(states)
     return Coexistence(run, starts, seed, box, tally.basins(), unsettled)
 

@@ -358,7 +358,8 @@ def _on_circuit(
     first = _attractors([measured[i] for i in rows])
     model = synthesis.modelfile.model.at(r.b)
     box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts
-    result = coexistence.of_flow(flow, box, *sampling, first, volts)
+    even = model.second_order().even
+    result = coexistence.of_flow(flow, box, *sampling, first, volts, even=even)
     more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
     rows += range(len(measured), len(measured) + len(more))
     measured += more

@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator
 from designer.base.arrays import Array
 from designer.base.figure_style import (
     GRID,
+    MODEL_COLOUR,
     MUTED,
     ON_DARK,
     ON_LIGHT,
@@ -24,6 +25,7 @@ from designer.base.figure_style import (
     styled,
 )
 from designer.circuit.coefficients import EXACT
+from designer.circuit.law_curves import LawCurve
 from designer.verdicts.verdict import Answer, Verdict
 from designer.workbench.prediction import PredictedStop
 from designer.yields.yield_count import Yield
@@ -52,6 +54,26 @@ def stop_chart(name: str, stop: PredictedStop) -> Figure:
     axes.set_xlim(*limits)
     axes.set_xlabel(f"{name} [V]")
     axes.set_ylabel(f"{stop.output} [V]")
+    return figure
+
+
+@styled
+def law_chart(curve: LawCurve) -> Figure:
+    """A force law: by the model a broad light line, by the nominal board a dashed one; its corners
+    as dots, what the responses reach shaded."""
+    figure = new_figure(5.2, 2.8)
+    axes = figure.subplots()
+    if curve.reached is not None:
+        axes.axvspan(*curve.reached, color=GRID, lw=0, zorder=0, label="reached by the responses")
+    axes.plot(curve.x, curve.wanted, color=MODEL_COLOUR, lw=4.0, label="model")
+    axes.plot(curve.x, curve.made, color=ON_LIGHT, lw=1.1, ls="--", label="nominal board")
+    corners = np.array(curve.corners)
+    axes.plot(corners, np.interp(corners, curve.x, curve.wanted), "o", color=ON_LIGHT, ms=3.0)
+    axes.set_xlim(float(curve.x[0]), float(curve.x[-1]))
+    axes.set_xlabel(curve.symbol)
+    axes.set_ylabel(f"force [{curve.unit}]" if curve.unit else "force")
+    axes.set_title(curve.name)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure
 
 

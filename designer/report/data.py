@@ -17,6 +17,7 @@ from designer.board.kicad_reader import BoardFile
 from designer.check.checked_design import CheckedResponse, traces
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
+from designer.circuit.law_curves import LawCurve, law_curves
 from designer.circuit.netlist import Circuit
 from designer.circuit.nominal import Trace
 from designer.design_rules.rule_subject import RuleSubject
@@ -148,12 +149,23 @@ class ReportData:
         each = (m.in_unit(motion.scale, motion.unit) for m in companion_motions(system))
         return tuple(m for m in each if np.array_equal(m.row, motion.row))
 
-    @cached_property
+    @property
     def stops(self) -> tuple[PredictedStop, ...]:
-        """The dead zones of the nominal board, one for each clearance."""
+        """The stages of the clearances on the nominal board."""
+        return self.zones[: len(self.design.circuit.stops)]
+
+    @cached_property
+    def zones(self) -> tuple[PredictedStop, ...]:
+        """The stages of all dead zones of the nominal board, those of the clearances first."""
         result = self.result
         nominal = Synthesis(result.modelfile, result.catalog, result.model_responses, result.design)
-        return BoardPrediction(nominal).stops
+        return BoardPrediction(nominal).zones
+
+    @cached_property
+    def laws(self) -> tuple[LawCurve, ...]:
+        """The force laws, as wanted and as the nominal board makes them."""
+        orbits = [c.model.orbit.extremes for c in self.checked]
+        return law_curves(self.design, orbits, si=in_si(self.si, self.design.model))
 
     @cached_property
     def bom(self) -> list[Mapping[str, str]]:

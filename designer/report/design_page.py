@@ -172,7 +172,12 @@ def _system(model: LumpedSystem, drawing: Picture, *, si: bool) -> PageSection:
         caption += " A comparison in the equations is 1 where it holds, else 0."
     equations: list[Block] = []
     for title, lines in (
-        ("With symbols; u is the displacement in a clearance:", equations_of(model)),
+        (
+            "With symbols; u is the displacement in a clearance, or what a law depends on:"
+            if model.second_order().laws
+            else "With symbols; u is the displacement in a clearance:",
+            equations_of(model),
+        ),
         ("With the numbers of this model:", equations_of(model, number_of)),
     ):
         equations += [SmallPrint(title), Verbatim(lines, equations=True)]
@@ -231,8 +236,10 @@ def _dead_zones(data: ReportData, pictures: Pictures) -> PageSection:
         "nodal analysis: a slow ramp at the input draws the same on a scope set to XY."
     )
     drawn = [p for name, p in pictures.items() if name.startswith("stop ")]
-    curves: list[Block] = [SmallPrint(note), *drawn, design_tables.stop_table(data.stops)]
-    blocks = curves if data.stops else []
+    blocks: list[Block] = []
+    if data.zones:
+        blocks = [SmallPrint(note), *drawn, design_tables.stop_table(data.zones)]
+    blocks += [p for name, p in pictures.items() if name.startswith("law ")]
     return PageSection("DC curve of the dead zone", blocks, "dc", "DC curve")
 
 

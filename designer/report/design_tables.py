@@ -162,7 +162,7 @@ def _wanted(design: Design, name: str) -> str:
 
 
 def stop_table(stops: Sequence[PredictedStop]) -> Table | None:
-    """Where contact begins in each dead zone of the nominal board, and how steep its output is."""
+    """Where each dead zone of the nominal board ends, and how steep its output is."""
     rows = [
         (
             stop.clearance,
@@ -177,8 +177,8 @@ def stop_table(stops: Sequence[PredictedStop]) -> Table | None:
         for side, end in sorted(stop.ends.items(), reverse=True)
     ]
     columns = (
-        "clearance", "stop", "displacement", "contact begins at", "output", "V per V inside",
-        "V per V in contact",
+        "dead zone", "side", "moves with", "begins at", "output", "V per V inside",
+        "V per V beyond",
     )  # fmt: skip
     return table(columns, rows, (3, 5, 6))
 

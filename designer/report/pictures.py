@@ -96,6 +96,10 @@ def pictures(data: ReportData) -> Pictures:
             "in the table.",
         )
         out[stop_name(number)] = Picture(svg=svg, plot=stop_name(number))
+    for curve in data.laws:
+        shows = f"Force of {curve.name}: by the model, and as the nominal board makes it."
+        name = f"law {curve.name}"
+        out[name] = Picture(svg=once(name, partial(study_plots.law_chart, curve), shows))
     angular = data.result.modelfile.angular
     for one in data.study.maps:
         label = words.label(data.checked[data.study.response_indices[one.question]], " ")

@@ -142,7 +142,7 @@ def circuit_cells(
     pins = {net for s in circuit.sections for net in s.nets}
     rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
     shown = {net for part in fittings for net in part.nets}
-    visible = frozenset(pins | rails | shown | {*circuit.stage_outputs})
+    visible = frozenset(pins | rails | shown | _stage_outputs(circuit))
     two_pin = [*(p for p in circuit.parts if not isinstance(p, Section)), *fittings]
     left = chains(two_pin, visible)
     stages = section_stages(circuit)
@@ -164,12 +164,20 @@ def circuit_cells(
     return tuple(row for row in rows if row)
 
 
+def _stage_outputs(circuit: Circuit) -> set[str]:
+    """Outputs of dead-zone stages, and of their halves where these have one each: what a diode
+    joins to an op-amp's output."""
+    amplifiers = {net for s in circuit.sections for net in (s.output, s.inverting)}
+    joined = {net for s in circuit.sections for net in circuit.output_nets(s)}
+    return {*circuit.stage_outputs, *(joined - amplifiers)}
+
+
 def _amplifier(circuit: Circuit, section: Section, stage: str, left: list[Chain]) -> Amplifier:
     """The cell of a section; takes its chains out of ``left``."""
     node, out = section.inverting, section.output
     nodes = {s.inverting for s in circuit.sections}
     # Behind its diode a rectifier's output is the stage's.
-    beyond = {net for net in circuit.stage_outputs for c in left if c.nets == {out, net}}
+    beyond = {net for net in _stage_outputs(circuit) for c in left if c.nets == {out, net}}
     ends = {out, *beyond} - nodes
     inputs: list[Chain] = []
     feedback: list[Chain] = []

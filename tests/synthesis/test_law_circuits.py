@@ -9,7 +9,10 @@ import pytest
 
 from benchmarks.stranger_systems import draw
 from designer.base.errors import InputError
+from designer.check.coexistence import of_flow
 from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.law_curves import law_curves
+from designer.circuit.netlist import Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.design_rules import run_rules
 from designer.jobs.bench_job import check_fits
@@ -48,6 +51,25 @@ def test_friction_is_made_by_a_limiter() -> None:
     for _, contact in zone.contacts:
         row = board.solution(board.circuit.carrying(contact)).voltage[zone.output]
         assert np.abs(row[:-1]).max() < 1e-4
+
+
+def test_the_curve_of_a_law_is_that_of_the_board() -> None:
+    """As wanted on the chosen parts; with R50 a tenth larger the friction is a tenth smaller."""
+    design = synthesise(parse_model_file(ONE + FRICTION + FORCE)).design
+    curve = law_curves(design, [np.array([[-1.0, 1.0], [-2.0, 1.5]])], si=False)[0]
+    assert (curve.symbol, curve.unit, curve.reached) == ("x₁′", "", (-2.0, 1.5))
+    assert curve.corners == (-0.05, 0.05)
+    assert curve.wanted == pytest.approx(np.clip(4.0 * curve.x, -0.2, 0.2))
+    assert curve.made == pytest.approx(curve.wanted, abs=0.001)
+    parts = tuple(
+        replace(p, value=1.1 * p.value) if isinstance(p, Resistor) and p.name == "R50" else p
+        for p in design.circuit.parts
+    )
+    weaker = replace(design, circuit=replace(design.circuit, parts=parts))
+    off = law_curves(weaker, [np.array([[-1.0, 1.0], [-2.0, 1.5]])], si=False)[0]
+    beyond = off.x > 0.06
+    change = (off.made[beyond] - 4.0 * off.x[beyond]) / (curve.made[beyond] - 4.0 * off.x[beyond])
+    assert change == pytest.approx(1.0 / 1.1, rel=0.01)
 
 
 @pytest.mark.slow
@@ -101,3 +123,12 @@ def test_a_law_keeps_every_rule_that_a_clearance_keeps() -> None:
     found = {o.rule.id: o for o in run_rules.on_circuit(subject, {})}
     assert found["far-slope"].status == "pass"
     assert found["dead-zone-stiffness"].value < 1e-3
+
+
+def test_a_circuit_of_an_uneven_model_has_no_twins() -> None:
+    made = bent(0.01).synthesis
+    system = nominal_reduction(made.design).system()
+    flow = circuit_flow(system, made.design, made.model_responses[0])
+    found = of_flow(flow, np.ones(2), 8, 1, (), made.design.volts(), even=False)
+    assert [basin.twins for basin in found.basins] == [None] * len(found.basins)
+    assert found.basins[0].orbit.symmetric is False
