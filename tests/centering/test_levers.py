@@ -25,12 +25,14 @@ from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.synthesis import parts_choice
 from tests.shared.chains import chain_text
-from tests.shared.search_cases import catalog, file
+from tests.shared.search_cases import asked, catalog, file
 from tests.shared.system_text import clearance
 
 pytestmark = pytest.mark.usefixtures("designs_are_made_once")
 
 PLACE = 'omega = 0.8\nexpect = "1-2-2"'
+LOW_BAND = asked(PLACE).replace("[circuit]", "[circuit]\nfrequency = [5, 1000]")
+"""With a band that leaves room for slower time scales, whichever design is found."""
 BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
 
 
@@ -190,9 +192,9 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
 ) -> None:
     """ngspice is played by a rule: below a frequency it keeps every board, above it half."""
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
-    wanted = file(PLACE)
+    wanted = parse_model_file(LOW_BAND)
 
-    def asked(limit: float) -> list[RungOutcome]:
+    def checks_of(limit: float) -> list[RungOutcome]:
         def listen(
             bench: ScaledBoards,
             stands: Sequence[OperatingOrbit | None],
@@ -211,14 +213,14 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
         assert found.synthesis.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
         return checks
 
-    free = asked(1e9)
+    free = checks_of(1e9)
     assert len(free) == 1
     (own,) = (h.frequency for h in free)
-    slower = asked(0.4 * own)
+    slower = checks_of(0.4 * own)
     assert [h.adopted for h in slower] == [False] * (len(slower) - 1) + [True]
     assert slower[-1].frequency <= 0.4 * own < slower[-2].frequency
     # Where no time scale is slow enough, the first of the best stands.
-    never = asked(0.0)
+    never = checks_of(0.0)
     assert [h.adopted for h in never] == [True] + [False] * (len(never) - 1)
     assert len(never) > len(slower) - 1
 
@@ -247,12 +249,12 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
 ) -> None:
     """The bandwidth bears out the third time scale or none, ngspice all: it is asked once."""
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
-    asked: list[float] = []
+    heard: list[float] = []
 
     def listen(
         bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], _: object
     ) -> Agreements:
-        asked.append(bench.design.errors.scales.frequency(1.0))
+        heard.append(bench.design.errors.scales.frequency(1.0))
         return (Agreement(16, 16),) * len(stands)
 
     played = itertools.chain([8, 8], itertools.repeat(15 if bears_out else 8))
@@ -261,14 +263,14 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
         return lambda bench, stands, progress: (Agreement(16, next(played)),) * len(stands)
 
     monkeypatch.setattr("designer.centering.design_search.LaggingBoards", lagging)
-    found = search(file(PLACE), catalog(), listen=listen)
+    found = search(parse_model_file(LOW_BAND), catalog(), listen=listen)
     answers = [h.adopted for h in found.checks if h.rung == BANDWIDTH]
     if bears_out:
         assert answers == [False, False, True]
     else:  # the first of the best
         assert answers == [True] + [False] * (len(answers) - 1)
         assert len(answers) > 2
-    assert asked == [h.frequency for h in found.checks if h.rung == RUNG and h.adopted]
+    assert heard == [h.frequency for h in found.checks if h.rung == RUNG and h.adopted]
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:
