@@ -199,14 +199,19 @@ class _Drawn:
             self._constant[mass] = rng.uniform(0.05, 0.5) * self._force.max() * rng.choice([-1, 1])
             self._kinds.add("constant force")
 
-    def _gap(self, number: int) -> dict[str, object]:
-        """A clearance: what stands in it, its gaps and its stops, in drawn units."""
+    def _joined(self) -> tuple[int, str]:
+        """A mass, and what it is joined to: the ground, or another mass now and then."""
         rng, n = self._rng, len(self._names)
-        i = int(rng.integers(n))
-        other = "ground"
+        i, other = int(rng.integers(n)), "ground"
         if n > 1 and rng.uniform() < 0.35:
             other = self._names[int(rng.choice([j for j in range(n) if j != i]))]
             self._kinds.add("between masses")
+        return i, other
+
+    def _gap(self, number: int) -> dict[str, object]:
+        """A clearance: what stands in it, its gaps and its stops, in drawn units."""
+        rng = self._rng
+        i, other = self._joined()
         reach = float(max(self._reach[i], 0.3 * self._reach.max()))
         own = float(self._matrix(self._springs)[i, i])
 
@@ -249,12 +254,8 @@ class _Drawn:
 
     def _drawn_law(self, law: str) -> tuple[str, dict[str, tuple[object, str]]]:
         """Its table and its keys, each with the unit of its value."""
-        rng, n = self._rng, len(self._names)
-        i = int(rng.integers(n))
-        other = "ground"
-        if n > 1 and rng.uniform() < 0.35:
-            other = self._names[int(rng.choice([j for j in range(n) if j != i]))]
-            self._kinds.add("between masses")
+        rng = self._rng
+        i, other = self._joined()
         own, reach = float(self._matrix(self._springs)[i, i]), float(self._reach.max())
         fast = reach * math.sqrt(own / self._mass[i])
         force = float(self._force.max())

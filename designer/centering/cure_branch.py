@@ -85,10 +85,10 @@ def branches(
         now = catalog.opamp(spec.opamp)
         names += [o.name for o in better_opamps(now, spec.supply, catalog)]
     zones: list[str | None] = [None]
-    clearances = base.modelfile.model.second_order().dead_zones
-    if DEAD_ZONE not in without and clearances:
+    dead_zones = base.modelfile.model.second_order().dead_zones
+    if DEAD_ZONE not in without and dead_zones:
         other: DeadZone = "rectifier" if spec.dead_zone == "saturation" else "saturation"
-        zones += [other] if stage_refusal(clearances, other) is None else []
+        zones += [other] if stage_refusal(dead_zones, other) is None else []
     for zone in zones:
         for name in names:
             if name is not None or zone is not None:

@@ -96,8 +96,8 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
             field = "search.opamps" if error.field == "circuit.opamp" else error.field
             raise InputError(None, field, error.found, error.expected) from None
     opamps = spec.opamps or (file_choice.opamp,)
-    clearances = modelfile.model.second_order().dead_zones
-    able = [zone for zone in spec.dead_zones if stage_refusal(clearances, zone) is None]
+    dead_zones = modelfile.model.second_order().dead_zones
+    able = [zone for zone in spec.dead_zones if stage_refusal(dead_zones, zone) is None]
     choices = [
         replace(file_choice, opamp=opamp, dead_zone=zone)
         for opamp in opamps

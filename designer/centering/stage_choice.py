@@ -166,9 +166,9 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
 
 def _able(modelfile: ModelFile) -> list[DeadZone]:
     """The stages that make the clearances of a model; none where it has none."""
-    clearances = modelfile.model.second_order().dead_zones
-    kinds: tuple[DeadZone, ...] = get_args(DeadZone) if clearances else ()
-    return [kind for kind in kinds if stage_refusal(clearances, kind) is None]
+    dead_zones = modelfile.model.second_order().dead_zones
+    kinds: tuple[DeadZone, ...] = get_args(DeadZone) if dead_zones else ()
+    return [kind for kind in kinds if stage_refusal(dead_zones, kind) is None]
 
 
 def _differ(one: int, two: int) -> bool:

@@ -266,7 +266,7 @@ def _limiter(
     """
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    between, role = place.net("fu"), "limiter"
+    between, role, ends = place.net("fu"), "limiter", dict(place.clearance.sides)
     for side, source, output in ((1, place.displacement, between), (-1, between, place.output)):
         half = half_names(place, side)
         word = "upper" if side > 0 else "lower"
@@ -274,7 +274,7 @@ def _limiter(
             _section(half.section, half.node, half.output, f"{word} end of the {role}"),
             *resistor(half.source, source, half.node, f"{word} end of the {role}"),
         ]
-        if _limiter_threshold(place.clearance, side):
+        if side < 0 or ends[side].gap:
             parts += resistor(half.threshold, RAILS[-1], half.node, f"{word} end of the {role}")
         parts += [
             *resistor(half.feedback, half.node, output, f"{word} end of the {role}"),
@@ -284,13 +284,6 @@ def _limiter(
         contacts[side] = Contact(half.series, 0, ((half.clamp, 1),))
     parts += rails(-1, f"reference of the {role}", "feed of the reference, lower half")
     return parts, _stop(place, contacts, parts)
-
-
-def _limiter_threshold(clearance: Clearance, side: int) -> float:
-    """What the threshold of one half of a limiter is, before the gains, in the model's unit: the
-    place above rest, then the distance of both places."""
-    ends = dict(clearance.sides)
-    return ends[1].gap if side > 0 else ends[1].gap + ends[-1].gap
 
 
 def _half(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,6 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_reading import DeadZoneReading
 from designer.circuit.design import Design
 from designer.circuit.reduction import Reduction
-from designer.model.clearance import Clearance
 from designer.model.force_law import ForceLaw
 from designer.model.relative_motion import subscripted
 
@@ -21,6 +21,9 @@ FAR = 1.25
 """Of the furthest corner, or of the furthest motion: how far a curve is drawn."""
 POINTS = 401
 """Of a curve."""
+MadeBend = tuple[int, float, float]
+"""The side on which it is, 1 upper or -1 lower, its distance from rest, and its change of the
+slope."""
 
 
 @dataclass(frozen=True)
@@ -51,43 +54,32 @@ def law_curves(design: Design, extremes: list[Array], *, si: bool) -> tuple[LawC
     extremes : (states, 2) of each wanted response, in model units. si : whether the model's numbers
     are SI values.
     """
-    system = design.model.second_order()
-    bends = dict(_made_bends(design))
-    return tuple(_curve(law, bends, extremes, si=si) for law in system.laws)
+    bends = _made_bends(design)
+    laws = design.model.second_order().laws
+    return tuple(_curve(law, bends.get(law.name, []), extremes, si=si) for law in laws)
 
 
-def _made_bends(design: Design) -> Iterator[tuple[str, list[tuple[Clearance, int, float, float]]]]:
-    """By law: the dead zone, the side, its place and its change of the slope as the board has
-    them, in model units."""
+def _made_bends(design: Design) -> dict[str, list[MadeBend]]:
+    """By law, or by clearance, in model units."""
     system, scales = design.model.second_order(), design.errors.scales
     reduction = Reduction(design.circuit, nominal_board(design.circuit, ideal=True))
-    found: dict[str, list[tuple[Clearance, int, float, float]]] = {}
+    found: dict[str, list[MadeBend]] = defaultdict(list)
     for k, zone in enumerate(system.dead_zones):
         if not zone.bend_of:
             continue
-        reading, state, row = (
-            DeadZoneReading.of(reduction, k, zone),
-            zone.watched,
-            2 * zone.mass + 1,
-        )
+        reading = DeadZoneReading.of(reduction, k, zone)
+        state, row = zone.watched, 2 * zone.mass + 1
         unit = scales.seconds * scales.volts[state] / scales.volts[row] * system.mass[zone.mass]
         for side, volts in reading.thresholds.items():
-            slope = reading.slopes.get(side, reading.slopes.get(0))
-            assert slope is not None
+            slope = reading.slopes[side if side in reading.slopes else 0]
             place = volts / float(scales.volts[state])
-            change = -float(slope[row, state] * unit)
-            found.setdefault(zone.bend_of, []).append((zone, side, place, change))
-    yield from found.items()
+            found[zone.bend_of].append((side, place, -float(slope[row, state] * unit)))
+    return found
 
 
 def _curve(
-    law: ForceLaw,
-    bends: dict[str, list[tuple[Clearance, int, float, float]]],
-    extremes: list[Array],
-    *,
-    si: bool,
+    law: ForceLaw, own: Sequence[MadeBend], extremes: Sequence[Array], *, si: bool
 ) -> LawCurve:
-    own = bends.get(law.name, [])
     places = [i for i, factor in enumerate(law.row) if factor]
     # A law of one mass seen from the ground's side is drawn over the mass's own displacement.
     sign = law.row[places[0]] if len(places) == 1 else 1.0
@@ -102,7 +94,7 @@ def _curve(
     corners = tuple(sorted(sign * corner for corner in law.corners))
     x = np.unique([*np.linspace(-far, far, POINTS), *corners])
     made = sign * law.offset + law.slope * x
-    for _, side, place, change in own:
+    for side, place, change in own:
         made = made + side * change * np.maximum(side * x - place, 0.0)
     wanted = np.asarray(sign * law.force(sign * x))
     (metre, length), (newton, force) = (1.0, ""), (1.0, "")

@@ -359,6 +359,14 @@ class Circuit:
         """Every dead zone that has a stage: the clearances, then the others."""
         return (*self.stops, *self.bends)
 
+    @cached_property
+    def chains(self) -> Mapping[str, Sequence[Stop]]:
+        """The dead zones of each clearance and of each law, the first to be met first."""
+        chains: dict[str, list[Stop]] = {stop.clearance: [stop] for stop in self.stops}
+        for bend in self.bends:
+            chains.setdefault(bend.bend_of, []).append(bend)
+        return chains
+
     @property
     def stage_outputs(self) -> tuple[str, ...]:
         """Nets of the dead-zone stages' outputs, in the order of ``dead_zones``."""
@@ -435,10 +443,7 @@ class Circuit:
     def _ways(self) -> list[list[list[dict[str, int]]]]:
         """For each clearance, or each law, the positions of its switches: open, then on the way
         into each contact, then past each further bend on that side."""
-        chains: dict[str, list[Stop]] = {stop.clearance: [stop] for stop in self.stops}
-        for bend in self.bends:
-            chains.setdefault(bend.bend_of, []).append(bend)
-        return [self._ways_along(chain) for chain in chains.values()]
+        return [self._ways_along(chain) for chain in self.chains.values()]
 
     @staticmethod
     def _ways_along(chain: Sequence[Stop]) -> list[list[dict[str, int]]]:

@@ -120,10 +120,15 @@ class Reduction:
         for k, (stop, i) in enumerate(zip(c.stops, moving, strict=True)):
             if stop.difference is not None:
                 net, sign = stop.difference
-                A, row = self._mode(c.open).A, sign * self.solution(c.open).voltage[net]
+                A, row = self._still.A, sign * self.solution(c.open).voltage[net]
                 displacement[k] = row
                 velocity[k] = np.append(row[:size] @ A / A[i, i + 1], row[size])
         return tuple(displacement), tuple(velocity)
+
+    @cached_property
+    def _still(self) -> Mode:
+        """With every clearance open."""
+        return self._mode(self.circuit.open)
 
     def _mode(self, key: ModeKey) -> Mode:
         solved, n = self.solution(key), len(self._equations.states)
@@ -163,7 +168,7 @@ class Reduction:
         assert stop.upper is not None
         assert stop.lower is not None
         c = self.circuit
-        rest = self._mode(c.open)
+        rest = self._still
         above, below = (self._mode(c.carrying(contact)) for contact in (stop.upper, stop.lower))
         ends = [self.threshold(stop, contact) for _, contact in stop.contacts]
         M, largest = self._equations.mirror, float(np.abs(above.d).max())
@@ -178,8 +183,7 @@ class Reduction:
         """Voltage of a dead zone's state at which its contact begins, every other state at zero."""
         c = self.circuit
         switch = c.switches.index(contact.switch)
-        guards = self._mode(c.open).guards
-        guard = next(g for g in guards if g.target[switch] == contact.position)
+        guard = next(g for g in self._still.guards if g.target[switch] == contact.position)
         return -guard.e / float(guard.C[c.states.index(stop.state)])
 
 

@@ -152,8 +152,8 @@ def far_slope(s: RuleSubject) -> Iterator[Finding]:
     circuit, grades = s.circuit, s.resistor_grades
     zones = s.design.model.second_order().dead_zones
     for chain in dict.fromkeys(zone.bend_of for zone in zones if zone.bend_of and zone.falls):
-        own = [zone for zone in zones if chain in (zone.bend_of, zone.name)]
-        for side in dict.fromkeys(side for zone in own for side in zone.positions):
+        own = circuit.chains[chain]
+        for side in dict.fromkeys(side for zone in own for side, _ in zone.contacts):
             nominal = far_slope_of(circuit, chain, side)
             shares = {
                 r.name: (

@@ -263,7 +263,8 @@ def _dead_zone(design: Design) -> dict[str, Any] | None:
     if not design.circuit.dead_zones:
         return None
     errors = design.errors
-    slopes = [error for name, error in errors.errors.items() if " slope" in f" {name}"]
+    kinds = ("stop slope", "bend slope")
+    slopes = [e for name, e in errors.errors.items() if any(kind in name for kind in kinds)]
     return {
         "kind": "rectifier" if design.circuit.diodes else "saturation",
         "saturation": _limit(design.circuit),

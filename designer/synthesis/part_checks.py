@@ -137,6 +137,13 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     refusal = stage_refusal(zones, stage_kind(spec, zones))
     if refusal is not None:
         raise refusal
+    limiting = [zone.bend_of for zone in zones if zone.limits]
+    for key, value in (("most_values", spec.most_values), ("matched", spec.matched)):
+        if limiting and value:
+            expected = (
+                f"none beside a force that limits ({limiting[0]}): its parts are chosen by scales"
+            )
+            raise InputError(None, f"circuit.{key}", value, expected)
 
 
 def _too_many(system: SecondOrderSystem) -> tuple[str, str]:

@@ -175,9 +175,9 @@ def far_slope(
     """Slope beyond every bend of a law, or of a stop, on one side: what the velocity of its mass
     loses by what it depends on [1/s² or 1/s], with all that is linear.
 
-    chain : ``Stop.bend_of``. values : as of ``leftovers``.
+    chain : its name in ``Circuit.chains``. values : as of ``leftovers``.
     """
-    zones = [zone for zone in circuit.dead_zones if chain in (zone.bend_of, zone.clearance)]
+    zones = circuit.chains[chain]
     sides = [side * (zone in zones and side in dict(zone.contacts)) for zone in circuit.dead_zones]
     state = circuit.states.index(zones[0].state)
     board = _with(circuit, values)

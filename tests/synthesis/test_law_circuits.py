@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.exact_records import drawn_records
 from benchmarks.stranger_systems import draw
 from designer.base.errors import InputError
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.coexistence import of_flow
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.law_curves import law_curves
@@ -19,6 +21,8 @@ from designer.jobs.bench_job import check_fits
 from designer.model.find_responses import matches
 from designer.model.model_file import parse_model_file
 from designer.synthesis.limits import limits
+from designer.synthesis.part_checks import check_choices
+from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.prediction import POINTS, BoardPrediction
 from tests.shared.rule_cases import bent
 from tests.shared.system_text import system_text, table
@@ -132,3 +136,25 @@ def test_a_circuit_of_an_uneven_model_has_no_twins() -> None:
     found = of_flow(flow, np.ones(2), 8, 1, (), made.design.volts(), even=False)
     assert [basin.twins for basin in found.basins] == [None] * len(found.basins)
     assert found.basins[0].orbit.symmetric is False
+
+
+@pytest.mark.parametrize("key", ["most_values = 8", 'matched = [["R50", "R1"]]'])
+def test_what_scales_do_not_know_is_refused_beside_a_limiter(key: str) -> None:
+    """Both would be left out in silence: what limits is always chosen by scales."""
+    file = parse_model_file(f"{ONE}{FRICTION}{FORCE}[circuit]\n{key}\n")
+    with pytest.raises(InputError, match="that limits") as refused:
+        check_choices(file.model, file.circuit, load_catalog())
+    assert refused.value.field == f"circuit.{key.split()[0]}"
+
+
+def test_channels_of_a_board_with_a_law_are_told_with_a_doubt() -> None:
+    made = bent(0.01).synthesis
+    prediction, named = BoardPrediction(made), 0
+    for drawn in drawn_records(made, range(8), 3):
+        try:
+            motion = recorded_motion(drawn.record, prediction, told=drawn.told)
+        except InputError:
+            continue
+        named += 1
+        assert drawn.told or motion.doubt
+    assert named
