@@ -74,14 +74,31 @@ def open_in(spec: Response) -> bool:
     return spec.omega is None or isinstance(spec.b, tuple)
 
 
+def need_periods(wanted: Sequence[Response]) -> None:
+    """Refuse what neither a search nor a cure can follow.
+
+    Raises
+    ------
+    InputError : a response without a period is wanted.
+    """
+    for number, spec in enumerate(wanted, start=1):
+        if spec.expect is not None and not spec.periodic:
+            expected = (
+                "n-p-q for a search, which follows orbits to where they end; how many boards show "
+                f'"{spec.expect}" is what run and tolerance count'
+            )
+            raise InputError(None, f"response[{number}].expect", str(spec.expect), expected)
+
+
 def check(wanted: Sequence[Response]) -> None:
     """Refuse what no search can find.
 
     Raises
     ------
-    InputError : ω or b is open and nothing says which response is wanted, or a range of b is one
-        value.
+    InputError : a response without a period; ω or b is open and nothing says which response is
+        wanted, or a range of b is one value.
     """
+    need_periods(wanted)
     for number, spec in enumerate(wanted, start=1):
         if not open_in(spec):
             continue

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,9 +23,10 @@ from designer.circuit.nominal import (
     trace_of,
 )
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import SURE, Orbit, OrbitStatus
 from designer.model.find_responses import ModelResponse
-from designer.spice import numerics_gate as gate
+from designer.model.response_table import Response
+from designer.spice import numerics_gate as gate, twin_runs
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import name_in_ngspice
@@ -47,6 +49,20 @@ class CheckedResponse:
     """The design that was checked; None where nothing is measured of the exact answers' trust."""
     flow: Flow | None = None
     """Flow of the design's circuit at this response; None as ``design`` is."""
+
+    @property
+    def exponents(self) -> dict[str, tuple[float, float]]:
+        """Largest Lyapunov exponent and its standard error of each engine that has measured one of
+        a motion without a period, per unit of the model's time."""
+        seconds = self.model.omega / (2.0 * math.pi * self.excitation.frequency)
+        of = {"model": (self.model.orbit, 1.0), "circuit": (self.circuit, seconds)}
+        if self.ngspice is not None:
+            of["ngspice"] = self.ngspice, seconds
+        return {
+            engine: (orbit.lyapunov * scale, orbit.lyapunov_error * scale)
+            for engine, (orbit, scale) in of.items()
+            if math.isfinite(orbit.lyapunov_error)
+        }
 
     @cached_property
     def model_trust(self) -> Trust:
@@ -97,8 +113,22 @@ class CheckedResponse:
         if ngspice is None:
             return True
         if name_in_ngspice(circuit.response) == OrbitStatus.APERIODIC:
-            return ngspice.status is OrbitStatus.APERIODIC
+            return ngspice.status is OrbitStatus.APERIODIC and _alike(circuit, ngspice)
         return (ngspice.status, ngspice.counts.family) == (circuit.status, circuit.counts.family)
+
+
+def _alike(one: Orbit, other: Orbit) -> bool:
+    """Whether two exponents may be one, within their errors; where one is not known they may."""
+    error = math.hypot(one.lyapunov_error, other.lyapunov_error)
+    apart = abs(one.lyapunov - other.lyapunov)
+    return not (other.status is one.status and apart > SURE * error)
+
+
+def as_named_in_ngspice(wanted: Response) -> Response:
+    """A wanted response by the name that ngspice has for it."""
+    if wanted.periodic or wanted.expect is None:
+        return wanted
+    return replace(wanted, expect=OrbitStatus(name_in_ngspice(str(wanted.expect))))
 
 
 def check(
@@ -128,7 +158,8 @@ def check(
     elif pool is not None:
         progress("ngspice, numerics gate")
         pairs = zip(settings, orbits, strict=True)
-        results = gate.check(pool, [gate.GateSubject(reduction, e, o) for e, o in pairs])
+        subjects = [gate.GateSubject(reduction, e, o) for e, o in pairs]
+        results = twin_runs.with_exponents(pool, subjects, gate.check(pool, subjects))
     return tuple(
         CheckedResponse(r, o, e, g, design, flow)
         for r, o, e, g, flow in zip(responses, orbits, settings, results, flows, strict=True)

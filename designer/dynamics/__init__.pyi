@@ -16,6 +16,7 @@ from .attractors import (
     shoot as shoot,
     starts as starts,
     twin as twin,
+    with_exponent as with_exponent,
 )
 from .coexisting_attractors import (
     coexisting as coexisting,
@@ -39,6 +40,9 @@ from .drive_states import (
 )
 from .flow import MAX_EVENTS as MAX_EVENTS, Flow as Flow
 from .flow_result import FlowResult as FlowResult, FlowStatus as FlowStatus
+from .lyapunov_exponent import (
+    batch_error as batch_error,
+)
 from .modal_tables import (
     WORST_RESONANCE as WORST_RESONANCE,
     Oscillators as Oscillators,
@@ -52,6 +56,8 @@ from .mode_tables import (
 from .orbit import (
     ANSWERS as ANSWERS,
     MOST_COUNTED as MOST_COUNTED,
+    SETTLED as SETTLED,
+    SURE as SURE,
     SYMMETRY_TOLERANCE as SYMMETRY_TOLERANCE,
     WITHOUT_PERIOD as WITHOUT_PERIOD,
     Complex as Complex,

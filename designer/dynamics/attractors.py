@@ -24,13 +24,12 @@ from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.lyapunov_exponent import (
     BLOCK,
-    SURE,
     Bound,
     LyapunovExponent,
     lyapunov,
     sign,
 )
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import SURE, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.quasi_periodic import DRIFT, closed_curve, frequencies
 from designer.dynamics.step_budget import Budget

@@ -17,6 +17,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
+from designer.dynamics.orbit import SURE
 from designer.dynamics.piecewise_linear import ModeKey
 
 BLOCK = 5
@@ -25,8 +26,6 @@ BATCHES = 64
 """Batches of the series: few enough to be long against the motion's memory."""
 
 
-SURE = 4.0
-"""Standard errors that an exponent has to be away from 0 to be told from it."""
 LEAST = 1e-6
 """Growth per drive period that is never told from 0: less is rounding."""
 

@@ -12,6 +12,8 @@ from designer.base.arrays import Array, Index
 from designer.dynamics.counts import Counts, Pairs
 
 Complex = NDArray[np.complex128]
+SURE = 4.0
+"""Standard errors that a measured exponent has to be away from a value to be told from it."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
 MOST_COUNTED = 1_000_000
@@ -43,6 +45,8 @@ ANSWERS = frozenset(
 """Statuses that answer the question where no response was wanted."""
 WITHOUT_PERIOD = frozenset({OrbitStatus.APERIODIC, OrbitStatus.QUASI_PERIODIC})
 """Answers that no n-p-q names."""
+SETTLED = frozenset({OrbitStatus.PERIODIC, *WITHOUT_PERIOD})
+"""Answers that a board may be asked to show."""
 
 
 class Motion:

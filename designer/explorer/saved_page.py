@@ -20,7 +20,7 @@ from designer.bifurcations.continuation import End
 from designer.bifurcations.windows import BranchWindow, WindowEnd, window
 from designer.centering import stage_choice
 from designer.check import checked_design
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import SETTLED, Orbit
 from designer.explorer.controls import Control, controls
 from designer.explorer.explorer_page import recorded_page
 from designer.explorer.omega_strip import COURSE, piece
@@ -89,7 +89,7 @@ def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> Reco
     synthesis = stage_choice.synthesise(modelfile, all_found=False, jobs=options.workers)
     design, responses = synthesis.design, synthesis.model_responses
     checked = checked_design.check(design, responses, None)
-    asked = [each for each in checked if each.circuit.status is OrbitStatus.PERIODIC]
+    asked = [each for each in checked if each.circuit.status in SETTLED]
     studied = modelfile, design, asked, synthesis.catalog
     plan = plan_study(*studied, samples=options.samples, seed=options.seed)
     answers = _answers(plan, options, progress)

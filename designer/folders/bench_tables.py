@@ -11,7 +11,7 @@ from designer.base.second_process import Ask
 from designer.base.units import distinct_texts
 from designer.check import checked_design
 from designer.circuit.design import Design, settings
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.orbit import SETTLED
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import state_names
 from designer.model.model import SiScales
@@ -89,11 +89,7 @@ def start_recipes(
     """A start recipe for each response of a design, found on its circuit; None where the model or
     the nominal circuit does not show it. other : as of ``find_recipes``."""
     checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
-    indices = [
-        i
-        for i, c in enumerate(checked)
-        if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
-    ]
+    indices = [i for i, c in enumerate(checked) if c.model.found and c.circuit.status in SETTLED]
     plan = plan_study(
         synthesis.modelfile,
         synthesis.design,

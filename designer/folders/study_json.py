@@ -74,6 +74,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "ngspice_reason": "" if ngspice is None else ngspice.reason,
         "engines_agree": checked.agrees,
         "symmetric": model.orbit.symmetric,
+        **({"exponents": _exponents(checked)} if checked.exponents else {}),
         "others": [o.response for o in model.others],
         "yield": _yield(counted),
         "rate": None if counted is None else counted.rate,
@@ -95,6 +96,14 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
     if counted is None:
         row["left_out"] = study.left_out[index]
     return row
+
+
+def _exponents(checked: CheckedResponse) -> dict[str, dict[str, float]]:
+    """Of each engine."""
+    return {
+        engine: {"value": value, "error": error}
+        for engine, (value, error) in checked.exponents.items()
+    }
 
 
 def _yield(counted: Yield | None) -> dict[str, Any] | None:

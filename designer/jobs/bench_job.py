@@ -14,6 +14,7 @@ from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.circuit.design import GeneratorSetting
+from designer.dynamics.counts import read_counts
 from designer.folders.report_sections import BENCHED as NAME
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
@@ -63,10 +64,13 @@ class BenchedRecord:
     @property
     def as_wanted(self) -> bool | None:
         """Whether it surely shows what is wanted at the nearest setting, or its mirror twin; None
-        where nothing is wanted there."""
+        where nothing is wanted there, and where a motion without a period is, which no record of
+        one proves."""
         if self.setting is None or self.setting.expect is None:
             return None
         counts = self.named.counts
+        if read_counts(self.setting.expect) is None:
+            return False if self.named.sure and counts is not None else None
         if not self.named.sure or counts is None:
             return False
         return self.setting.expect in (str(counts), str(counts.mirrored))

@@ -29,6 +29,7 @@ from designer.centering.cure_measure import VerdictCache
 from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
+from designer.centering.response_windows import need_periods
 from designer.check.synthesis_result import Synthesis
 from designer.folders.design_source import design_inputs, design_stage, grade_inputs, read_design
 from designer.folders.model_source import design_inputs_of
@@ -152,6 +153,8 @@ def cure_into(
         Folder(out)  # refuses a place where something else stands
     base = read_design(path, progress=progress)
     need_responses(base.modelfile)
+    with errors_in(base.modelfile):
+        need_periods(base.modelfile.responses)
     folder = Folder(path)
     inputs = {
         "design": design_inputs_of(folder),

@@ -13,10 +13,11 @@ from designer.base.errors import InputError, ResponseNotFound
 from designer.base.progress import doing
 from designer.base.si_unit import value_text
 from designer.dynamics import harmonics
-from designer.dynamics.attractors import settle, starts, twin
+from designer.dynamics.attractors import settle, starts, twin, with_exponent
 from designer.dynamics.coexisting_attractors import coexisting
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
+from designer.dynamics.orbit import ANSWERS, WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.model.clearance import Clearance
 from designer.model.driven import model_flow
 from designer.model.force_law import Quantity
@@ -133,16 +134,31 @@ def _not_found(response: ModelResponse, si: SiScales | None) -> str:
     hertz = "" if si is None else f" ({value_text(si.hertz(response.omega), 'Hz')})"
     symmetry = {None: "", True: ", symmetric", False: ", asymmetric"}
     wanted = f"{response.expected or 'a settled motion'}{symmetry[spec.symmetric]}"
+    if spec.least_exponent is not None:
+        wanted += f", of a largest exponent of {spec.least_exponent:g} at least,"
     seen = dict.fromkeys(
-        orbit.response + ("" if spec.symmetric is None else symmetry[orbit.symmetric])
+        orbit.response
+        + ("" if spec.symmetric is None else symmetry[orbit.symmetric])
+        + ("" if spec.least_exponent is None else _exponent_text(orbit))
         for orbit in (response.orbit, *response.others)
     )
     at = f"at omega = {response.omega:.6g}{hertz}"
     return f"{wanted} {at} was found from none of {STARTS} starts; found instead: {'; '.join(seen)}"
 
 
+def _exponent_text(orbit: Orbit) -> str:
+    """Exponent of a motion without a period, in brackets."""
+    if orbit.status not in WITHOUT_PERIOD:
+        return ""
+    return f" (exponent {orbit.lyapunov:.3g} ± {orbit.lyapunov_error:.1g})"
+
+
 def matches(orbit: Orbit, spec: Response) -> bool:
-    """Whether an orbit is the one wanted; anything that is an answer, where nothing is."""
+    """Whether an orbit, in the model's units, is the one wanted; anything that is an answer, where
+    nothing is."""
+    if orbit.status in WITHOUT_PERIOD and spec.expect is not None:
+        enough = spec.has_exponent(orbit.lyapunov, orbit.lyapunov_error)
+        return not spec.difference(orbit) and enough is True
     if orbit.status is not OrbitStatus.PERIODIC:
         return spec.expect is None and spec.symmetric is None and orbit.status in ANSWERS
     if spec.symmetric is False and orbit.symmetric is not False:
@@ -255,6 +271,8 @@ def _find_one(model: MechanicalModel, spec: Response, b: float) -> ModelResponse
     assert spec.omega is not None
     flow = model_flow(model, spec.omega)
     orbits = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
+    if spec.least_exponent is not None:
+        orbits = [with_exponent(flow, orbit) for orbit in orbits]
     for orbit in orbits:
         for candidate in _with_twin(flow, orbit, spec):
             if matches(candidate, spec):
@@ -267,7 +285,9 @@ def _find_one(model: MechanicalModel, spec: Response, b: float) -> ModelResponse
 def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:
     """The orbit, and its mirror twin first where that is the one named by ``expect``."""
     expect = spec.expect
-    if expect is None or orbit.counts == expect or orbit.counts != expect.mirrored:
+    if not isinstance(expect, Counts) or orbit.counts == expect:
+        return [orbit]
+    if orbit.counts != expect.mirrored:
         return [orbit]
     other = twin(flow, orbit)
     return [orbit] if other is None else [other, orbit]

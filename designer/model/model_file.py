@@ -38,6 +38,7 @@ from designer.base.toml_reader import parse_toml
 from designer.catalog.entries import Kind
 from designer.catalog.parts_catalog import Catalog
 from designer.dynamics.counts import Counts
+from designer.dynamics.orbit import OrbitStatus
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
@@ -395,7 +396,8 @@ def check_possible(
         whatever its mirror twin has; a period or a symmetry that such a motion cannot have.
     """
     expect, system = response.expect, model.second_order()
-    if expect is None:
+    if not isinstance(expect, Counts):
+        _check_without_period(expect, index, system, file)
         return
     stops, field = system.clearances, f"response[{index}].expect"
     count = max(len(stops), 1)
@@ -415,6 +417,15 @@ def check_possible(
         field = f"response[{index}].symmetric"
         expected = f"none beside {expect}: of a symmetric motion n is odd"
         raise InputError(file, field, "true", expected)
+
+
+def _check_without_period(
+    wanted: OrbitStatus | None, index: int, system: SecondOrderSystem, file: str | None
+) -> None:
+    """Refuse a motion without a period of a system without anything that bends or jumps."""
+    if wanted is not None and not system.clearances and not system.laws:
+        expected = "1-0-0: a linear system has the period of its drive"
+        raise InputError(file, f"response[{index}].expect", str(wanted), expected)
 
 
 def _missing_stops(counts: Counts, system: SecondOrderSystem) -> Iterator[str]:

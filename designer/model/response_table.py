@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
@@ -12,7 +12,7 @@ from designer.base.json_schema import either
 from designer.base.schema import Accepts, FileTable, choice, flag, literal, number, physical, span
 from designer.base.si_unit import DIGITS, drive_text
 from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
-from designer.dynamics.orbit import Orbit
+from designer.dynamics.orbit import SURE, WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.model.model import SiScales
 from designer.model.si_units import FREQUENCIES, angular_frequency
 
@@ -52,14 +52,29 @@ def _frequency() -> Accepts:
     return Accepts(expected, check, json={"type": ["number", "string"]})
 
 
+Wanted = Counts | OrbitStatus
+"""What may be wanted: the n-p-q of a periodic response, or one of ``WITHOUT_PERIOD``."""
+
+
+def read_wanted(text: str) -> Wanted:
+    """What a text names.
+
+    Raises
+    ------
+    ValueError : nothing that may be wanted.
+    """
+    return OrbitStatus(text) if text in WITHOUT_PERIOD else Counts.parse(text)
+
+
 def _expect() -> Accepts:
-    def check(value: object) -> Counts:
+    def check(value: object) -> Wanted:
         try:
-            return Counts.parse(str(value))
+            return read_wanted(str(value))
         except ValueError:
             raise ValueError from None
 
-    expected = f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIOD} and p, q >= 0'
+    expected = f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIOD} and p, q >= 0, or '
+    expected += " or ".join(f'"{status}"' for status in sorted(WITHOUT_PERIOD))
     return Accepts(expected, check, json={"type": "string"})
 
 
@@ -79,8 +94,8 @@ class Response(FileTable):
 
     omega: Annotated[float | None, _omega()]
     """Dimensionless frequency; None for "best": the tool chooses it."""
-    expect: Annotated[Counts | None, _expect()] = None
-    """The wanted n-p-q, or None where any is of interest."""
+    expect: Annotated[Wanted | None, _expect()] = None
+    """The wanted n-p-q, "aperiodic" or "quasi-periodic"; None where any is of interest."""
     twin: Annotated[Twin, choice("either", "exact")] = "either"
     """"either" accepts the mirror twin of ``expect`` as well; "exact" does not."""
     symmetric: Annotated[bool | None, flag()] = None
@@ -88,9 +103,20 @@ class Response(FileTable):
     b: Annotated[float | tuple[float, float] | None, _clearance()] = None
     """Clearance at which this response is wanted: a value, a range to choose from, or None for the
     model's own."""
+    least_exponent: Annotated[float | None, number("", "a number > 0", _positive)] = None
+    """Of an aperiodic response: the largest Lyapunov exponent is this at least, per unit of the
+    model's time; None where any above 0 will do."""
 
     in_hertz: ClassVar[bool] = False
     """Whether people read ω in hertz, since it is in rad/s."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data; the exponent where one is stated, so that studies of files without one keep
+        their hashes."""
+        out = asdict(self)
+        if self.least_exponent is None:
+            del out["least_exponent"]
+        return out
 
     def place_text(self, digits: int = DIGITS) -> str:
         """Its drive frequency for people: "36 Hz" or "ω = 0.85"."""
@@ -100,10 +126,17 @@ class Response(FileTable):
         )
 
     def completed(self, nominal: Orbit) -> Response:
-        """The same; where no n-p-q is expected, the nominal orbit's or its twin is wanted."""
+        """The same; where nothing is expected, the nominal orbit's n-p-q or its twin is wanted, or
+        a motion without a period as it is."""
         if self.expect is not None:
             return self
-        return replace(self, expect=nominal.counts)
+        shown = nominal.status if nominal.status in WITHOUT_PERIOD else nominal.counts
+        return replace(self, expect=shown)
+
+    @property
+    def periodic(self) -> bool:
+        """Whether an n-p-q is wanted."""
+        return isinstance(self.expect, Counts)
 
     def accepts(self, counts: Counts) -> bool:
         """Whether these, or those of the mirror twin unless ``twin`` is "exact", are expected here;
@@ -113,21 +146,34 @@ class Response(FileTable):
         return self.twin != "exact" and counts.mirrored == self.expect
 
     def accepts_text(self, response: str, *, symmetric: bool) -> bool:
-        """Whether a response in words, "1-2-2" or a status, survives as this one."""
+        """Whether a response in words, "1-2-2" or a status, survives as this one. The exponent is
+        not looked at."""
         counts = read_counts(response)
-        accepted = counts is not None and self.accepts(counts)
-        return accepted and (symmetric or not self.symmetric)
+        if counts is None:
+            return response == self.expect
+        return self.accepts(counts) and (symmetric or not self.symmetric)
 
     def difference(self, orbit: Orbit) -> str:
-        """Why a periodic orbit does not survive as this response; "" where it does.
+        """Why an orbit that has settled does not survive as this response; "" where it does.
 
-        Boards are never exactly symmetric: ``symmetric = false`` refuses no orbit.
+        Boards are never exactly symmetric: ``symmetric = false`` refuses no orbit. Of one without a
+        period the exponent is not looked at (``has_exponent``).
         """
+        if orbit.status in WITHOUT_PERIOD:
+            return "" if orbit.status is self.expect else str(orbit.status)
         if not self.accepts(orbit.counts):
             return f"to {orbit.response}"
         if self.symmetric and not orbit.symmetric:
             return f"asymmetric by {orbit.asymmetry:.2g} of the peak"
         return ""
+
+    def has_exponent(self, value: float, error: float) -> bool | None:
+        """Whether a largest exponent, with its standard error, per unit of the model's time, is
+        ``least_exponent`` at least; None where it cannot be told from it."""
+        if self.least_exponent is None:
+            return True
+        above = value - self.least_exponent
+        return above > 0.0 if abs(above) > SURE * error else None
 
 
 @dataclass(frozen=True)
@@ -184,8 +230,19 @@ class ResponseTable(Response):
                 refuse(key, angular, "a frequency within the range of numbers")
         if self.twin == "exact" and self.expect is None:
             refuse("twin", literal(self.twin), "an expect that it can apply to")
+        if isinstance(self.expect, OrbitStatus):
+            for key in ("twin", "symmetric"):
+                if key in keys:
+                    refuse(
+                        key,
+                        literal(getattr(self, key)),
+                        f'none beside expect = "{self.expect}", which has no twin',
+                    )
+        if self.least_exponent is not None and self.expect is not OrbitStatus.APERIODIC:
+            expected = 'none without expect = "aperiodic"'
+            refuse("least_exponent", self.least_exponent, expected)
         kind = HertzResponse if si == SiScales() else Response
-        return kind(omega, self.expect, self.twin, self.symmetric, self.b)
+        return kind(omega, self.expect, self.twin, self.symmetric, self.b, self.least_exponent)
 
 
 def placed(

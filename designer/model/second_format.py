@@ -80,6 +80,7 @@ def _rewritten(block: _Block, modelfile: ModelFile, scales: SiScales) -> _Block:
         changes["format"] = lambda _: 2
     if block.table == "response":
         changes["b"] = lambda b: _each(b, lambda value: value / model.b)
+        changes["least_exponent"] = lambda rate: rate / scales.time_scale
     if block.table in ("response", "search"):
         changes["omega"] = lambda omega: _each(omega, lambda value: value / scales.time_scale)
     return _Block(block.table, tuple(_changed(line, changes) for line in block.lines))
@@ -149,9 +150,10 @@ def _check(modelfile: ModelFile, text: str, scales: SiScales) -> None:
 
 
 def _frequencies(modelfile: ModelFile, scales: SiScales) -> Array:
-    """Of the responses, in the new file's units; 0 for one that is to be chosen."""
-    omegas = [0.0, *(r.omega or 0.0 for r in modelfile.responses)]
-    return np.array(omegas) / scales.time_scale
+    """Of the responses, in the new file's units, and their least exponents; 0 for one that is to be
+    chosen or not stated."""
+    rates = [rate or 0.0 for r in modelfile.responses for rate in (r.omega, r.least_exponent)]
+    return np.array([0.0, *rates]) / scales.time_scale
 
 
 def _refuse(modelfile: ModelFile) -> NoReturn:

@@ -41,6 +41,10 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         return figure
     groups, parts = _rows([b for _, b in blamed])
     rows = groups + parts
+    if not rows:
+        figure = new_figure(7.4, 1.2)
+        say(figure.subplots(), "no part that was made exact saved a board")
+        return figure
     figure = new_figure(7.4, max(0.2 * len(rows) + 1.3, LEAST_HEIGHT))
     axes = figure.subplots()
     values = np.full((len(rows), len(blamed)), np.nan)
@@ -71,7 +75,7 @@ def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -
     blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
     if not blamed:
         figure = new_figure(7.4, 1.2)
-        say(figure.subplots(), "nothing limits any response")
+        say(figure.subplots(), "no limit of a response was found")
         return figure
     columns = min(3, len(blamed))
     lines = -(-len(blamed) // columns)

@@ -94,7 +94,10 @@ def _low_yields(data: ReportData) -> Iterator[Remedy]:
     )
     if parts := _blamed_parts(data, place):
         text += f" Most losses would be avoided if {parts} were exact."
-    yield Remedy(text, f"designer search DIR --yield {WANTED:g}")
+    if data.checked[place].model.spec.completed(data.checked[place].circuit).periodic:
+        yield Remedy(text, f"designer search DIR --yield {WANTED:g}")
+    else:  # a search follows orbits
+        yield Remedy(text, "designer tolerance DIR --tuned --reached")
 
 
 def _blamed_parts(data: ReportData, response: int) -> str:

@@ -44,7 +44,15 @@ def response_table(data: ReportData) -> Table | None:
         "symmetric (model)": lambda c: words.yes(c.model.orbit.symmetric),
         "coexisting (model)": partial(_coexisting, data),
     }
+    if any(c.exponents for c in data.checked):
+        columns["largest exponents"] = _exponents
     return table_of(data.checked, columns, ("ω", "mechanism"))
+
+
+def _exponents(checked: CheckedResponse) -> str:
+    """Of each engine with its standard error, per unit of the model's time."""
+    each = [f"{name} {v:.3g} ± {e:.1g}" for name, (v, e) in checked.exponents.items()]
+    return ", ".join(each) or words.NONE
 
 
 def _coexisting(data: ReportData, checked: CheckedResponse) -> str:

@@ -211,22 +211,31 @@ def job(
         keep=keep,
         brief=subject.brief and not subject.orbit.n,
     )
-    text = deck.write(
+    # A period before the first strobe, for the points around it: a long way takes no memory.
+    kept = 0.0 if whole else max(subject.discard - 1, 0) * subject.period
+    text = deck_of(subject, settings, (1.0 + nudge) * capacitors, stop, kept)
+    signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
+    return SpiceJob(text, signals, stop, partial(read, reading=reading), patience=patience)
+
+
+def deck_of(
+    subject: GateSubject, settings: SolverSettings, capacitors: Array, stop: float, kept: float
+) -> str:
+    """The deck of a subject from capacitor voltages (states,) at t = 0 until ``stop`` [s]; what
+    comes before ``kept`` [s] is not stored."""
+    return deck.write(
         subject.circuit,
         subject.board,
         subject.excitation,
         settings,
         title="one response of one board",
         stop_time=stop,
-        initial=(1.0 + nudge) * capacitors,
+        initial=capacitors,
         rung=subject.rung,
-        # A period before the first strobe, for the points around it: a long way takes no memory.
-        kept_from=0.0 if whole else max(subject.discard - 1, 0) * subject.period,
+        kept_from=kept,
         stage=False,
         bounded=True,
     )
-    signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
-    return SpiceJob(text, signals, stop, partial(read, reading=reading), patience=patience)
 
 
 def length(subject: GateSubject) -> int:

@@ -93,6 +93,17 @@ class Read:
     """On request, time (m,) from 0 over the last n periods and states (m, states)."""
 
 
+def strobes_after(
+    waveforms: Waveforms, period: float, nets: tuple[str, ...], shift: Array
+) -> Array:
+    """(k, states) states at the ends of the run's periods but the first; as of ``Reading``."""
+    time = waveforms.axis
+    x = np.stack([waveforms.signals[net] for net in nets], axis=1) - shift
+    last = int(np.floor(time[-1] / period * (1.0 + 1e-9)))
+    marks = np.minimum(np.arange(1, last + 1) * period, time[-1])
+    return _at(time, x, marks)
+
+
 def read(waveforms: Waveforms, reading: Reading) -> Read:
     """Classify the run after ``reading.discard`` periods."""
     time = waveforms.axis

@@ -433,7 +433,8 @@ class _Search:
             assert system is not None
             flow = circuit_flow(system, design, response)
             start = response.orbit.start * design.volts(response.b)
-            if not matches(settle(flow, start, budget=Budget(LOOK), watch=0), response.spec):
+            orbit = settle(flow, start, budget=Budget(LOOK), watch=0)
+            if not matches(design.in_model_units(orbit, design.volts(response.b)), response.spec):
                 return False
         return True
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.si_unit import is_angular, value_text
+from designer.dynamics.counts import read_counts
 from designer.verbs.console import say
 
 Step = tuple[str, str]
@@ -51,7 +52,9 @@ def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     yield f"open {shlex.quote(str(folder / 'report.html'))}", "the report"
     yield from after_failed_rules(folder, answer)
     yield from after_response(folder, responses)
-    if any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses):
+    low = any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses)
+    # A search follows orbits.
+    if low and all(read_counts(r["expected"] or r["circuit"]) for r in responses):
         yield _step("the cheapest cure", "search", folder, "--yield", GOOD)
     if _board(folder) is None:
         yield _step("the KiCad project, its board routed", "export", folder, "--routed")

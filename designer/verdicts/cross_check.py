@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from designer.check.checked_design import as_named_in_ngspice
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.read_orbit import name_in_ngspice
@@ -132,7 +133,8 @@ def survives(wanted: Response, response: str, either: str, *, symmetric: bool) -
     Two step sizes that name different ones (``either``) need not name the wanted one: then it is
     lost.
     """
-    if is_answer(response) and response != OrbitStatus.GRAZING:
+    wanted = as_named_in_ngspice(wanted)
+    if is_answer(response) and (response != OrbitStatus.GRAZING or not wanted.periodic):
         return wanted.accepts_text(response, symmetric=symmetric)
     both = _both(either)
     possible = any(wanted.accepts_text(one, symmetric=True) for one in both)

@@ -10,7 +10,8 @@ from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import Excitation
-from designer.dynamics.attractors import settle
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle, with_exponent
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.kernels.kernel_boards import POINTS
@@ -92,8 +93,9 @@ def _settled_boards(
     twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
     wanted = [images(_nominal_displacement(plan, q), mirror=twins) for q in plan.questions]
     for (i, number), response in zip(pairs, settled, strict=True):
-        orbit = response.orbit
-        verdict, reason = plan.questions[number].judge(orbit)
+        question = plan.questions[number]
+        orbit = _decidable(response.orbit, question, boards.reduction, i)
+        verdict, reason = question.judge(orbit)
         waveform = float("nan")
         if orbit.status is OrbitStatus.PERIODIC:
             waveform = waveform_error(response.trace, wanted[number])
@@ -111,6 +113,19 @@ def _settled_boards(
             waveform=rounded(waveform),
         )
         yield answer, orbit, boards
+
+
+def _decidable(
+    orbit: Orbit, question: Question, reduction: Callable[[int], Reduction], board: int
+) -> Orbit:
+    """The orbit of a board, with its exponent to a smaller error where a least one is wanted and
+    the first estimate does not tell."""
+    chaotic = orbit.status is OrbitStatus.APERIODIC
+    if question.wanted.least_exponent is None or not chaotic:
+        return orbit
+    if question.judge(orbit)[0] is not Verdict.FAILED:
+        return orbit
+    return with_exponent(Flow(reduction(board).system(), question.excitation.drive), orbit)
 
 
 def images(wanted: Array, *, mirror: bool = False) -> Array:

@@ -6,6 +6,7 @@ A verdict is decided on the exact circuit rung, started on the nominal design's 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -13,7 +14,7 @@ from enum import StrEnum
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Excitation
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import SETTLED, Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import Rung
@@ -58,13 +59,19 @@ class Question:
         return self.spec.omega
 
     @property
+    def periodic(self) -> bool:
+        """Whether an n-p-q is wanted: only such a response has an orbit that can be followed."""
+        return self.wanted.periodic
+
+    @property
     def wanted(self) -> Response:
         """The wanted response; without an expected n-p-q, the nominal orbit's is wanted."""
         return self.spec.completed(self.start)
 
     def judge(self, orbit: Orbit) -> tuple[Verdict, str]:
         """Verdict and reason of a board with this orbit."""
-        return judge(orbit, self.spec, self.start)
+        seconds = self.omega / (2.0 * math.pi * self.excitation.frequency)
+        return judge(orbit, self.spec, self.start, seconds)
 
 
 @dataclass(frozen=True)
@@ -160,20 +167,36 @@ class StudyPlan:
         return [(i, k) for i in range(len(indices)) for k in range(len(self.questions))]
 
 
-def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
+def judge(
+    orbit: Orbit, spec: Response, nominal: Orbit, seconds: float = 1.0
+) -> tuple[Verdict, str]:
     """Verdict and reason. Without an expectation the nominal circuit's own response is wanted.
 
     Whatever a board does, if it is not what is wanted it is lost; failed is only what has no
-    answer: a computation that broke off, or a motion that has not settled.
+    answer: a computation that broke off, a motion that has not settled, or an exponent that cannot
+    be told from the least that is wanted. seconds : one unit of the model's time on the board, in
+    which a wanted exponent counts.
     """
+    wanted = spec.completed(nominal)
     if orbit.status is OrbitStatus.GRAZING:
-        return Verdict.GRAZING, orbit.reason
+        # Whichever n-p-q it has, it has a period.
+        undecided = wanted.periodic
+        return (Verdict.GRAZING if undecided else Verdict.LOST), orbit.reason
     if orbit.status in (OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED):
         return Verdict.FAILED, orbit.reason or str(orbit.status)
-    if orbit.status is not OrbitStatus.PERIODIC:
+    if orbit.status not in SETTLED:
         return Verdict.LOST, str(orbit.status)
-    difference = spec.completed(nominal).difference(orbit)
-    return (Verdict.LOST if difference else Verdict.OK), difference
+    difference = wanted.difference(orbit)
+    if difference or wanted.least_exponent is None:
+        return (Verdict.LOST if difference else Verdict.OK), difference
+    value, error = orbit.lyapunov * seconds, orbit.lyapunov_error * seconds
+    enough = wanted.has_exponent(value, error)
+    if enough:
+        return Verdict.OK, ""
+    found = f"exponent {value:.3g} ± {error:.1g}"
+    if enough is None:
+        return Verdict.FAILED, f"{found}, not told from {wanted.least_exponent:g}"
+    return Verdict.LOST, found
 
 
 def rounded(value: float) -> float:

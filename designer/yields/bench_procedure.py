@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics.counts import Counts
+from designer.dynamics.counts import MAX_PERIOD, Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
-from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands
 from designer.verdicts.verdict import Question
@@ -94,10 +93,11 @@ class _Person:
         rng: np.random.Generator,
     ) -> None:
         self.system, self.question, self.bands, self.rng = system, question, bands, rng
-        peak = float(np.abs(question.start.extremes[system.moving]).max())
+        extremes = _extremes(system, question)
+        peak = float(np.abs(extremes[system.moving]).max())
         self.step = SCREEN * peak / 2**BITS
         self.stages = [
-            _Stage.of(system, index, question.start) for index in range(len(system.clearances))
+            _Stage.of(system, index, extremes) for index in range(len(system.clearances))
         ]
         self.stops = dict(self.stages[0].stops) if self.stages else {}
         self.state = question.start.start
@@ -110,8 +110,9 @@ class _Person:
         self.setting = setting
         self.steps += 1
         wanted = self.question.wanted.expect
-        assert wanted is not None
-        periods = wanted.n * max(-(-WATCHED // wanted.n), 3)
+        # A motion without a period is one that the screen shows to repeat after none.
+        n = wanted.n if isinstance(wanted, Counts) else MAX_PERIOD
+        periods = n * max(-(-WATCHED // n), 3)
         flow = Flow(self.system, setting.of(self.question.excitation).drive)
         waited = flow.run(self.state, DWELL)
         run = flow.run(waited.strobes[-1], periods, mode=waited.mode, points=POINTS)
@@ -123,7 +124,7 @@ class _Person:
         trace = states[:, self.system.moving]
         self.high, self.low = self._read(float(trace.max())), self._read(float(trace.min()))
         wave = flow.drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS)
-        return self._shows(trace, np.column_stack([states, wave + flow.drive.offset]), wanted.n)
+        return self._shows(trace, np.column_stack([states, wave + flow.drive.offset]), n)
 
     def centre(self) -> bool:
         """Turn the DC offset until the peaks of v1 stand equally far beyond the stops, by the rule
@@ -158,7 +159,8 @@ class _Person:
     def _shows(self, trace: Array, signals: Array, wanted: int) -> bool:
         """Whether v1 over whole multiples of the wanted period is the wanted pattern to the eye.
 
-        signals : (k, states + 1) states and generator, of which the stages' outputs are made.
+        wanted : the period; the longest that is looked for where none is wanted. signals : (k,
+        states + 1) states and generator, of which the stages' outputs are made.
         """
         laps = trace.reshape(-1, POINTS)
         n = next(
@@ -169,6 +171,8 @@ class _Person:
             ),
             0,
         )
+        if not self.question.periodic:
+            return n == 0
         if n != wanted:
             return False
         pulses = [stage.pulses(signals) for stage in self.stages] or [(0, 0)]
@@ -184,6 +188,17 @@ class _Person:
         return float(np.round(noisy).mean() * self.step)
 
 
+def _extremes(system: PiecewiseLinearSystem, question: Question) -> Array:
+    """(states, 2) least and greatest of each state on the nominal orbit; of a motion without a
+    period over as many drive periods as the screen is watched at most."""
+    orbit = question.start
+    if len(orbit.extremes):
+        return orbit.extremes
+    flow = Flow(system, question.excitation.drive)
+    run = flow.run(orbit.start, WATCHED * MAX_PERIOD, mode=orbit.mode or None, points=POINTS)
+    return np.column_stack([run.strobes.min(axis=0), run.strobes.max(axis=0)])
+
+
 @dataclass(frozen=True)
 class _Stage:
     """A clearance's dead-zone stage on the screen.
@@ -197,14 +212,14 @@ class _Stage:
     low_pulse: float
 
     @classmethod
-    def of(cls, system: PiecewiseLinearSystem, index: int, orbit: Orbit) -> _Stage:
+    def of(cls, system: PiecewiseLinearSystem, index: int, extremes: Array) -> _Stage:
         row = system.displacement[index][:-1]
         largest = int(np.argmax(np.abs(row)))
         stops = {
             side: -float(contact[-1] * row[largest] / contact[largest])
             for side, contact in system.contact_rows(index).items()
         }
-        peak = float(np.abs(row[:-1]) @ np.abs(orbit.extremes).max(axis=1))
+        peak = float(np.abs(row[:-1]) @ np.abs(extremes).max(axis=1))
         inside = min((abs(place) for place in stops.values()), default=peak)
         return cls(row, stops, SEEN * max(peak - inside, 0.0))
 

@@ -15,7 +15,7 @@ from enum import StrEnum
 from typing import Any
 
 from designer.base.plain_json import plain
-from designer.verdicts.verdict import Answer, StudyPlan, Verdict
+from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
 from designer.yields import margins as margin_limits
 from designer.yields.blame_replay import KEPT, LOST, BlamedPart, extent_of, replay
 from designer.yields.margins import Margin, Prediction
@@ -159,7 +159,7 @@ def blame(
             sought=margin.sought,
             there=margin.there,
             corner=corners[i],
-            limited_by=_sentence(row, blamed[i], indices[i], margin),
+            limited_by=_sentence(row, blamed[i], indices[i], margin, plan.questions[i]),
             skipped=_skipped(row, blamed[i], cut[i]),
         )
         for i, (row, margin) in enumerate(zip(extent.rows, margins, strict=True))
@@ -193,13 +193,19 @@ def _skipped(row: Sequence[Answer], blamed: Sequence[BlamedPart], cut: bool) -> 
 
 
 def _sentence(
-    row: Sequence[Answer], blamed: Sequence[BlamedPart], indices: Sequence[Index], margin: Margin
+    row: Sequence[Answer],
+    blamed: Sequence[BlamedPart],
+    indices: Sequence[Index],
+    margin: Margin,
+    question: Question,
 ) -> str:
     """What limits the response, in one line."""
     nearest = margin.limits[0] if margin.limits else None
     through = ", ".join(list(dict.fromkeys(index.part for index in indices))[:3])
     lost = [a for a in row if a.verdict is Verdict.LOST]
     if not lost:
+        if not question.periodic:
+            return "nothing was lost; a motion without a period has no orbit to follow to a limit"
         if nearest is None:
             return "nothing within the spread"
         return (

@@ -166,7 +166,8 @@ def extent_of(
         tuple(sorted((a for a in answers if a.question == i), key=lambda a: a.sample))
         for i in range(len(plan.questions))
     )
-    again, followed = _replays(rows, (lost, ok)), _in_turn(lost_boards(rows))
+    again = _replays(rows, (lost, ok))
+    followed = _in_turn([pair for pair in lost_boards(rows) if plan.questions[pair[0]].periodic])
     samples = sorted({r.sample for r in again})
     changes = _changes(plan.circuit, boards.take(samples)) if samples else []
     around = 2 * len(quantities(plan.circuit, boards))

@@ -159,7 +159,7 @@ def margins(
     progress: Callable[[], None] = lambda: None,
     parts: StoredParts | None = None,
 ) -> tuple[Margin, ...]:
-    """The margin of each question.
+    """The margin of each question; without limits where no n-p-q is wanted.
 
     boards : drawn of the spread; answers : of each question, what became of board ``sample``.
     count : crossings sought for each question. only : of those the ones that are sought, as
@@ -168,12 +168,19 @@ def margins(
     """
     differing = quantities(circuit, boards)
     parts = StoredParts() if parts is None else parts
-    lost = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
+    lost = [
+        pair
+        for pair in lost_boards(answers, count)
+        if questions[pair[0]].periodic and (only is None or pair in only)
+    ]
     crossed = _stored_crossings(boards, lost, questions, parts, jobs, progress)
     nominal = replace(Boards.of(circuit, [nominal_board(circuit)]), bandwidth=boards.bandwidth)
     probes = _probes(nominal, differing)
     limits: list[list[Limit]] = []
     for number, question in enumerate(questions):
+        if not question.periodic:
+            limits.append([])
+            continue
         base = _Base(nominal, question, question.start)
         compute = partial(_nominal_limits, base, probes, differing, boards, jobs)
         limits.append(list(counted(parts, f"nominal {number}", progress, compute)))

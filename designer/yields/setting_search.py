@@ -1,8 +1,9 @@
 """A setting of the generator at which a board shows a wanted response: a stated search.
 
 The rounds are those of "Tuned" in docs/definitions.md: the centred board, its bands' corners,
-settings halved, paths from the nominal board. Nothing is random. No board is asked more than
-``MOST_TRIES`` times, and no more than ``MOST_FOLLOWED`` orbits are followed for it.
+settings halved, paths from the nominal board; of a response without a period the first two.
+Nothing is random. No board is asked more than ``MOST_TRIES`` times, and no more than
+``MOST_FOLLOWED`` orbits are followed for it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.circuit.ensemble import Ensemble
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
 from designer.verdicts.exact_rung import Case, settled
@@ -125,6 +127,8 @@ def _rounds(ensemble: Ensemble, bands: Bands) -> list[Round]:
 
     def path(first: float, tied: bool) -> Round:
         def propose(case: BoardCase) -> list[Asked]:
+            if not case.question.periodic:
+                return []
             board = ensemble.boards.take([case.board])
             spots, followed = find_window(board, case.question, bands, first, tied=tied)
             case.followed += followed
@@ -180,7 +184,8 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
     their distance. A pair leaves the wanted count of a stop between it if not both have too many
     impacts there, or both too few; one stop of which that holds is enough, two are better."""
     expect = case.question.wanted.expect
-    assert expect is not None
+    if not isinstance(expect, Counts):
+        return []
     counted = [t for t in case.tries if t.orbit.n]
     pairs = []
     for wanted in {expect, expect.mirrored}:

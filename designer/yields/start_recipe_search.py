@@ -204,7 +204,7 @@ class _Bench:
     def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
         """From the first ``count`` phases, without those that were tried before."""
         own = self.question.start
-        known = own if own.radius < 1.0 else None
+        known = own if self.question.periodic and own.radius < 1.0 else None
         starts = [
             _Trial(0, trials.recipe, phase(k), known) for k in range(len(trials.nominal), count)
         ]
@@ -212,9 +212,9 @@ class _Bench:
 
     def on_boards(self, trials: _Trials, boards: int = BOARDS, each: int = STARTS) -> _Trials:
         """On the first ``boards`` able ones, from the first ``each`` phases of each."""
-        able = list(self.able.items())[:boards]
+        able, periodic = list(self.able.items())[:boards], self.question.periodic
         starts = [
-            _Trial(i, trials.recipe, phase(STARTS * i + k), orbit)
+            _Trial(i, trials.recipe, phase(STARTS * i + k), orbit if periodic else None)
             for k in range(each)
             for i, orbit in able
         ]

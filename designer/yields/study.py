@@ -53,8 +53,8 @@ def plan_study(
 ) -> StudyPlan:
     """The Monte Carlo study of these responses, boards as the model file says.
 
-    Every one of ``checked`` is a question: leave out what the nominal circuit does not show
-    periodically, since there is no nominal orbit to start from.
+    Every one of ``checked`` is a question: leave out those on which the nominal circuit does not
+    settle, since there is no nominal orbit to start from.
     """
     return StudyPlan(
         circuit=design.circuit,

@@ -107,7 +107,7 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         "seed": plan.seed,
         "questions": [
             {
-                "spec": asdict(q.spec),
+                "spec": q.spec.as_dict(),
                 "excitation": nine_digits(asdict(q.excitation)),
                 "start": nine_digits([float(v) for v in q.start.start]),
                 "nominal": q.start.response,

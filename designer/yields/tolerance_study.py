@@ -23,7 +23,7 @@ from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.ensemble import Ensemble
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.orbit import SETTLED
 from designer.model.model_file import need_responses
 from designer.model.tuning_bands import Bands
 from designer.spice.numerics_gate import GateResult
@@ -72,7 +72,7 @@ def lagging_plan(
         [q.excitation.drive for q in plan.questions],
         np.array([q.start.start for q in plan.questions]),
     )
-    left = tuple(k for k, o in enumerate(orbits) if o.status is OrbitStatus.PERIODIC)
+    left = tuple(k for k, o in enumerate(orbits) if o.status in SETTLED)
     why = {
         k: f"the nominal circuit with bandwidth is {orbit.response}"
         for k, orbit in enumerate(orbits)
@@ -241,7 +241,7 @@ def _why_not(checked: CheckedResponse) -> str:
     """Why a response cannot be a question of a study; "" where it can."""
     if not checked.model.found:
         return "the model does not show it"
-    if checked.circuit.status is not OrbitStatus.PERIODIC:
+    if checked.circuit.status not in SETTLED:
         return f"the nominal circuit is {checked.circuit.response}"
     return ""
 

@@ -33,6 +33,9 @@ amplitude = 0.3
 """
 
 
+LINEAR = HERTZ[: HERTZ.index("[[clearance]]")] + HERTZ[HERTZ.index("[[force]]") :]
+
+
 def paper(k0: float, sides: str) -> str:
     table = PAPER_TABLE.replace("k0 = 0.95", f"k0 = {k0}")
     return f'format = 1\n{table}sides = "{sides}"\n'
@@ -40,6 +43,32 @@ def paper(k0: float, sides: str) -> str:
 
 def wanted(model: str, keys: str) -> None:
     parse_model_file(f"{model}[[response]]\nomega = 1.0\nexpect = {keys}\n")
+
+
+@pytest.mark.parametrize(
+    ("model", "keys", "field"),
+    [
+        (HERTZ, '"aperiodic"', None),
+        (HERTZ, '"quasi-periodic"', None),
+        (HERTZ, '"aperiodic"\nleast_exponent = 0.1', None),
+        (HERTZ, '"chaos"', "expect"),
+        (HERTZ, '"grazing"', "expect"),
+        (HERTZ, '"aperiodic"\nleast_exponent = 0.0', "least_exponent"),
+        (HERTZ, '"quasi-periodic"\nleast_exponent = 0.1', "least_exponent"),
+        (HERTZ, '"1-0-0"\nleast_exponent = 0.1', "least_exponent"),
+        (HERTZ, '"aperiodic"\ntwin = "exact"', "twin"),
+        (HERTZ, '"aperiodic"\nsymmetric = true', "symmetric"),
+        (LINEAR, '"aperiodic"', "expect"),
+    ],
+)
+def test_motions_without_a_period_can_be_wanted(model: str, keys: str, field: str | None) -> None:
+    """Of what is not linear; with an exponent that is one of chaos, and nothing of n-p-q."""
+    if field is None:
+        wanted(model, keys)
+        return
+    with pytest.raises(InputError) as caught:
+        wanted(model, keys)
+    assert caught.value.field == f"response[1].{field}"
 
 
 @pytest.mark.parametrize("n", [1, 2, 16])

@@ -37,6 +37,55 @@ def wanted(text: str | None, **more: object) -> Response:
     return Response(omega=1.0, expect=expect, **more)  # type: ignore[arg-type]
 
 
+def chaotic(exponent: float, error: float) -> Orbit:
+    return Orbit(OrbitStatus.APERIODIC, lyapunov=exponent, lyapunov_error=error)
+
+
+def without_period(status: OrbitStatus, least: float | None = None) -> Response:
+    return Response(omega=1.0, expect=status, least_exponent=least)
+
+
+TORUS = Orbit(OrbitStatus.QUASI_PERIODIC, lyapunov=0.0, lyapunov_error=1e-4)
+CHAOS = without_period(OrbitStatus.APERIODIC)
+
+
+@pytest.mark.parametrize(
+    ("orbit", "spec", "verdict"),
+    [
+        (chaotic(0.1, 0.01), CHAOS, Verdict.OK),
+        (periodic(3, 0, 0), CHAOS, Verdict.LOST),
+        (TORUS, CHAOS, Verdict.LOST),
+        (TORUS, without_period(OrbitStatus.QUASI_PERIODIC), Verdict.OK),
+        (chaotic(0.1, 0.01), without_period(OrbitStatus.QUASI_PERIODIC), Verdict.LOST),
+        (chaotic(0.1, 0.01), wanted("1-1-1"), Verdict.LOST),
+        (Orbit(OrbitStatus.GRAZING, n=2), CHAOS, Verdict.LOST),
+        (Orbit(OrbitStatus.NOT_SETTLED), CHAOS, Verdict.FAILED),
+        # 4 standard errors decide: 0.1 against 0.05, 0.07 and 0.15 with an error of 0.01.
+        (chaotic(0.1, 0.01), without_period(OrbitStatus.APERIODIC, 0.05), Verdict.OK),
+        (chaotic(0.1, 0.01), without_period(OrbitStatus.APERIODIC, 0.07), Verdict.FAILED),
+        (chaotic(0.1, 0.01), without_period(OrbitStatus.APERIODIC, 0.15), Verdict.LOST),
+    ],
+)
+def test_what_survives_without_a_period(orbit: Orbit, spec: Response, verdict: Verdict) -> None:
+    assert judge(orbit, spec, chaotic(0.1, 0.01))[0] is verdict
+
+
+def test_an_exponent_counts_in_the_models_time() -> None:
+    """A unit of the model's time is 2 ms on this board: 50 per second is 0.1 of the model."""
+    spec = without_period(OrbitStatus.APERIODIC, 0.09)
+    question = Question(
+        spec, Excitation(1.0 / (2.0 * math.pi * 2e-3), 1.0), chaotic(50.0, 0.5), None
+    )
+    assert question.judge(chaotic(50.0, 0.5))[0] is Verdict.OK
+    assert question.judge(chaotic(40.0, 0.5))[0] is Verdict.LOST
+
+
+def test_without_an_expectation_the_nominal_motion_without_a_period_is_wanted() -> None:
+    nominal = chaotic(0.1, 0.01)
+    assert judge(chaotic(0.2, 0.01), wanted(None), nominal)[0] is Verdict.OK
+    assert judge(periodic(1, 1, 1), wanted(None), nominal)[0] is Verdict.LOST
+
+
 def nothing() -> None:
     return None
 
