@@ -47,18 +47,20 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     """The numbers of a system at a drive frequency."""
     size = 2 * system.size
     B, d = np.zeros(size), np.zeros(size)
-    B[1::2], d[1::2] = system.drive_force(omega) / system.mass, system.constant / system.mass
+    B[1::2] = system.over_mass(system.drive_force(omega))
+    d[1::2] = system.over_mass(system.constant)
     turned = [HarmonicForce(1, np.zeros(system.size), system.quadrature)]
     waves = [] if system.driven_by_sine else [*turned, *system.harmonics]
     S, C = np.zeros((len(waves), size)), np.zeros((len(waves), size))
     for k, wave in enumerate(waves):
-        S[k, 1::2], C[k, 1::2] = wave.sine / system.mass, wave.cosine / system.mass
+        S[k, 1::2], C[k, 1::2] = system.over_mass(wave.sine), system.over_mass(wave.cosine)
     rows, places, pushes, drags = [], [], [], []
     for stop in system.clearances:
         along = system.displacement(stop)
         force = np.zeros(size)
-        force[1::2] = along / system.mass
+        force[1::2] = system.over_mass(along)
         moves = system.ground(omega) if system.fixed_stops and stop.other is None else 0.0
+        moves *= float(along.sum())
         rate = np.zeros(size)
         rate[1::2] = along
         for side, spring in stop.sides:
@@ -71,7 +73,7 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
                 drags.append((0.0 if number else stop.damping) * np.outer(force, rate))
     for law in system.laws:
         along, force, watched = np.array(law.row), np.zeros(size), np.zeros(size + 1)
-        force[1::2] = along / system.mass
+        force[1::2] = system.over_mass(along)
         watched[(0 if law.quantity == "displacement" else 1) : size : 2] = along
         for side, bends in law.bends.items():
             for place, change in bends:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from designer.model.lumped_elements import words_of
+
 if TYPE_CHECKING:
-    from designer.model.law_elements import Law
     from designer.model.lumped_elements import Elements
     from designer.model.model import Dimensionless
 
@@ -55,9 +56,9 @@ def system_sketch(system: Elements) -> str:
     row = ("|", *system.row)
     widths = [len(name) + 4 for name in row]
     widths[0] = 1
-    springs = {frozenset(spring.between) for spring in system.springs}
+    springs = {frozenset(spring.between) for spring in system.shown_springs}
     springs |= {frozenset(spring.between) for spring in system.cubic_springs}
-    dampers = {frozenset(damper.between) for damper in system.dampers}
+    dampers = {frozenset(damper.between) for damper in system.shown_dampers}
     pairs = [frozenset(name.replace("|", "ground") for name in row[i : i + 2])
              for i in range(len(row) - 1)]  # fmt: skip
     lines = []
@@ -74,8 +75,8 @@ def system_sketch(system: Elements) -> str:
         lines += [f"{kind}: {first} to {second}" for first, second in apart]
     for gap in system.gaps:
         sides = " and ".join(s for s in ("upper", "lower") if getattr(gap, s) is not None)
-        lines.append(f"{gap.name}: {sides} stop, {' to '.join(gap.between)}")
-    lines += [f"law {law.name}: {_joined(law)}" for law in system.laws]
+        lines.append(f"{gap.name}: {sides} stop, {words_of(gap)}")
+    lines += [f"law {law.name}: {words_of(law)}" for law in system.laws]
     lines += [f"cubic spring: {' to '.join(each.between)}" for each in system.cubic_springs]
     lines += [f"friction: {' to '.join(each.between)}" for each in system.frictions]
     lines += [f"force on {force.on}" for force in system.forces]
@@ -83,9 +84,3 @@ def system_sketch(system: Elements) -> str:
         stops = "with it" if system.base.stops == "base" else "stay"
         lines.append(f"the ground moves, stops go {stops}".replace("go stay", "stay"))
     return "\n".join(line.rstrip() for line in lines)
-
-
-def _joined(law: Law) -> str:
-    if law.between is not None:
-        return " to ".join(law.between)
-    return " ".join(f"{factor:+g} {name}" for name, factor in law.factors.items())

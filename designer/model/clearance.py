@@ -6,6 +6,9 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
+from designer.base.arrays import Array
 from designer.model.force_law import Quantity
 
 Sides = Literal["both", "upper", "lower"]
@@ -60,6 +63,16 @@ class Side:
         return Side(*lengths, factor * self.preload, factor * self.rise)
 
 
+def combined(row: Array) -> tuple[int, int | None, tuple[float, ...]]:
+    """``Clearance.mass``, ``other`` and ``combination`` of a sum (masses,) of displacements."""
+    places = np.flatnonzero(row)
+    if len(places) == 1 and row[places[0]] == 1.0:
+        return int(places[0]), None, ()
+    if sorted(row[places].tolist()) == [-1.0, 1.0]:
+        return int(np.argmax(row)), int(np.argmin(row)), ()
+    return int(np.argmax(np.abs(row))), None, tuple(row.tolist())
+
+
 @dataclass(frozen=True)
 class Clearance:
     """A gap between a mass and ground, or between two masses, with stops on one side or both."""
@@ -84,6 +97,10 @@ class Clearance:
     limits: bool = False
     """Of a dead zone whose stiffness is negative and the same on both sides: whether it makes the
     slope between its ends too, from which it would take: a force that rises and then stays."""
+
+    combination: tuple[float, ...] = ()
+    """(masses,) factors of the displacements in a sum, where it is neither one mass nor the
+    difference of two; ``mass`` is then the one with the largest factor."""
 
     @classmethod
     def even(

@@ -28,6 +28,9 @@ def dead_zones(clearances: Sequence[Clearance], laws: Sequence[ForceLaw]) -> tup
     """
     first, further = [], list[Clearance]()
     for stop in clearances:
+        if stop.combination:
+            expected = "for a circuit one mass, or the difference of two"
+            raise InputError(None, f"clearance {stop.name}.of", "a combination", expected)
         springs = {side: end.springs for side, end in stop.sides}
         ends = {
             side: replace(Side(*springs[side][0]), preload=end.jump) for side, end in stop.sides

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from designer.base.schema import Accepts, number, several, text
 
@@ -27,6 +28,20 @@ def two_bodies() -> Accepts:
         return names[0], names[1]
 
     return Accepts(expected, check, json={**each.json, "maxItems": 2})
+
+
+def combination() -> Accepts:
+    """Factors of masses' displacements in a sum."""
+    expected = "a factor for each mass, not 0, such as { hammer = 1.0, gear = -0.04 }"
+    factor = number("", expected, lambda value: value != 0.0 and math.isfinite(value))
+
+    def check(value: object) -> tuple[tuple[str, float], ...]:
+        if not isinstance(value, Mapping) or not value:
+            raise ValueError
+        return tuple((NAME.check(name), factor.check(each)) for name, each in value.items())
+
+    json = {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}
+    return Accepts(expected, check, json=json)
 
 
 def signed(unit: str, expected: str) -> Accepts:

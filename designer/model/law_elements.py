@@ -7,7 +7,6 @@ units become SI.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,7 +23,7 @@ from designer.base.schema import (
 )
 from designer.base.units import has_unit
 from designer.model.cubic_law import MOST_POINTS, cubic_error, cubic_points, points_for
-from designer.model.element_keys import NAME, signed, two_bodies
+from designer.model.element_keys import NAME, combination, signed, two_bodies
 from designer.model.force_law import Quantity
 
 DEFAULT_ERROR = 0.001
@@ -80,19 +79,6 @@ def _finite(value: object, unit: str) -> float:
     return float(number(unit or "m", "a number").check(value))
 
 
-def _combination() -> Accepts:
-    expected = "a factor for each mass, not 0, such as { hammer = 1.0, gear = -0.04 }"
-    factor = number("", expected, lambda value: value != 0.0 and math.isfinite(value))
-
-    def check(value: object) -> tuple[tuple[str, float], ...]:
-        if not isinstance(value, Mapping) or not value:
-            raise ValueError
-        return tuple((NAME.check(name), factor.check(each)) for name, each in value.items())
-
-    json = {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}
-    return Accepts(expected, check, json=json)
-
-
 @dataclass(frozen=True)
 class Law(FileTable):
     """A force that is straight between given points, and straight on beyond them."""
@@ -105,7 +91,7 @@ class Law(FileTable):
     """What x is: a displacement or a velocity."""
     between: Annotated[tuple[str, str] | None, two_bodies()] = None
     """What it joins: x is that of the first less that of the second."""
-    of: Annotated[tuple[tuple[str, float], ...] | None, _combination()] = None
+    of: Annotated[tuple[tuple[str, float], ...] | None, combination()] = None
     """In the place of ``between``: x is the sum of the masses' displacements, or velocities, times
     these factors."""
 

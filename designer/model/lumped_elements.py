@@ -16,7 +16,7 @@ from designer.base.arrays import Array
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.model.clearance import Side
-from designer.model.element_keys import GROUND, NAME, signed, two_bodies
+from designer.model.element_keys import GROUND, NAME, combination, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
 from designer.model.law_elements import (
     CubicSpring,
@@ -26,6 +26,7 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
+from designer.model.matrices import Matrices
 from designer.model.waveforms import Waveform, series
 
 
@@ -65,7 +66,7 @@ class Gap(FileTable):
 
     name: Annotated[str, NAME]
     """Its name."""
-    between: Annotated[tuple[str, str], two_bodies()]
+    between: Annotated[tuple[str, str] | None, two_bodies()] = None
     """What moves in it, and what carries the stops."""
     upper: Annotated[float | None, signed("m", "a length, negative for a preloaded stop,")] = None
     """Gap to the upper stop; None where there is none."""
@@ -96,6 +97,17 @@ class Gap(FileTable):
     """Down to which the Hertzian law holds."""
     pieces: Annotated[int, whole_number("a whole number from 1 to 12", 1, 12)] = 4
     """Straight pieces that stand for the Hertzian law."""
+    of: Annotated[tuple[tuple[str, float], ...] | None, combination()] = None
+    """In the place of ``between``: what moves in it is the sum of the masses' displacements times
+    these factors, such as a rocking corner or a point between two nodes."""
+
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """What moves in it is the sum of, ground left out of it or not."""
+        if self.between is not None:
+            first, second = self.between
+            return {first: 1.0, second: -1.0}
+        return dict(self.of or ())
 
     @property
     def hertz(self) -> HertzPieces | None:
@@ -283,6 +295,9 @@ class Elements:
     """The cubic springs."""
     frictions: tuple[Friction, ...] = ()
     """Dry friction."""
+    matrices: Matrices | None = None
+    """The linear part, where it is given by matrices; ``masses`` then have the diagonal of the
+    first, and there are no springs and no dampers."""
 
     @property
     def nonlinear(self) -> dict[str, NonlinearElement]:
@@ -301,7 +316,23 @@ class Elements:
     def holding(self) -> tuple[tuple[str, ...], ...]:
         """What each element joins whose force depends on a displacement, clearances left out."""
         laws = [each for each in self.nonlinear.values() if quantity_of(each) == "displacement"]
-        return (*(spring.between for spring in self.springs), *map(joined_by, laws))
+        return (*(spring.between for spring in self.shown_springs), *map(joined_by, laws))
+
+    @property
+    def shown_springs(self) -> tuple[Spring, ...]:
+        """The springs, or those that make the stiffness matrix."""
+        if self.matrices is None:
+            return self.springs
+        joints = self.matrices.joints(self.matrices.stiffness_matrix, GROUND)
+        return tuple(Spring(between, stiffness) for between, stiffness in joints)
+
+    @property
+    def shown_dampers(self) -> tuple[Damper, ...]:
+        """The dampers, or those that make the even part of the damping matrix."""
+        if self.matrices is None:
+            return self.dampers
+        joints = self.matrices.joints(self.matrices.damping_matrix, GROUND)
+        return tuple(Damper(between, damping) for between, damping in joints)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -328,13 +359,24 @@ class Elements:
         return row
 
     @property
+    def mass_matrix(self) -> Array:
+        """(n, n) mass matrix."""
+        if self.matrices is not None:
+            return self.matrices.mass_matrix
+        return np.diag([mass.mass for mass in self.masses])
+
+    @property
     def stiffness_matrix(self) -> Array:
         """(n, n) of the springs."""
+        if self.matrices is not None:
+            return self.matrices.stiffness_matrix
         return self._matrix([(spring.between, spring.stiffness) for spring in self.springs])
 
     @property
     def damping_matrix(self) -> Array:
         """(n, n) of the dampers."""
+        if self.matrices is not None:
+            return self.matrices.damping_matrix
         return self._matrix([(damper.between, damper.damping) for damper in self.dampers])
 
     def _matrix(self, joints: Sequence[tuple[tuple[str, str], float]]) -> Array:
@@ -346,7 +388,15 @@ class Elements:
         return out
 
 
-def joined_by(element: NonlinearElement) -> tuple[str, ...]:
+def joined_by(element: NonlinearElement | Gap) -> tuple[str, ...]:
     """The bodies that the force of an element joins; a combination of masses stands on ground."""
-    names = tuple(factors_of(element))
+    names = tuple(element.factors if isinstance(element, Gap) else factors_of(element))
     return names if element.between is not None else (*names, GROUND)
+
+
+def words_of(element: NonlinearElement | Gap) -> str:
+    """What an element is between, or of what combination."""
+    if element.between is not None:
+        return " to ".join(element.between)
+    factors = element.factors if isinstance(element, Gap) else factors_of(element)
+    return " ".join(f"{factor:+g} {name}" for name, factor in factors.items())

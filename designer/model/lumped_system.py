@@ -22,7 +22,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import one_of
-from designer.model.clearance import Clearance
+from designer.model.clearance import Clearance, combined
 from designer.model.cubic_law import MOST_POINTS
 from designer.model.element_keys import GROUND
 from designer.model.force_law import ForceLaw
@@ -65,6 +65,9 @@ def check(system: Elements) -> None:
     if len(system.masses) > MOST_MASSES:
         _refuse("mass", len(system.masses), f"at most {MOST_MASSES} masses")
     _check_names(system)
+    if system.matrices is not None:
+        _check_alone(system)
+        system.matrices.check()
     for gap in system.gaps:
         _check_gap(gap)
     for law in system.laws:
@@ -79,6 +82,14 @@ def check(system: Elements) -> None:
             _refuse(f"force on {force.on}.{key}", MISSING, "both waveform and terms, or neither")
     _check_grounded(system)
     _check_driven(system)
+
+
+def _check_alone(system: Elements) -> None:
+    """Matrices stand in the place of springs and dampers."""
+    for key, elements in (("spring", system.springs), ("damper", system.dampers)):
+        if elements:
+            expected = "none beside [matrices], which has them; or no [matrices]"
+            _refuse(key, f"{len(elements)} tables [[{key}]]", expected)
 
 
 def _refuse(field: str, found: object, expected: str) -> NoReturn:
@@ -126,7 +137,8 @@ def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
     """(key of the model file, bodies) of everything that joins bodies."""
     yield from (("spring.between", spring.between) for spring in system.springs)
     yield from (("damper.between", damper.between) for damper in system.dampers)
-    yield from (("clearance.between", gap.between) for gap in system.gaps)
+    for gap in system.gaps:
+        yield ("clearance.of" if gap.between is None else "clearance.between"), joined_by(gap)
     for law in system.laws:
         yield ("law.of" if law.between is None else "law.between"), joined_by(law)
     yield from (("cubic_spring.between", each.between) for each in system.cubic_springs)
@@ -135,6 +147,7 @@ def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
 
 def _check_gap(gap: Gap) -> None:
     field = f"clearance {gap.name}"
+    _check_joined(gap, field)
     if gap.upper is None and gap.lower is None:
         _refuse(f"{field}.upper", MISSING, "a gap to an upper or a lower stop, or both")
     if gap.upper is not None and gap.lower is not None and gap.upper + gap.lower <= 0.0:
@@ -168,6 +181,8 @@ def _check_restitution(gap: Gap, field: str) -> None:
     """It decides the damper of the stops, so that there is one damper and one stiffness for it."""
     if gap.damping:
         _refuse(field, gap.restitution, "none beside damping, which it decides")
+    if gap.of is not None:
+        _refuse(field, gap.restitution, "damping instead: of a combination no one contact is meant")
     if gap.law == "hertz":
         _refuse(field, gap.restitution, 'damping instead: with law = "hertz" no stiffness decides')
     upper, lower = gap.sides
@@ -176,18 +191,23 @@ def _check_restitution(gap: Gap, field: str) -> None:
         _refuse(field, gap.restitution, expected)
 
 
+def _check_joined(element: Gap | Law, field: str) -> None:
+    """One of ``between`` and ``of``, and that with factors that are numbers."""
+    if (element.between is None) == (element.of is None):
+        found = MISSING if element.of is None else "between and of"
+        _refuse(f"{field}.between", found, "between = [A, B], or of = {A = factor, …}")
+    if element.of is not None and GROUND in element.factors:
+        _refuse(f"{field}.of", GROUND, "masses: ground is what their displacements are from")
+    for value in element.factors.values():
+        _check_size(f"{field}.of", value, "numbers")
+
+
 def _check_law(law: Law) -> None:
-    if (law.between is None) == (law.of is None):
-        found = MISSING if law.of is None else "between and of"
-        _refuse(f"law {law.name}.between", found, "between = [A, B], or of = {A = factor, …}")
-    if law.of is not None and GROUND in law.factors:
-        _refuse(f"law {law.name}.of", GROUND, "masses: ground is what their displacements are from")
+    _check_joined(law, f"law {law.name}")
     expected = {"displacement": "m", "velocity": "m/s"}[law.quantity]
     if law.points.unit not in ("", expected):
         text = f"x in {law.points.unit}"
         _refuse(f"law {law.name}.points", text, f"x in {expected}: the law is of a {law.quantity}")
-    for value in law.factors.values():
-        _check_size(f"law {law.name}.of", value, "numbers")
     for value in chain.from_iterable(law.corners):
         _check_size(f"law {law.name}.points", value, "numbers")
     slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(law.corners)]
@@ -228,7 +248,7 @@ def _check_grounded(system: Elements) -> None:
     for name in system.names:
         if name not in sprung:
             expected = f"a [[spring]] between {name} and another"
-            if any(name in gap.between for gap in system.gaps):
+            if any(name in gap.factors for gap in system.gaps):
                 expected += DRIFTS
             _refuse("spring.between", f"no spring on {name}", expected)
     grounded = _reached({GROUND}, system.holding)
@@ -251,16 +271,17 @@ def _check_driven(system: Elements) -> None:
     if system.base is not None and system.base.stops == "fixed":
         for gap in system.gaps:
             for key in ("damping", "restitution"):
-                if getattr(gap, key) and GROUND in gap.between:
+                if getattr(gap, key) and GROUND in joined_by(gap):
                     expected = f'no {key} where [base] stops = "fixed": its other end moves'
                     _refuse(f"clearance {gap.name}.{key}", getattr(gap, key), expected)
     joints = [between for _, between in _joints(system) if GROUND not in between]
     moved = _reached(driven, joints)
     for gap in system.gaps:
-        if moved.isdisjoint(gap.between):
+        if moved.isdisjoint(gap.factors):
             expected = "a force, a base motion or a spring that moves it: it can never be reached"
+            key = "of" if gap.between is None else "between"
             _refuse(
-                f"clearance {gap.name}.between", f"{' and '.join(gap.between)}, at rest", expected
+                f"clearance {gap.name}.{key}", f"{' and '.join(gap.factors)}, at rest", expected
             )
 
 
@@ -452,7 +473,16 @@ class LumpedSystem(Elements):
             quadrature=quadrature,
             harmonics=tuple(HarmonicForce(k, *waves[k]) for k in sorted(waves)),
             laws=laws,
+            coupled_mass=self._coupled_mass,
         )
+
+    @property
+    def _coupled_mass(self) -> Array | None:
+        """The mass matrix where it is not diagonal."""
+        if self.matrices is None:
+            return None
+        matrix = self.matrices.mass_matrix
+        return None if not (matrix - np.diag(matrix.diagonal())).any() else matrix
 
     def _force_laws(self) -> tuple[ForceLaw, ...]:
         """Of the elements whose force is not linear."""
@@ -469,12 +499,18 @@ class LumpedSystem(Elements):
 
     def _clearance(self, gap: Gap) -> Clearance:
         """With ground first it is the same gap seen from the mass, its sides changed."""
-        (mass, other), (upper, lower) = gap.between, gap.sides
-        if mass == GROUND:
-            mass, other, upper, lower = other, mass, lower, upper
-        place = None if other == GROUND else self.names.index(other)
+        upper, lower = gap.sides
         damping = self.stop_damping(gap)
-        clearance = Clearance(gap.name, self.names.index(mass), place, upper, lower, damping)
+        if gap.between is None:
+            row = self.row_of(gap.factors)
+            mass, place, combination = combined(row)
+        else:
+            first, other = gap.between
+            if first == GROUND:
+                first, other, upper, lower = other, first, lower, upper
+            place = None if other == GROUND else self.names.index(other)
+            mass, combination = self.names.index(first), ()
+        clearance = Clearance(gap.name, mass, place, upper, lower, damping, combination=combination)
         return clearance.scaled(self.b)
 
     def stop_damping(self, gap: Gap) -> float:
@@ -487,7 +523,8 @@ class LumpedSystem(Elements):
             return gap.damping
         loss = -math.log(gap.restitution)
         ratio = loss / math.hypot(math.pi, loss)
-        inverse = sum(1.0 / m.mass for m in self.masses if m.name in gap.between)
+        row = self.row_of(gap.factors)
+        inverse = float(row @ np.linalg.solve(self.mass_matrix, row))
         stiffness = next(stop.stiffness for stop in gap.sides if stop is not None)
         return 2.0 * ratio * math.sqrt(stiffness / inverse)
 
@@ -525,7 +562,7 @@ class LumpedSystem(Elements):
     def _places(self) -> dict[str, tuple[str, int, str]]:
         """The list, the index in it and the field of each parameter but ``b``."""
         named: dict[str, list[str]] = {
-            "masses": list(self.names),
+            "masses": list(self.names) if self.matrices is None else [],
             "springs": ["-".join(spring.between) for spring in self.springs],
             "dampers": ["-".join(damper.between) for damper in self.dampers],
             "gaps": [gap.name for gap in self.gaps],
@@ -603,7 +640,10 @@ class LumpedSystem(Elements):
                     del force[key]
         if self.base is not None and self.base.unit == "m":
             del out["base"]["unit"]
-        for later in ("laws", "cubic_springs", "frictions"):
+        for gap in out["gaps"]:
+            if gap["of"] is None:
+                del gap["of"]
+        for later in ("laws", "cubic_springs", "frictions", "matrices"):
             if not out[later]:
                 del out[later]
         return out

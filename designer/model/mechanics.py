@@ -69,6 +69,8 @@ class SecondOrderSystem:
     """Forces at multiples of the drive's frequency, one for each."""
     laws: tuple[ForceLaw, ...] = ()
     """Further forces. What they are at rest is in the matrices and in ``constant``."""
+    coupled_mass: Array | None = None
+    """(n, n) mass matrix where it is not diagonal; ``mass`` then is its diagonal."""
 
     def __post_init__(self) -> None:
         if not len(self.constant):
@@ -80,6 +82,17 @@ class SecondOrderSystem:
     def size(self) -> int:
         """Number of masses."""
         return len(self.mass)
+
+    @property
+    def mass_matrix(self) -> Array:
+        """(n, n) mass matrix."""
+        return np.diag(self.mass) if self.coupled_mass is None else self.coupled_mass
+
+    def over_mass(self, forces: Array) -> Array:
+        """(n,) or (n, k) accelerations that forces on the masses make."""
+        if self.coupled_mass is not None:
+            return np.asarray(np.linalg.solve(self.coupled_mass, forces))
+        return np.asarray((forces.T / self.mass).T)
 
     @property
     def own_frequency(self) -> float:
@@ -114,7 +127,7 @@ class SecondOrderSystem:
     def drive_force(self, omega: float) -> Array:
         """(n,) amplitude of the force on each mass at a drive frequency, the ground's included."""
         acceleration = self.base * omega * omega + self.base_acceleration
-        return np.asarray(self.force + self.mass * acceleration)
+        return np.asarray(self.force + self.mass_matrix.sum(axis=1) * acceleration)
 
     @property
     def driven_by_sine(self) -> bool:
@@ -138,10 +151,12 @@ class SecondOrderSystem:
         columns = [self.quadrature]
         for harmonic in self.harmonics:
             columns += [harmonic.sine, harmonic.cosine]
-        return np.stack([_interleaved(each / self.mass, 1) for each in columns], axis=1)
+        return np.stack([_interleaved(self.over_mass(each), 1) for each in columns], axis=1)
 
     def displacement(self, clearance: Clearance) -> Array:
         """(n,) row over the masses' displacements that gives the one in a clearance."""
+        if clearance.combination:
+            return np.array(clearance.combination)
         row = np.zeros(self.size)
         row[clearance.mass] = 1.0
         if clearance.other is not None:
@@ -183,8 +198,12 @@ class SecondOrderSystem:
                     max(accumulate(k for _, k in side.springs)) for _, side in stop.sides
                 )
                 stiffness += stiffest * np.outer(row, row)
-        root = np.sqrt(self.mass)
-        squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+        if self.coupled_mass is None:
+            root = np.sqrt(self.mass)
+            squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+        else:
+            inverse = np.linalg.inv(np.linalg.cholesky(self.coupled_mass))
+            squares = np.linalg.eigvalsh(inverse @ stiffness @ inverse.T)
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     @cached_property
@@ -222,10 +241,9 @@ class SecondOrderSystem:
     def _first_order(self, stiffness: Array, damping: Array) -> Array:
         n = self.size
         A = np.zeros((2 * n, 2 * n))
-        for i in range(n):
-            A[2 * i, 2 * i + 1] = 1.0
-            A[2 * i + 1, 0::2] = -stiffness[i] / self.mass[i]
-            A[2 * i + 1, 1::2] = -damping[i] / self.mass[i]
+        A[0::2, 1::2] = np.eye(n)
+        A[1::2, 0::2] = -self.over_mass(stiffness)
+        A[1::2, 1::2] = -self.over_mass(damping)
         return A
 
     def piecewise_linear(self, omega: float | None = None) -> PiecewiseLinearSystem:
@@ -250,8 +268,8 @@ class SecondOrderSystem:
         stops, count = contacts[: len(self.clearances)], len(self.clearances)
         A0 = self.state_matrix()
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
-        B0[1::2] = self.drive_force(omega or 0.0) / self.mass
-        d0[1::2] = self.constant / self.mass
+        B0[1::2] = self.over_mass(self.drive_force(omega or 0.0))
+        d0[1::2] = self.over_mass(self.constant)
         waves, orders = self._waves(), tuple(harmonic.order for harmonic in self.harmonics)
 
         def build(key: ModeKey) -> Mode:
@@ -312,11 +330,11 @@ class _Contact:
         return cls(
             _interleaved(along, 0),
             _interleaved(along, 1),
-            _interleaved(along / system.mass, 1),
+            _interleaved(system.over_mass(along), 1),
             {side: stop.springs for side, stop in clearance.sides},
             {side: stop.jump for side, stop in clearance.sides},
             clearance.damping,
-            ground if fixed else 0.0,
+            ground * float(along.sum()) if fixed else 0.0,
             index,
         )
 
@@ -325,7 +343,7 @@ class _Contact:
         """One law of a system, beyond its piece at rest."""
         along = np.array(law.row)
         watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
-        push_back = _interleaved(along / system.mass, 1)
+        push_back = _interleaved(system.over_mass(along), 1)
         return cls(watched, np.zeros_like(watched), push_back, law.bends, {})
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:

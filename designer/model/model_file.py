@@ -45,6 +45,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
+from designer.model.matrices import Matrices, written_out
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.response_table import Response, ResponseTable
@@ -80,7 +81,7 @@ class ModelFile:
     circuit: CircuitSpec
     """What the circuit is to be made of."""
     text: str = field(repr=False)
-    """The file word for word."""
+    """The file word for word, but for NumPy files that it names, which are written out."""
     source: Path | None = None
     """The file that it was read from; None where it was none."""
     spread: SpreadSpec = BENCH_1
@@ -137,7 +138,12 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     InputError : the file cannot be read, or anything in it is wrong.
     """
     path = Path(path)
-    modelfile = parse_model_file(read_text(path, "a model file (TOML)", most=MAX_BYTES), path)
+    text = read_text(path, "a model file (TOML)", most=MAX_BYTES)
+    try:
+        text = written_out(text, path.parent)
+    except InputError as error:
+        raise InputError(path, error.field, error.found, error.expected) from None
+    modelfile = parse_model_file(text, path)
     named = modelfile.spread.measured
     if named is None:
         return modelfile
@@ -292,21 +298,31 @@ class _SystemFile(_Tables):
     """Springs with a cubic force."""
     friction: tuple[Friction, ...] = ()
     """Dry friction."""
+    matrices: Matrices | None = None
+    """The linear part by its matrices, in the place of masses, springs and dampers."""
     mechanical: ClassVar[None] = None
 
     @property
     def system(self) -> LumpedSystem:
         """What is computed with."""
         base = None if self.base is None else self.base.motion
-        linear = self.mass, self.spring, self.damper, self.clearance, self.force
-        return LumpedSystem(*linear, base, self.law, self.cubic_spring, self.friction)
+        masses = self.mass
+        if self.matrices is not None:
+            if masses:
+                expected = "none beside [matrices], whose names are the masses'"
+                raise InputError(None, "mass", f"{len(masses)} tables [[mass]]", expected)
+            named = zip(self.matrices.names, self.matrices.mass, strict=False)
+            masses = tuple(Mass(name, row[i]) for i, (name, row) in enumerate(named))
+        linear = masses, self.spring, self.damper, self.clearance, self.force
+        laws = self.law, self.cubic_spring, self.friction
+        return LumpedSystem(*linear, base, *laws, self.matrices)
 
     def scales(self, data: Mapping[str, Any]) -> SiScales | None:
         """The file is in SI where a value of its elements is a text with a unit."""
-        keys = (key for key in model_limits.ELEMENTS if key != "base")
+        keys = (key for key in model_limits.ELEMENTS if key not in ("base", "matrices"))
         elements = [element for key in keys for element in data.get(key, ())]
         elements += [data["base"]] if "base" in data else []
-        words = ("name", "between", "on", "law", "stops", "quantity", "waveform", "phase")
+        words = ("name", "between", "of", "on", "law", "stops", "quantity", "waveform", "phase")
         values = [v for each in elements for key, v in each.items() if key not in words]
         values += [v for law in data.get("law", ()) for point in law["points"] for v in point]
         values += [v for f in data.get("force", ()) for _, v, _ in f.get("harmonics", ())]

@@ -27,6 +27,7 @@ MODELS = ("model", "mechanical")
 """The two tables that a model of format 1 may be given in."""
 ELEMENTS = (
     "mass", "spring", "damper", "clearance", "force", "base", "law", "cubic_spring", "friction",
+    "matrices",
 )  # fmt: skip
 """Tables of the elements of format 2."""
 _REWRITTEN = "designer new FILE --from OLD rewrites a file in it"
@@ -237,18 +238,16 @@ LIMITS = (
         keys=r"\w*delay\w*|tau\w?",
     ),
     ModelLimit(
-        "a system by its matrices",
-        "`[matrices]`, `mass = [[…], […]]`, `stiffness_matrix`",
-        "elements of format 2: of a stiffness matrix K a [[spring]] of -Kᵢⱼ between each two "
-        "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
-        tables=r"matri(x|ces)|\w+_matrix|[MCK]",
+        "matrices as keys of an element",
+        "`stiffness_matrix`, `mass = [[…], […]]` of a [mechanical]",
+        "the table [matrices] of format = 2: names, mass, damping, stiffness",
+        tables=r"matrix|\w+_matrix|[MCK]",
         keys=r"matri(x|ces)|\w+_matrix",
     ),
     ModelLimit(
-        "a system by its matrices",
+        "matrices as keys of an element",
         "",
-        "elements of format 2: of a stiffness matrix K a [[spring]] of -Kᵢⱼ between each two "
-        "masses, and of the sum of a row to ground; so for damping; the mass matrix is diagonal",
+        "the table [matrices] of format = 2: names, mass, damping, stiffness",
         tables=r"\w+",
         keys=r"\w+",
         of=(*MODELS, "mass", "spring", "damper", "clearance", "base"),

@@ -170,6 +170,9 @@ def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
     stop = system.clearances[number]
     masses = [stop.mass] if stop.other is None else [stop.mass, stop.other]
     fixed = system.fixed_stops and stop.other is None
+    row = system.displacement(stop)
+    if stop.combination:
+        return _of_combination(system, number, row)
     symbols = [subscripted(f"x{mass + 1}") for mass in masses]
     if stop.other is None and system.ground_moves and not fixed:
         symbols.append("y")
@@ -182,6 +185,23 @@ def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
         stops,
         (number,) * len(stops),
         base_acceleration=system.base_acceleration if fixed else 0.0,
+    )
+
+
+def _of_combination(system: SecondOrderSystem, number: int, row: Array) -> RelativeMotion:
+    """The same of a sum of displacements, from the base where the stops move with it."""
+    stop = system.clearances[number]
+    fixed = float(row.sum()) if system.fixed_stops else 0.0
+    names = system.names or [subscripted(f"x{mass + 1}") for mass in range(system.size)]
+    terms = [f"{factor:+.4g} {name}" for factor, name in zip(row, names, strict=True) if factor]
+    return RelativeMotion(
+        stop.name,
+        " ".join(terms).replace("-", "−"),
+        row,
+        fixed * system.base,
+        tuple((side, side * spring.gap) for side, spring in stop.sides),
+        (number,) * len(stop.sides),
+        base_acceleration=fixed * system.base_acceleration,
     )
 
 

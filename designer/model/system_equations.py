@@ -7,8 +7,9 @@ gives it, such as "A.upper".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
+from designer.base.arrays import Array
 from designer.base.si_unit import quantity_text
 from designer.model.element_keys import GROUND
 from designer.model.law_elements import (
@@ -18,7 +19,7 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
-from designer.model.lumped_elements import Force, Gap
+from designer.model.lumped_elements import Force, Gap, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 
@@ -95,7 +96,9 @@ def approximation_notes(model: LumpedSystem, *, si: bool) -> list[str]:
 
 
 def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
-    for i, mass in enumerate(model.masses, start=1):
+    if model.matrices is not None:
+        yield from _of_matrices(model)
+    for i, mass in enumerate(model.masses if model.matrices is None else (), start=1):
         yield subscripted(f"m{i}"), mass.mass, "kg", f"mass of {mass.name}"
     for i, spring in enumerate(model.springs, start=1):
         text = f"spring, {' to '.join(spring.between)}"
@@ -130,8 +133,31 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         yield symbol, model.base.amplitude, model.base.unit, text
 
 
+def _matrix_terms(model: LumpedSystem) -> Iterator[tuple[str, Array, str, str]]:
+    """Symbol, matrix, unit and prime of the displacements of each matrix of the linear part."""
+    assert model.matrices is not None
+    yield "m", model.matrices.mass_matrix, "kg", "″"
+    yield "c", model.matrices.damping_matrix, "N s/m", "′"
+    yield "k", model.matrices.stiffness_matrix, "N/m", ""
+
+
+def _of_matrices(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
+    words = {"m": "mass", "c": "damping", "k": "stiffness"}
+    for letter, matrix, unit, _ in _matrix_terms(model):
+        for i, name in enumerate(model.names):
+            for j, other in enumerate(model.names):
+                if matrix[i, j] and (j >= i or matrix[i, j] != matrix[j, i]):
+                    text = f"{words[letter]} matrix, {name} and {other}"
+                    yield _entry(letter, i, j), float(matrix[i, j]), unit, text
+
+
+def _entry(letter: str, row: int, column: int) -> str:
+    between = "," if max(row, column) > 8 else ""
+    return subscripted(f"{letter}{row + 1}") + between + subscripted(f"{column + 1}")
+
+
 def _of_gap(gap: Gap, damping: float) -> Iterator[tuple[str, float, str, str]]:
-    location = f"in {gap.name}, {' to '.join(gap.between)}"
+    location = f"in {gap.name}, {words_of(gap)}"
     for side in ("upper", "lower"):
         place = getattr(gap, side)
         if place is not None:
@@ -190,6 +216,9 @@ def _value(value: float, unit: str) -> str:
 def _line(model: LumpedSystem, mass: int, naming: Naming) -> str:
     """The equation of one mass."""
     name = model.names[mass]
+    if model.matrices is not None:
+        left = list(_matrix_line(model, mass, naming))
+        return _with_forces(model, name, " + ".join(left).replace("+ −", "− "), naming)
     left = [_times(naming(subscripted(f"m{mass + 1}"), model.masses[mass].mass)) + _x(mass, "″")]
     for i, damper in enumerate(model.dampers, start=1):
         if name in damper.between:
@@ -199,11 +228,32 @@ def _line(model: LumpedSystem, mass: int, naming: Naming) -> str:
         if name in spring.between:
             value = naming(subscripted(f"k{i}"), spring.stiffness)
             left.append(_times(value) + _stretch(model, name, spring.between, ""))
-    text = " + ".join(left)
+    return _with_forces(model, name, " + ".join(left), naming)
+
+
+def _matrix_line(model: LumpedSystem, mass: int, naming: Naming) -> Iterator[str]:
+    """The linear terms of one mass, by the matrices. Springs and dampers stand on what moves."""
+    moves = "" if model.base is None else "y"
+    for letter, matrix, _, prime in _matrix_terms(model):
+        for other in range(len(model.names)):
+            if matrix[mass, other]:
+                i, j = sorted((mass, other))
+                even = matrix[mass, other] == matrix[other, mass]
+                symbol = _entry(letter, i, j) if even else _entry(letter, mass, other)
+                place = _x(other, prime)
+                if moves and letter != "m":
+                    place = f"({place} − {moves}{prime})"
+                yield _times(naming(symbol, float(matrix[mass, other]))) + place
+
+
+def _with_forces(model: LumpedSystem, name: str, text: str, naming: Naming) -> str:
+    """The equation of a mass from its linear terms on."""
     for gap in model.gaps:
-        if name in gap.between:
-            sign = "+" if name == gap.between[0] else "−"
-            text += f" {sign} {gap.name}({_motion(model, gap)})"
+        factor = gap.factors.get(name, 0.0)
+        if factor:
+            size = _times(number_of("", abs(factor)))
+            sign = "+" if factor > 0.0 else "−"
+            text += f" {sign} {size}{gap.name}({_motion(model, gap)})"
     for name_of_law, symbol in law_symbols(model).items():
         element = model.nonlinear[name_of_law]
         factor = factors_of(element).get(name, 0.0)
@@ -234,6 +284,8 @@ def _stretch(model: LumpedSystem, name: str, between: tuple[str, str], prime: st
 def _motion(model: LumpedSystem, gap: Gap) -> str:
     """The displacement that a clearance sees."""
     moves = model.base is not None and model.base.stops == "base"
+    if gap.between is None:
+        return _sum_of(model, gap.factors, "")
     first, second = (_place(model, name, "", moves=moves) for name in gap.between)
     return f"{first} − {second}" if first and second else first or f"−{second}"
 
@@ -241,8 +293,13 @@ def _motion(model: LumpedSystem, gap: Gap) -> str:
 def law_variable(model: LumpedSystem, element: NonlinearElement) -> str:
     """What the force of an element depends on."""
     prime = "" if quantity_of(element) == "displacement" else "′"
+    return _sum_of(model, factors_of(element), prime)
+
+
+def _sum_of(model: LumpedSystem, factors: Mapping[str, float], prime: str) -> str:
+    """A sum of displacements or velocities."""
     terms = []
-    for name, factor in factors_of(element).items():
+    for name, factor in factors.items():
         place = _place(model, name, prime)
         if place:
             size = _times(number_of("", abs(factor)))
@@ -304,7 +361,7 @@ def _law(model: LumpedSystem, gap: Gap, naming: Naming) -> str:
     """The force of a clearance's stops over the displacement u in it."""
     terms: list[str] = []
     clearance = next(c for c in model.second_order().clearances if c.name == gap.name)
-    turned = gap.between[0] == GROUND
+    turned = gap.between is not None and gap.between[0] == GROUND
     for side, stop in clearance.sides:
         end = "upper" if (side > 0) != turned else "lower"
         sign = "−" if end == "upper" else "+"

@@ -7,21 +7,23 @@ Displacements count to the right, so upper stops stand at the right.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, styled
 from designer.model.element_keys import GROUND
 from designer.model.law_elements import CubicSpring, Friction, Law
-from designer.model.lumped_elements import Damper, Gap, Spring
+from designer.model.lumped_elements import Damper, Gap, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 from designer.model.system_equations import drive_terms, element_rows, law_symbols, law_variable
 from designer.plots.mechanical_symbols import MechanicalSheet
 
 Joint = Spring | Damper | CubicSpring | Friction | Law
+T = TypeVar("T", Spring, Damper)
 _WALL, _FIRST, _WIDTH, _PITCH = 0.9, 5.3, 2.6, 7.0
 """Abscissae of the wall and of the first mass, the width of a mass, and from one to the next."""
 _ROW = 1.6
@@ -50,11 +52,17 @@ class _Page(MechanicalSheet):
         self.between: list[list[str]] = [[] for _ in self.row]
         self.below: list[str] = []
         self.joints = self._joints()
-        self.combinations = [s for s, element in self._laws() if element.between is None]
+        self.combinations = [
+            f"{symbol}({law_variable(model, element)})"
+            for symbol, element in self._laws()
+            if element.between is None
+        ]
+        self.combinations += [f"{g.name}: {words_of(g)}" for g in model.gaps if g.between is None]
         self._sort()
         rows = max(len(slot) for slot in self.between)
         self.top = 0.6 + _ROW * max(rows, 2)
-        high = self.top + 0.6 + _LANE * len(model.gaps)
+        self.gaps = [gap for gap in model.gaps if gap.between is not None]
+        high = self.top + 0.6 + _LANE * len(self.gaps)
         width = _FIRST + _PITCH * (len(model.masses) - 1) + _WIDTH + 4.6
         low = _DEEP * len(self.below) + _LINE * len(self.combinations)
         self.floor = 0.5 - 1.1 - low if low else 0.0
@@ -63,9 +71,16 @@ class _Page(MechanicalSheet):
 
     def _joints(self) -> dict[str, Joint]:
         """What joins two bodies, clearances left out, by symbols."""
-        springs = {subscripted(f"k{i}"): s for i, s in enumerate(self.model.springs, start=1)}
-        dampers = {subscripted(f"c{i}"): d for i, d in enumerate(self.model.dampers, start=1)}
+        springs: dict[str, Spring] = dict(self._numbered("k", self.model.shown_springs))
+        dampers: dict[str, Damper] = dict(self._numbered("c", self.model.shown_dampers))
         return {**springs, **dampers, **{s: e for s, e in self._laws() if e.between is not None}}
+
+    def _numbered(self, letter: str, joints: Sequence[T]) -> Iterator[tuple[str, T]]:
+        """Springs or dampers by their symbols; those that make a matrix have none in the table, so
+        that they are numbered in brackets."""
+        form = f"{letter}{{}}" if self.model.matrices is None else f"({letter}{{}})"
+        for i, joint in enumerate(joints, start=1):
+            yield subscripted(form.format(i)), joint
 
     def _laws(self) -> list[tuple[str, CubicSpring | Friction | Law]]:
         elements = self.model.nonlinear
@@ -119,9 +134,8 @@ class _Page(MechanicalSheet):
             self._under(-1.5 - _DEEP * number, symbol)
         for number, symbol in enumerate(self.combinations):
             y = -1.2 - _DEEP * len(self.below) - _LINE * number
-            law = self.model.nonlinear[symbol]
-            self.text(_WALL + 0.4, y, f"{symbol}({law_variable(self.model, law)})", "left")
-        for number, gap in enumerate(self.model.gaps):
+            self.text(_WALL + 0.4, y, symbol, "left")
+        for number, gap in enumerate(self.gaps):
             self._clearance(self.top + 1.3 + _LANE * number, gap, self._shift(number))
 
     def _ground(self) -> None:
@@ -137,7 +151,8 @@ class _Page(MechanicalSheet):
         left, name = self._left(place), self.row[place]
         number = self.model.names.index(name) + 1
         self.box(left, left + _WIDTH, 0.0, self.top)
-        text = f"{name}\n{self.values[subscripted(f'm{number}')]}"
+        entry = f"m{number}" if self.model.matrices is None else f"m{number}{number}"
+        text = f"{name}\n{self.values.get(subscripted(entry), '')}"
         self.text(left + 0.5 * _WIDTH, 0.5 * self.top, text, va="center", size=9.5)
         x = left + 0.5 * _WIDTH
         self.line([x, x], [0.0, -0.55], MUTED, 0.8)
@@ -171,7 +186,10 @@ class _Page(MechanicalSheet):
             return f"{symbol}: {linear}{self.values[f'{symbol}.k3']} x³"
         if isinstance(joint, Friction):
             return f"{symbol}: {self.values[f'{symbol}.force']}"
-        return symbol if isinstance(joint, Law) else f"{symbol} = {self.values[symbol]}"
+        if isinstance(joint, Law):
+            return symbol
+        size = joint.stiffness if isinstance(joint, Spring) else joint.damping
+        return f"{symbol} = {self.values.get(symbol, f'{size:.4g}'.replace('-', '−'))}"
 
     def _under(self, y: float, symbol: str) -> None:
         """A joint of what are no neighbours, below the row."""
@@ -185,15 +203,16 @@ class _Page(MechanicalSheet):
 
     def _shift(self, number: int) -> float:
         """Of a clearance's rod from the middle of its mass, where that carries several."""
-        return 0.0 if self._alone(self.model.gaps[number]) else _SHIFT * (number % 3 - 1)
+        return 0.0 if self._alone(self.gaps[number]) else _SHIFT * (number % 3 - 1)
 
     def _alone(self, gap: Gap) -> bool:
         """Whether no other clearance has a mass of this one."""
-        masses = set(gap.between) - {GROUND}
-        return sum(not masses.isdisjoint(other.between) for other in self.model.gaps) == 1
+        masses = set(gap.factors) - {GROUND}
+        return sum(not masses.isdisjoint(other.factors) for other in self.gaps) == 1
 
     def _clearance(self, y: float, gap: Gap, shift: float) -> None:
         """A rod on the mass between plates on springs, which stand on ground or on the other."""
+        assert gap.between is not None
         mass, other = gap.between if gap.between[0] != GROUND else gap.between[::-1]
         middle = self._middle(self.row.index(mass))
         rod = middle + shift

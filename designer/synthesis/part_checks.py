@@ -87,6 +87,12 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
+    if system.coupled_mass is not None:
+        expected = (
+            "a diagonal mass matrix for a circuit, such as lumped masses: a stop then pushes only "
+            "what it touches"
+        )
+        raise InputError(None, "matrices.mass", "a mass matrix with couplings", expected)
     if system.harmonics:
         orders = ", ".join(str(harmonic.order) for harmonic in system.harmonics)
         found = f"forces at {orders} times the drive's frequency"
