@@ -358,7 +358,7 @@ def _on_circuit(
     rows = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
     first = _attractors([measured[i] for i in rows])
     model = synthesis.modelfile.model.at(r.b)
-    box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts
+    box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts[:, None]
     even = model.second_order().even
     result = coexistence.of_flow(flow, box, *sampling, first, volts, even=even)
     more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]

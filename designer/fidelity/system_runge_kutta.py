@@ -47,10 +47,11 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     """The numbers of a system at a drive frequency."""
     size = 2 * system.size
     B, d = np.zeros(size), np.zeros(size)
-    B[1::2] = system.over_mass(system.drive_force(omega))
+    first, *further = system.drive_waves(omega)
+    B[1::2] = system.over_mass(first.sine)
     d[1::2] = system.over_mass(system.constant)
-    turned = [HarmonicForce(1, np.zeros(system.size), system.quadrature)]
-    waves = [] if system.driven_by_sine else [*turned, *system.harmonics]
+    turned = HarmonicForce(1, np.zeros(system.size), first.cosine)
+    waves = [] if system.driven_by_sine else [turned, *further]
     S, C = np.zeros((len(waves), size)), np.zeros((len(waves), size))
     for k, wave in enumerate(waves):
         S[k, 1::2], C[k, 1::2] = system.over_mass(wave.sine), system.over_mass(wave.cosine)

@@ -1,8 +1,8 @@
 """Extremes of absolute displacements, where the equations count them from a moving base.
 
-x = z + ground · sin ωt is no state, so its extremes are none of the flow's. Here the drive becomes
-two states (sin ωt, cos ωt), and x takes the place of z: a system of the same modes without a drive,
-whose flow refines the extremes of x as it does those of z.
+x = z + y is no state, so its extremes are none of the flow's. Here the drive becomes states (its
+sine, its cosine, and those of harmonics), and x takes the place of z: a system of the same modes
+without a drive, whose flow refines the extremes of x as it does those of z.
 """
 
 from __future__ import annotations
@@ -25,16 +25,18 @@ OPEN_PERIODS = 200
 
 
 def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
-    """(states, 2) least and greatest x = z + ground · sin ωt along an orbit of ``flow``.
+    """(states, 2) least and greatest x = z + y along an orbit of ``flow``.
 
-    ground : (states,) amplitude of the ground's displacement in each state's unit; 0 for a state
-    that it does not move. (0, 2) of an orbit that has no extremes.
+    ground : (states, 2 + 2h) the ground's displacement in each state's unit, as of
+    ``relative_motion.ground_of``; 0 for a state that it does not move. (0, 2) of an orbit that has
+    no extremes.
     """
     if not len(orbit.extremes) or not ground.any():
         return orbit.extremes
     rest = Drive(flow.drive.omega, 0.0, flow.drive.offset)
     moved = Flow(_in_absolute_terms(flow, ground), rest, fast=False)
-    start = np.concatenate([orbit.start, np.tile([0.0, 1.0], 1 + len(flow.system.orders or ()))])
+    waves = np.tile([0.0, 1.0], 1 + len(flow.system.orders or ()))
+    start = np.concatenate([orbit.start + ground @ waves[: ground.shape[1]], waves])
     with moved.within(Budget(step_budget.SETTLING)):
         run = moved.run(start, orbit.n or OPEN_PERIODS, mode=orbit.mode or None, measure=True)
     if run.status is not FlowStatus.DONE:
@@ -43,10 +45,11 @@ def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
 
 
 def _in_absolute_terms(flow: Flow, ground: Array) -> PiecewiseLinearSystem:
-    """The system of the states (z + ground sin ωt, sin ωt, cos ωt, …); it counts no impacts."""
+    """The system of the states (z + y, sin ωt, cos ωt, …); it counts no impacts."""
     driven, n = with_drive_states(flow.system, flow.drive), flow.system.size
     forth, back = np.eye(driven.size), np.eye(driven.size)
-    forth[:n, n], back[:n, n] = ground, -ground
+    waves = slice(n, n + ground.shape[1])
+    forth[:n, waves], back[:n, waves] = ground, -ground
 
     def build(key: ModeKey) -> Mode:
         mode = driven.mode(key)

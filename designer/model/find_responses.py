@@ -216,8 +216,9 @@ def scale_of(model: MechanicalModel, omega: float) -> Array:
     gaps = [abs(side.gap) for stop in system.clearances for _, side in stop.sides]
     # Without a stop the clearance b of a dimensionless model is a length still; else b is a factor.
     length = model.b if isinstance(model, Dimensionless) else 0.0
-    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=length)
-    for wave in (system.quadrature, *(w for h in system.harmonics for w in (h.sine, h.cosine))):
+    first, *further = system.drive_waves(omega)
+    x = np.abs(flexibility @ first.sine) + max(gaps, default=length)
+    for wave in (first.cosine, *(w for h in further for w in (h.sine, h.cosine))):
         x = x + np.abs(flexibility @ wave)
     x = x + np.abs(flexibility @ system.constant) + _law_reach(system, "displacement")
     if system.laws:  # a mass that only a law joins is moved by it, and by nothing that is linear

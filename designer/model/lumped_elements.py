@@ -5,7 +5,8 @@ All numbers are in the file's own consistent units; texts with units become SI.
 
 from __future__ import annotations
 
-from collections import Counter
+import math
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,6 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.model.clearance import Side
@@ -27,6 +29,7 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.matrices import Matrices
+from designer.model.mechanics import SINE, Shape
 from designer.model.waveforms import Waveform, series
 
 
@@ -202,10 +205,7 @@ class Force(FileTable):
     @property
     def waves(self) -> Iterator[tuple[int, float, float]]:
         """(n, amplitude, phase) of all that it is the sum of: amplitude · sin(nωt + phase)."""
-        phase = self.phase or 0.0
-        shape = [(1, 1.0)] if self.waveform is None else series(self.waveform, self.terms or 1)
-        sizes = [(n, self.amplitude * size, n * phase) for n, size in shape]
-        yield from (wave for wave in (*sizes, *self.harmonics) if wave[1])
+        return waves_of(self)
 
     @property
     def drives(self) -> bool:
@@ -213,7 +213,34 @@ class Force(FileTable):
         return any(True for _ in self.waves)
 
 
+def waves_of(element: Force | MovingBase) -> Iterator[tuple[int, float, float]]:
+    """(n, amplitude, phase) of what a force or a motion of the ground is the sum of:
+    amplitude · sin(nωt + phase)."""
+    phase = element.phase or 0.0
+    shape = [(1, 1.0)] if element.waveform is None else series(element.waveform, element.terms or 1)
+    sizes = [(n, element.amplitude * size, n * phase) for n, size in shape]
+    yield from (wave for wave in (*sizes, *element.harmonics) if wave[1])
+
+
+STRAIGHT = 1e-12
+"""A sine or a cosine that small is 0."""
+
+
+def turned(phase: float) -> Array:
+    """(2,) cosine and sine of an angle; 0 where that is what was meant, as of the sine of π."""
+    parts = np.array([math.cos(phase), math.sin(phase)])
+    parts[np.abs(parts) < STRAIGHT] = 0.0
+    return parts
+
+
 BaseStops = Literal["base", "fixed"]
+
+
+def _base_unit(value: object) -> str:
+    """Unit of a length or an acceleration; a number has that of a length."""
+    if not isinstance(value, str):
+        return "m"
+    return next((u for u in ACCELERATIONS if has_unit(value, u)), "m")
 
 
 def _base_amplitude() -> Accepts:
@@ -223,9 +250,7 @@ def _base_amplitude() -> Accepts:
     def check(value: object) -> tuple[float, str]:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError
-        unit = "m"
-        if isinstance(value, str):
-            unit = next((u for u in ACCELERATIONS if has_unit(value, u)), unit)
+        unit = _base_unit(value)
         amplitude = parse_quantity(value, unit)
         if not amplitude > 0.0:
             raise ValueError
@@ -234,9 +259,35 @@ def _base_amplitude() -> Accepts:
     return Accepts(expected, check, json={"type": ["number", "string"]})
 
 
+BaseHarmonics = tuple[tuple[int, float, str, float], ...]
+"""(n, amplitude, its unit or "" for that of the first, phase [rad]) of each."""
+
+
+def _base_harmonics() -> Accepts:
+    harmonics = _harmonics()
+    expected = harmonics.expected.replace("2 N", "0.1 mm")
+
+    def check(value: object) -> BaseHarmonics:
+        if not isinstance(value, list):
+            raise ValueError
+        units = [""] * len(value)
+        plain: list[object] = []
+        for place, each in enumerate(value):
+            if isinstance(each, list) and len(each) == 3 and isinstance(each[1], str):
+                units[place] = _base_unit(each[1])
+                each = [each[0], parse_quantity(each[1], units[place]), each[2]]
+            plain.append(each)
+        checked: Harmonics = harmonics.check(plain)
+        return tuple(
+            (n, size, unit, phase) for (n, size, phase), unit in zip(checked, units, strict=True)
+        )
+
+    return Accepts(expected, check, json=harmonics.json)
+
+
 @dataclass(frozen=True)
 class MovingBase:
-    """The ground moves as y = Y sin ωt."""
+    """The ground moves as y = Y sin ωt, or as a sum of such waves."""
 
     amplitude: float
     """Y, or the amplitude of the acceleration, Y ω²."""
@@ -244,6 +295,27 @@ class MovingBase:
     """Whether the stops between a mass and ground move with it or stay."""
     unit: str = "m"
     """Unit of ``amplitude``: one of ``ACCELERATIONS``, or that of a displacement."""
+    phase: float | None = None
+    """Of the motion, before the drive's sine; None: in phase."""
+    waveform: Waveform | None = None
+    """Shape with the peak ``amplitude``, in the place of the sine."""
+    terms: int | None = None
+    """How many harmonics that the waveform has are kept."""
+    harmonics: Harmonics = ()
+    """Waves amplitude · sin(nωt + phase) beside it, in the unit of ``amplitude``."""
+
+    @property
+    def shape(self) -> Shape:
+        """What it is the sum of, over ``amplitude``."""
+        waves = defaultdict[int, Array](lambda: np.zeros(2))
+        for n, size, phase in waves_of(self):
+            waves[n] += size / self.amplitude * turned(phase)
+        return tuple((n, *waves[n].tolist()) for n in sorted(waves))
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether it is the drive's sine."""
+        return self.shape == SINE
 
     @property
     def displacement(self) -> float:
@@ -265,12 +337,38 @@ class BaseTable(FileTable):
     drive frequency."""
     stops: Annotated[BaseStops, choice("base", "fixed")] = "base"
     """Whether the stops between a mass and ground move with it or stay."""
+    phase: Annotated[float | None, _angle()] = None
+    """Of the motion, before the drive's sine; None: in phase."""
+    waveform: Annotated[Waveform | None, choice("square", "triangle", "sawtooth")] = None
+    """Shape with the peak ``amplitude``, in the place of the sine."""
+    terms: Annotated[
+        int | None,
+        whole_number(f"a whole number from 1 to {MOST_HARMONICS}", 1, MOST_HARMONICS),
+    ] = None
+    """How many harmonics that the waveform has are kept, the first among them."""
+    harmonics: Annotated[BaseHarmonics, _base_harmonics()] = ()
+    """Waves amplitude · sin(nωt + phase) beside it: displacements where ``amplitude`` is one,
+    accelerations where that is one; a number has the unit of ``amplitude``."""
 
     @property
     def motion(self) -> MovingBase:
-        """The motion that it stands for."""
+        """The motion that it stands for.
+
+        Raises
+        ------
+        InputError : a displacement beside an acceleration.
+        """
         amplitude, unit = self.amplitude
-        return MovingBase(amplitude, self.stops, unit)
+        harmonics = []
+        for n, size, own, phase in self.harmonics:
+            if own and (own in ACCELERATIONS) != (unit in ACCELERATIONS):
+                kind = "an acceleration" if unit in ACCELERATIONS else "a displacement"
+                found = f"harmonic {n} in {own}"
+                raise InputError(None, "base.harmonics", found, f"{kind}, as amplitude is")
+            ratio = ACCELERATIONS.get(own, 1.0) / ACCELERATIONS.get(unit, 1.0) if own else 1.0
+            harmonics.append((n, ratio * size, phase))
+        more = self.phase, self.waveform, self.terms, tuple(harmonics)
+        return MovingBase(amplitude, self.stops, unit, *more)
 
 
 @dataclass(frozen=True)

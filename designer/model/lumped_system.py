@@ -33,8 +33,8 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
-from designer.model.lumped_elements import Elements, Gap, joined_by
-from designer.model.mechanics import HarmonicForce, SecondOrderSystem
+from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
+from designer.model.mechanics import SINE, HarmonicForce, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")
@@ -47,8 +47,6 @@ DRIFTS = (
 )
 UNDAMPED = 1e-12
 """Least damping ratio of a mode: below it no steady response is reached."""
-STRAIGHT = 1e-12
-"""A sine or a cosine that small is 0."""
 ROUNDED = 1e-12
 """Of the steepest slope: an eigenvalue of a matrix of slopes that small may be 0."""
 
@@ -77,9 +75,9 @@ def check(system: Elements) -> None:
     for friction in system.frictions:
         _check_friction(friction)
     for force in system.forces:
-        if (force.waveform is None) != (force.terms is None):
-            key = "waveform" if force.waveform is None else "terms"
-            _refuse(f"force on {force.on}.{key}", MISSING, "both waveform and terms, or neither")
+        _check_waves(force, f"force on {force.on}")
+    if system.base is not None:
+        _check_waves(system.base, "base")
     _check_grounded(system)
     _check_driven(system)
 
@@ -124,13 +122,6 @@ def _check_size(field: str, value: float, what: str = "a number") -> None:
     low, high = NUMBERS
     if value != 0.0 and not low <= abs(value) <= high:
         _refuse(field, value, f"{what} from {low:g} to {high:g}")
-
-
-def _turned(phase: float) -> Array:
-    """(2,) cosine and sine of an angle; 0 where that is what was meant, as of the sine of π."""
-    turned = np.array([math.cos(phase), math.sin(phase)])
-    turned[np.abs(turned) < STRAIGHT] = 0.0
-    return turned
 
 
 def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
@@ -242,6 +233,12 @@ def _check_friction(friction: Friction) -> None:
         _refuse(f"{field}.stribeck", friction.stribeck, expected)
 
 
+def _check_waves(drive: Force | MovingBase, field: str) -> None:
+    if (drive.waveform is None) != (drive.terms is None):
+        key = "waveform" if drive.waveform is None else "terms"
+        _refuse(f"{field}.{key}", MISSING, "both waveform and terms, or neither")
+
+
 def _check_grounded(system: Elements) -> None:
     """Springs hold every mass to ground, directly or through others."""
     sprung = {name for bodies in system.holding for name in bodies}
@@ -269,6 +266,12 @@ def _check_driven(system: Elements) -> None:
     if not driven:
         _refuse("force", MISSING, "a [[force]] with an amplitude, or a [base]: nothing moves")
     if system.base is not None and system.base.stops == "fixed":
+        if not system.base.is_sine:
+            expected = (
+                '"base", or a sine in phase for stops that stay; a phase of the base is that of '
+                "every force, turned the other way"
+            )
+            _refuse("base.stops", '"fixed", with another phase or shape', expected)
         for gap in system.gaps:
             for key in ("damping", "restitution"):
                 if getattr(gap, key) and GROUND in joined_by(gap):
@@ -360,7 +363,7 @@ LEAST: dict[str, dict[str, float]] = {
         "restitution": SMALLEST,
     },
     "forces": {"amplitude": -GREATEST, "constant": -GREATEST, "phase": -GREATEST},
-    "base": {"amplitude": SMALLEST},
+    "base": {"amplitude": SMALLEST, "phase": -GREATEST},
     "cubic_springs": {"k1": -GREATEST, "k3": -GREATEST, "range": SMALLEST},
     "frictions": {
         "force": 0.0,
@@ -451,7 +454,7 @@ class LumpedSystem(Elements):
             constant[place] += self.b * each.constant
             for order, size, phase in each.waves:
                 wave = waves.setdefault(order, np.zeros((2, n)))
-                wave[:, place] += size * _turned(phase)
+                wave[:, place] += size * turned(phase)
         force, quadrature = waves.pop(1, np.zeros((2, n)))
         damping, stiffness = self.damping_matrix, self.stiffness_matrix
         laws = self._force_laws()
@@ -468,6 +471,7 @@ class LumpedSystem(Elements):
             constant=constant,
             base=0.0 if self.base is None else self.base.displacement,
             base_acceleration=0.0 if self.base is None else self.base.acceleration,
+            base_shape=SINE if self.base is None else self.base.shape,
             fixed_stops=self.base is not None and self.base.stops == "fixed",
             names=self.names,
             quadrature=quadrature,
@@ -638,8 +642,12 @@ class LumpedSystem(Elements):
             for key in ("phase", "waveform", "terms", "harmonics"):
                 if not force[key]:
                     del force[key]
-        if self.base is not None and self.base.unit == "m":
-            del out["base"]["unit"]
+        if self.base is not None:
+            if self.base.unit == "m":
+                del out["base"]["unit"]
+            for key in ("phase", "waveform", "terms", "harmonics"):
+                if not out["base"][key]:
+                    del out["base"][key]
         for gap in out["gaps"]:
             if gap["of"] is None:
                 del gap["of"]

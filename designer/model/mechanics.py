@@ -39,6 +39,11 @@ class HarmonicForce:
     """(masses,) amplitudes."""
 
 
+Shape = tuple[tuple[int, float, float], ...]
+"""(n, amplitude of sin nωt, amplitude of cos nωt) of each wave of a sum."""
+SINE: Shape = ((1, 1.0, 0.0),)
+
+
 @dataclass(frozen=True)
 class SecondOrderSystem:
     """Masses, dampers and springs with stops, driven by forces and by the ground."""
@@ -59,6 +64,8 @@ class SecondOrderSystem:
     """Amplitude of the ground's displacement, where that is the same at every frequency."""
     base_acceleration: float = 0.0
     """Amplitude of the ground's acceleration, where that is the same at every frequency."""
+    base_shape: Shape = SINE
+    """What the ground's motion is the sum of, over that amplitude."""
     fixed_stops: bool = False
     """Whether the stops between a mass and ground stay where they are while the ground moves."""
     names: tuple[str, ...] = ()
@@ -119,20 +126,44 @@ class SecondOrderSystem:
         return bool(self.base or self.base_acceleration)
 
     def ground(self, omega: float) -> float:
-        """Amplitude of the ground's displacement at a drive frequency."""
+        """Amplitude of the ground's displacement at a drive frequency; of a motion that is no sine
+        that of its first harmonic's unit (``ground_shape``)."""
         if not self.base_acceleration:
             return self.base
         return self.base + self.base_acceleration / (omega * omega)
 
+    def ground_shape(self, omega: float) -> Shape:
+        """The ground's displacement at a drive frequency."""
+        return displacement_shape(self.base, self.base_acceleration, self.base_shape, omega)
+
     def drive_force(self, omega: float) -> Array:
-        """(n,) amplitude of the force on each mass at a drive frequency, the ground's included."""
-        acceleration = self.base * omega * omega + self.base_acceleration
-        return np.asarray(self.force + self.mass_matrix.sum(axis=1) * acceleration)
+        """(n,) amplitude of the sine in the force on each mass at a drive frequency, the ground's
+        included."""
+        return self.drive_waves(omega)[0].sine
+
+    def drive_waves(self, omega: float) -> tuple[HarmonicForce, ...]:
+        """All forces at a drive frequency, the ground's included, by their order; the first is that
+        of the drive itself."""
+        own = (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
+        waves = {wave.order: np.stack([wave.sine, wave.cosine]) for wave in own}
+        inertia = self.mass_matrix.sum(axis=1)
+        for n, *parts in self.base_shape if self.ground_moves else ():
+            acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
+            before = waves.get(n, np.zeros((2, self.size)))
+            waves[n] = before + np.outer(np.array(parts) * acceleration, inertia)
+        return tuple(HarmonicForce(n, *waves[n]) for n in sorted(waves))
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Multiples of the drive's frequency at which a force or the ground acts."""
+        of_base = [n for n, *_ in self.base_shape] if self.ground_moves else []
+        return tuple(sorted({*(wave.order for wave in self.harmonics), *of_base} - {1}))
 
     @property
     def driven_by_sine(self) -> bool:
         """Whether all forces are in phase, or in antiphase, and of one frequency."""
-        return not self.quadrature.any() and not self.harmonics
+        turned = self.ground_moves and any(cosine for _, _, cosine in self.base_shape)
+        return not (self.quadrature.any() or self.orders or turned)
 
     @property
     def even(self) -> bool:
@@ -140,16 +171,17 @@ class SecondOrderSystem:
         return (
             all(stop.upper == stop.lower for stop in self.clearances)
             and all(law.even for law in self.laws)
-            and all(harmonic.order % 2 for harmonic in self.harmonics)
+            and all(order % 2 for order in self.orders)
             and not self.constant.any()
         )
 
-    def _waves(self) -> Array | None:
+    def _waves(self, omega: float) -> Array | None:
         """(2n, 1 + 2 h) ``Mode.waves``."""
         if self.driven_by_sine:
             return None
-        columns = [self.quadrature]
-        for harmonic in self.harmonics:
+        first, *further = self.drive_waves(omega)
+        columns = [first.cosine]
+        for harmonic in further:
             columns += [harmonic.sine, harmonic.cosine]
         return np.stack([_interleaved(self.over_mass(each), 1) for each in columns], axis=1)
 
@@ -270,7 +302,7 @@ class SecondOrderSystem:
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
         B0[1::2] = self.over_mass(self.drive_force(omega or 0.0))
         d0[1::2] = self.over_mass(self.constant)
-        waves, orders = self._waves(), tuple(harmonic.order for harmonic in self.harmonics)
+        waves, orders = self._waves(omega or 0.0), self.orders
 
         def build(key: ModeKey) -> Mode:
             A, B, d = A0.copy(), B0.copy(), d0.copy()
@@ -292,6 +324,20 @@ class SecondOrderSystem:
             continuous=not any(stop.jumps for stop in self.clearances),
             orders=None if waves is None else orders,
         )
+
+
+def displacement_shape(
+    displacement: float, acceleration: float, shape: Shape, omega: float
+) -> Shape:
+    """A motion at a drive frequency of which the amplitude of the displacement is given, or of the
+    acceleration; 0 for the other."""
+
+    def sized(n: int, part: float) -> float:
+        return (displacement + acceleration / (n * omega) ** 2) * part
+
+    if not (displacement or acceleration):
+        return ()
+    return tuple((n, sized(n, sine), sized(n, cosine)) for n, sine, cosine in shape)
 
 
 def _without_rounding(less: Array, whole: Array) -> Array:

@@ -325,7 +325,8 @@ class _SystemFile(_Tables):
         words = ("name", "between", "of", "on", "law", "stops", "quantity", "waveform", "phase")
         values = [v for each in elements for key, v in each.items() if key not in words]
         values += [v for law in data.get("law", ()) for point in law["points"] for v in point]
-        values += [v for f in data.get("force", ()) for _, v, _ in f.get("harmonics", ())]
+        drives = [*data.get("force", ()), data.get("base", {})]
+        values += [v for each in drives for _, v, _ in each.get("harmonics", ())]
         return SiScales() if any(isinstance(value, str) for value in values) else None
 
 

@@ -222,9 +222,10 @@ LIMITS = (
         tables=r"drives?|excitations?|inputs?|loads?",
     ),
     ModelLimit(
-        "a drive that is no sine, but as waveform or harmonics of a [[force]] of format 2",
-        "`[base] harmonics`, `square`, `[[waveform]]`",
-        "waveform with terms, or harmonics, of a [[force]] of format 2; no circuit makes them",
+        "a drive that is no sine, but as waveform or harmonics of a force or base of format 2",
+        "`pulse`, `noise`, `[[waveform]]`",
+        "waveform with terms, or harmonics, of a [[force]] or [base] of format 2; no circuit makes "
+        "them",
         tables=r"waveforms?|harmonics?|signals?|sweep|chirp|noise",
         keys=r"waveform\w*|harmonics?|shape|square|triangle|sawtooth|pulse\w*|terms|noise|"
         r"random\w*|signal|chirp|sweep",

@@ -13,7 +13,13 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.orbit import Orbit
-from designer.model.mechanics import MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import (
+    SINE,
+    MechanicalModel,
+    SecondOrderSystem,
+    Shape,
+    displacement_shape,
+)
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -40,6 +46,8 @@ class RelativeMotion:
     """Unit that displacements are shown in, such as "mm"; "" for the model's own without a name."""
     base_acceleration: float = 0.0
     """Amplitude of the base's acceleration in it, where that is the same at every frequency."""
+    base_shape: Shape = SINE
+    """What the base's motion is the sum of, over that amplitude."""
 
     def in_unit(self, scale: float, unit: str) -> RelativeMotion:
         """The same motion of a model in metres in another unit, of which ``scale`` are a metre."""
@@ -83,10 +91,13 @@ class RelativeMotion:
 
     def of(self, time: Array, states: Array, omega: float) -> Array:
         """(k, 2) displacement and velocity along a trace: time (k,), states (k, 2 masses)."""
-        phase = omega * time
-        amplitude = self.base + self.base_acceleration / (omega * omega)
-        base = amplitude * np.stack([np.sin(phase), omega * np.cos(phase)], axis=1)
-        return np.stack([states[:, 0::2] @ self.row, states[:, 1::2] @ self.row], axis=1) + base
+        moved = np.stack([states[:, 0::2] @ self.row, states[:, 1::2] @ self.row], axis=1)
+        waves = displacement_shape(self.base, self.base_acceleration, self.base_shape, omega)
+        for n, sine, cosine in waves:
+            sin, cos, rate = np.sin(n * omega * time), np.cos(n * omega * time), n * omega
+            moved[:, 0] += sine * sin + cosine * cos
+            moved[:, 1] += rate * (sine * cos - cosine * sin)
+        return moved
 
 
 def relative_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
@@ -105,6 +116,7 @@ def mass_motion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
         system.base,
         (),
         base_acceleration=system.base_acceleration,
+        base_shape=system.base_shape,
     )
 
 
@@ -158,11 +170,15 @@ def shown_stops(system: SecondOrderSystem) -> tuple[tuple[int, int], ...]:
 
 
 def ground_of(model: MechanicalModel, omega: float) -> Array:
-    """(states,) amplitude of the ground's displacement in each state at a drive frequency:
-    x = z + ground · sin ωt."""
+    """(states, 2 + 2h) the ground's displacement in each state at a drive frequency, over the
+    drive's sine and cosine and those of each of the h ``SecondOrderSystem.orders``; without
+    columns that are 0 of a sine."""
     system = model.second_order()
-    ground = np.zeros(2 * system.size)
-    ground[0::2] = system.ground(omega)
+    orders = (1, *system.orders) if system.ground_moves else (1,)
+    ground = np.zeros((2 * system.size, 2 * len(orders)))
+    for n, sine, cosine in system.ground_shape(omega):
+        place = 2 * orders.index(n)
+        ground[0::2, place], ground[0::2, place + 1] = sine, cosine
     return ground
 
 

@@ -8,9 +8,11 @@ gives it, such as "A.upper".
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from designer.base.arrays import Array
 from designer.base.si_unit import quantity_text
+from designer.base.units import ACCELERATIONS
 from designer.model.element_keys import GROUND
 from designer.model.law_elements import (
     CubicSpring,
@@ -19,7 +21,7 @@ from designer.model.law_elements import (
     factors_of,
     quantity_of,
 )
-from designer.model.lumped_elements import Force, Gap, words_of
+from designer.model.lumped_elements import Force, Gap, MovingBase, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 
@@ -47,11 +49,20 @@ def equations_of(model: LumpedSystem, naming: Naming = symbol_of) -> tuple[str, 
         _nonlinear(symbols[name], element, naming) for name, element in model.nonlinear.items()
     ]
     if model.base is not None:
-        if model.base.acceleration:
-            lines.append(f"y = {naming('a', model.base.acceleration)}/ω² {MOTION}")
-        else:
-            lines.append(f"y = {naming('Y', model.base.amplitude)} {MOTION}")
+        lines.append(ground_line(model.base, naming))
     return tuple(lines)
+
+
+def ground_line(base: MovingBase, naming: Naming) -> str:
+    """How the ground moves."""
+    if base.is_sine and base.acceleration:
+        return f"y = {naming('a', base.acceleration)}/ω² {MOTION}"
+    symbol = "a" if base.acceleration else "Y"
+    unit = ACCELERATIONS.get(base.unit, 1.0)
+    harmonics = tuple((n, unit * size, phase) for n, size, phase in base.harmonics)
+    sized = replace(base, amplitude=unit * base.amplitude, harmonics=harmonics)
+    terms = _wave_terms(sized, symbol, "φ", naming)
+    return f"{'−y″' if base.acceleration else 'y'} = {' + '.join(terms)}".replace("+ −", "− ")
 
 
 def element_rows(model: LumpedSystem, *, si: bool) -> list[tuple[str, str, str]]:
@@ -114,16 +125,8 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         if force.amplitude:
             text = f"amplitude of the force on {force.on}"
             yield subscripted(f"P{i}"), force.amplitude, "N", text
-        if force.phase:
-            yield subscripted(f"φ{i}"), force.phase, "rad", f"phase of the force on {force.on}"
-        if force.terms is not None:
-            text = f"harmonics kept of the {force.waveform} force on {force.on}"
-            yield f"{subscripted(f'P{i}')}.terms", force.terms, "", text
-        for n, amplitude, phase in force.harmonics:
-            text = f"harmonic {n} of the force on {force.on}"
-            yield f"{subscripted(f'P{i}')}.{n}", amplitude, "N", f"amplitude of {text}"
-            if phase:
-                yield f"{subscripted(f'φ{i}')}.{n}", phase, "rad", f"phase of {text}"
+        symbols = subscripted(f"P{i}"), subscripted(f"φ{i}")
+        yield from _of_waves(force, *symbols, f"the force on {force.on}", "N")
         if force.constant:
             yield subscripted(f"G{i}"), force.constant, "N", f"constant force on {force.on}"
     if model.base is not None:
@@ -131,6 +134,22 @@ def _elements(model: LumpedSystem) -> Iterator[tuple[str, float, str, str]]:
         symbol, motion = ("a", "acceleration") if model.base.acceleration else ("Y", "motion")
         text = f"amplitude of the ground's {motion}, {stops} the stops"
         yield symbol, model.base.amplitude, model.base.unit, text
+        yield from _of_waves(model.base, symbol, "φ", f"the ground's {motion}", model.base.unit)
+
+
+def _of_waves(
+    drive: Force | MovingBase, P: str, φ: str, what: str, unit: str
+) -> Iterator[tuple[str, float, str, str]]:
+    """Phase and shape of a drive, beyond its amplitude."""
+    if drive.phase:
+        yield φ, drive.phase, "rad", f"phase of {what}"
+    if drive.terms is not None:
+        shaped = what.replace("the ", f"the {drive.waveform} ", 1)
+        yield f"{P}.terms", drive.terms, "", f"harmonics kept of {shaped}"
+    for n, amplitude, phase in drive.harmonics:
+        yield f"{P}.{n}", amplitude, unit, f"amplitude of harmonic {n} of {what}"
+        if phase:
+            yield f"{φ}.{n}", phase, "rad", f"phase of harmonic {n} of {what}"
 
 
 def _matrix_terms(model: LumpedSystem) -> Iterator[tuple[str, Array, str, str]]:
@@ -341,7 +360,11 @@ def _forces(model: LumpedSystem, name: str, naming: Naming) -> str:
 
 def drive_terms(force: Force, number: int, naming: Naming) -> list[str]:
     """What a force is the sum of, but for its constant part. number : of the force, from 1 on."""
-    P, φ = subscripted(f"P{number}"), subscripted(f"φ{number}")
+    return _wave_terms(force, subscripted(f"P{number}"), subscripted(f"φ{number}"), naming)
+
+
+def _wave_terms(drive: Force | MovingBase, P: str, φ: str, naming: Naming) -> list[str]:
+    """The same of a drive whose amplitude and phase have these symbols."""
 
     def wave(shape: str, order: int, amplitude: float, phase: float, names: tuple[str, str]) -> str:
         turn = f"{order if order > 1 else ''}ωt"
@@ -350,9 +373,9 @@ def drive_terms(force: Force, number: int, naming: Naming) -> list[str]:
         return f"{_times(naming(names[0], amplitude))}{shape}{'' if phase else ' '}{turn}"
 
     terms = []
-    if force.amplitude:
-        terms.append(wave(force.waveform or "sin", 1, force.amplitude, force.phase or 0.0, (P, φ)))
-    for n, amplitude, phase in force.harmonics:
+    if drive.amplitude:
+        terms.append(wave(drive.waveform or "sin", 1, drive.amplitude, drive.phase or 0.0, (P, φ)))
+    for n, amplitude, phase in drive.harmonics:
         terms.append(wave("sin", n, amplitude, phase, (f"{P}.{n}", f"{φ}.{n}")))
     return terms
 

@@ -19,7 +19,13 @@ from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import Damper, Gap, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
-from designer.model.system_equations import drive_terms, element_rows, law_symbols, law_variable
+from designer.model.system_equations import (
+    drive_terms,
+    element_rows,
+    ground_line,
+    law_symbols,
+    law_variable,
+)
 from designer.plots.mechanical_symbols import MechanicalSheet
 
 Joint = Spring | Damper | CubicSpring | Friction | Law
@@ -144,8 +150,10 @@ class _Page(MechanicalSheet):
             return
         self.arrow(_WALL - 0.1, _WALL + 1.2, self.floor - 0.35)
         stay = ", the stops stay" if base.stops == "fixed" and self.model.gaps else ""
-        amplitude = f"{self.values['a']}/ω²" if base.acceleration else self.values["Y"]
-        self.text(_WALL - 0.4, self.floor - 0.95, f"y = {amplitude} sin ωt{stay}", "left")
+        # Harmonics are in the table alone, as those of forces are.
+        line = ground_line(replace(base, harmonics=()), self._amplitude)
+        more = " + …" if base.harmonics else ""
+        self.text(_WALL - 0.4, self.floor - 0.95, f"{line}{more}{stay}", "left")
 
     def _mass(self, place: int) -> None:
         left, name = self._left(place), self.row[place]

@@ -93,11 +93,11 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "what it touches"
         )
         raise InputError(None, "matrices.mass", "a mass matrix with couplings", expected)
-    if system.harmonics:
-        orders = ", ".join(str(harmonic.order) for harmonic in system.harmonics)
+    if system.orders:
+        orders = ", ".join(map(str, system.orders))
         found = f"forces at {orders} times the drive's frequency"
         raise InputError(None, "force", found, "for a circuit sines alone: " + _ONE_GENERATOR)
-    if system.quadrature.any():
+    if not system.driven_by_sine:
         expected = (
             f"for a circuit forces in phase or in antiphase: {_ONE_GENERATOR}; a phase that all "
             "forces have may be left out"

@@ -44,7 +44,7 @@ def new(
     InputError : there is a file of this name, which is left alone, or none can be written there;
         both ``from_`` and ``format``; a file that cannot be read or rewritten.
     """
-    from designer.model.template import write_model_file
+    from designer.jobs.template import write_model_file
 
     if format not in (None, 1, 2):
         raise InputError(None, "--format", format, "1 or 2")
@@ -53,7 +53,7 @@ def new(
 
 def _files(path: Path) -> list[str]:
     """What was written: beside a commented file its schema."""
-    from designer.model.template import SCHEMA, SECOND, TEXT
+    from designer.jobs.template import SCHEMA, SECOND, TEXT
 
     schema = path.with_name(SCHEMA)
     commented = path.read_text("utf-8") in (TEXT, SECOND) and schema.exists()

@@ -27,7 +27,7 @@ def drawn(seed: int) -> tuple[str, dict[str, Array], Array, float, float, float]
 
     def definite(low: float, high: float) -> Array:
         turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
-        return np.round(turn @ np.diag(rng.uniform(low, high, 3)) @ turn.T, 6)
+        return np.asarray(np.round(turn @ np.diag(rng.uniform(low, high, 3)) @ turn.T, 6))
 
     mass, stiffness = definite(0.5, 2.0), definite(0.6, 4.0)
     mass, stiffness = (0.5 * (m + m.T) for m in (mass, stiffness))

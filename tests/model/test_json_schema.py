@@ -11,8 +11,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from designer.base.errors import InputError
+from designer.jobs.template import SCHEMA, SECOND, TEXT
 from designer.model.model_file import json_schema, parse_model_file
-from designer.model.template import SCHEMA, SECOND, TEXT
 from designer.verbs.new import new
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

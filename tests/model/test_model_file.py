@@ -18,15 +18,16 @@ from hypothesis import given, strategies as st
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import FileTable, keys_of
 from designer.dynamics.counts import Counts
+from designer.jobs.template import TEXT
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
+from designer.model.matrices import Matrices
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
 from designer.model.response_table import Response, ResponseTable
 from designer.model.search_table import SearchSpec
 from designer.model.spread_table import SpreadSpec
-from designer.model.template import TEXT
 from designer.model.tuning_bands import Bands
 from tests.shared.model_text import dimensionless
 
@@ -636,6 +637,7 @@ def test_the_docs_name_every_key_of_an_element() -> None:
     kinds: dict[str, type[FileTable]] = {
         "mass": Mass, "spring": Spring, "damper": Damper, "clearance": Gap, "force": Force,
         "base": BaseTable, "law": Law, "cubic_spring": CubicSpring, "friction": Friction,
+        "matrices": Matrices,
     }  # fmt: skip
     assert found.keys() == kinds.keys()
     for table, kind in kinds.items():

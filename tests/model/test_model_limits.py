@@ -135,7 +135,7 @@ def _element(table: str) -> type[FileTable]:
         ('[[coulomb]]\nbetween = ["hammer", "ground"]\nforce = 1', "friction"),
         ('[[nonlinear_spring]]\nname = "x"', "a spring that is not linear"),
         ("[[duffing]]\nk3 = 1", "a spring that is not linear"),
-        ("[matrices]\nmass = [[1.0]]", "matrices"),
+        ("[stiffness_matrix]\nrows = [[1.0]]", "matrices"),
         ("[gravity]\ng = 9.81", "a weight"),
         ("[initial]\nx = 1", "initial conditions"),
         ("[[delay]]\ntime = 1", "a delay"),

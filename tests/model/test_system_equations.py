@@ -69,7 +69,7 @@ def accelerations(model: LumpedSystem, x: list[float], v: list[float], omega: fl
         if name.endswith("(u)"):
             code = compile(as_python(spring), name, "eval")
             coefficient = float(damper.split()[0]) if damper else 0.0
-            turned = -1.0 if model.gaps[0].between[0] == "ground" else 1.0
+            turned = -1.0 if (model.gaps[0].between or "")[0] == "ground" else 1.0
 
             def force(u: float, code=code, c=coefficient, w=turned * v[0]) -> float:  # type: ignore[no-untyped-def]
                 push = float(eval(code, {**known, "u": u}))

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from designer.base import figure_style
+from designer.jobs.template import TEXT
 from designer.model.ascii_sketch import sketch
 from designer.model.clearance import Sides
 from designer.model.equations import (
@@ -20,7 +21,6 @@ from designer.model.equations import (
     mechanical_equations,
 )
 from designer.model.model import Dimensionless, Mechanical
-from designer.model.template import TEXT
 from designer.plots.model_drawing import model_drawing
 from tests.shared.figure_text import clipped, overlapping
 

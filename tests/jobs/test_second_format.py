@@ -10,11 +10,11 @@ from hypothesis import given, strategies as st
 
 from designer.base.errors import InputError
 from designer.cli import entry
+from designer.jobs.second_format import second_format
+from designer.jobs.template import SECOND, TEXT
 from designer.model.driven import model_flow
 from designer.model.model import Mechanical
 from designer.model.model_file import parse_model_file, read_model_file
-from designer.model.second_format import second_format
-from designer.model.template import SECOND, TEXT
 from designer.verbs.new import new
 from tests.shared.model_text import PAPER_TABLE, dimensionless
 

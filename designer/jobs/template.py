@@ -9,9 +9,9 @@ from typing import Literal
 from designer.base import atomic_write
 from designer.base.errors import InputError
 from designer.base.plain_json import dumps
+from designer.jobs.second_format import second_format
 from designer.model.ascii_sketch import sketch
 from designer.model.model_file import json_schema, read_model_file
-from designer.model.second_format import second_format
 
 _SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
 

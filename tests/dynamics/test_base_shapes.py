@@ -1,0 +1,142 @@
+"""Bases that move by another phase or shape, against closed forms and another integrator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import OrbitStatus
+from designer.fidelity.system_runge_kutta import rates_of
+from designer.model.absolute_motion import absolute_extremes
+from designer.model.circuit_table import CircuitSpec
+from designer.model.driven import model_flow
+from designer.model.model_file import parse_model_file
+from designer.model.relative_motion import companion_motions, ground_of
+from designer.model.system_equations import equations_of
+from designer.synthesis.part_checks import check_system
+
+BLOCK = """
+format = 2
+[[mass]]
+name = "a"
+mass = 2.0
+[[spring]]
+between = ["a", "ground"]
+stiffness = 3.0
+[[damper]]
+between = ["a", "ground"]
+damping = 0.4
+"""
+STOP = """
+[[clearance]]
+name = "S"
+between = ["a", "ground"]
+upper = 0.3
+stiffness = 20.0
+"""
+OMEGA = 0.8
+SHAPES = {
+    "a phase": ('phase = "70 deg"', [(1, 0.3, math.radians(70.0))]),
+    "harmonics": (
+        'harmonics = [[2, 0.1, "30 deg"], [3, "0.05 m", 0.0]]',
+        [(1, 0.3, 0.0), (2, 0.1, math.radians(30.0)), (3, 0.05, 0.0)],
+    ),
+    "a waveform": (
+        'waveform = "triangle"\nterms = 2\nphase = 0.4',
+        [(1, 0.3 * 8 / math.pi**2, 0.4), (3, -0.3 * 8 / (9 * math.pi**2), 1.2)],
+    ),
+}
+
+
+def base(keys: str, amplitude: str = "0.3") -> str:
+    return f"[base]\namplitude = {amplitude}\n{keys}\n"
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("stop", ["", STOP])
+def test_the_absolute_motion_is_another_integrators(shape: str, stop: str) -> None:
+    """m x″ + c (x − y)′ + k (x − y) + stop(x − y) = 0 in absolute x, with y as the file says."""
+    keys, waves = SHAPES[shape]
+    model = parse_model_file(BLOCK + stop + base(keys)).model
+    flow = model_flow(model, OMEGA)
+    orbit = settle(flow, np.zeros(2))
+    assert orbit.status is OrbitStatus.PERIODIC
+
+    def ground(t: Array) -> tuple[Array, Array]:
+        y = sum(size * np.sin(n * OMEGA * t + turn) for n, size, turn in waves)
+        rate = sum(n * OMEGA * size * np.cos(n * OMEGA * t + turn) for n, size, turn in waves)
+        return np.asarray(y), np.asarray(rate)
+
+    def rates(t: float, state: Array) -> Array:
+        y, rate = ground(np.array(t))
+        z, w = state[0] - y, state[1] - rate
+        push = 20.0 * max(float(z) - 0.3, 0.0) if stop else 0.0
+        return np.array([state[1], -(0.4 * w + 3.0 * z + push) / 2.0])
+
+    span = orbit.n * 2.0 * math.pi / OMEGA
+    times = np.linspace(0.0, span, 4001)
+    y, rate = ground(times)
+    start = orbit.start + np.array([y[0], rate[0]])
+    kept = solve_ivp(rates, (0.0, span), start, "DOP853", times, rtol=1e-11, atol=1e-13)
+    assert kept.y[:, -1] == pytest.approx(start, abs=1e-8)
+    absolute = absolute_extremes(flow, orbit, ground_of(model, OMEGA))
+    seen = np.column_stack([kept.y.min(axis=1), kept.y.max(axis=1)])
+    assert absolute[0] == pytest.approx(seen[0], abs=1e-5)
+    if stop:
+        states = flow.run(orbit.start, orbit.n, mode=orbit.mode, points=64).strobes
+        (companion,) = companion_motions(model.second_order())
+        at = np.linspace(0.0, span, len(states))
+        shown = companion.of(at, states, OMEGA)
+        assert shown[:, 0] == pytest.approx(np.interp(at, times, kept.y[0]), abs=1e-4)
+        assert shown[:, 1] == pytest.approx(np.interp(at, times, kept.y[1]), abs=1e-4)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_an_acceleration_is_a_force_of_that_shape(shape: str) -> None:
+    """Where accelerations are given, M A sin(nωt + φ) on the mass is the same system."""
+    keys, waves = SHAPES[shape]
+    keys = keys.replace("0.05 m", "0.05 m/s²")
+    moved = parse_model_file(BLOCK + STOP + base(keys, '"0.3 m/s²"')).model
+    first = next(wave for wave in waves if wave[0] == 1)
+    more = [[n, 2.0 * size, turn] for n, size, turn in waves if n > 1]
+    force = f'[[force]]\non = "a"\namplitude = {2.0 * first[1]}\nphase = {first[2]}\n'
+    force += f"harmonics = {more}\n" if more else ""
+    pushed = parse_model_file(BLOCK + STOP + force).model
+    one, two = (settle(model_flow(model, OMEGA), np.zeros(2)) for model in (moved, pushed))
+    assert one.response == two.response
+    assert one.start == pytest.approx(two.start, abs=1e-9)
+    numbers = [rates_of(model.second_order(), OMEGA) for model in (moved, pushed)]
+    assert pytest.approx(numbers[1].S, abs=1e-12) == numbers[0].S
+    assert pytest.approx(numbers[1].C, abs=1e-12) == numbers[0].C
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        (base('harmonics = [[2, "0.1 g", 0.0]]'), "base.harmonics"),
+        (base("harmonics = [[1, 0.1, 0.0]]"), "base.harmonics"),
+        (base('waveform = "square"'), "base.terms"),
+        (base("terms = 3"), "base.waveform"),
+        (base('phase = 0.1\nstops = "fixed"'), "base.stops"),
+        (base('phase = "0.1 m"'), "base.phase"),
+    ],
+)
+def test_what_is_no_shape_is_refused(text: str, field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_model_file(BLOCK + STOP + text)
+    assert caught.value.field == field
+
+
+def test_it_is_told_in_equations_and_refused_by_circuits() -> None:
+    model = parse_model_file(BLOCK + STOP + base(SHAPES["harmonics"][0])).model
+    line = equations_of(model)[-1]  # type: ignore[arg-type]
+    assert line == "y = Y sin ωt + Y.2 sin(2ωt + φ.2) + Y.3 sin 3ωt"
+    with pytest.raises(InputError) as caught:
+        check_system(model, CircuitSpec(dead_zone="rectifier"))
+    assert caught.value.field == "force"
