@@ -34,6 +34,7 @@ from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Crossing, Limit, Prediction
+from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 
@@ -46,7 +47,8 @@ _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
         Axis, BlamedPart, Blame, Corner, Crossing, EquationCheck, EquationFinding, GateResult,
-        Index, Limit, NearLimit, Orbit, Prediction, Read, ResponseBlame, SolverSettings, YieldMap,
+        Index, Limit, LossRegion, NearLimit, Orbit, Prediction, RareLosses, Read, ResponseBlame,
+        SolverSettings, ToleranceMargin, YieldMap,
     )
 }  # fmt: skip
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}

@@ -86,6 +86,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
+        **({"rare": _rare(study, index)} if study.rare else {}),
         "trust": {
             **{engine: trust.verdict() for engine, trust in checked.trust.items()},
             "yield": None
@@ -170,6 +171,14 @@ def _blame(study: Study, index: int) -> dict[str, Any] | None:
         return None
     blame: dict[str, Any] = study.blame.as_dict()["responses"][study.response_indices.index(index)]
     return blame
+
+
+def _rare(study: Study, index: int) -> dict[str, Any] | None:
+    """Without what it cost, which stands with the other costs."""
+    found = study.rare_of(index)
+    if found is None:
+        return None
+    return {k: v for k, v in found.as_dict().items() if k not in ("question", "seconds")}
 
 
 def _map(yields: YieldMap) -> dict[str, Any]:

@@ -95,6 +95,11 @@ class FolderStores(Stores):
     def maps(self, plan: StudyPlan) -> StoredParts:
         return self._pieces_of(study_hash(plan, "maps"))
 
+    def rare(self, plan: StudyPlan) -> StoredParts:
+        if self._cache is None:
+            return StoredParts()
+        return _FolderPieces(self._cache, study_hash(plan, "rare"), self._guard)
+
     def _pieces_of(self, key: str) -> StoredParts:
         if self._pieces is None:
             return StoredParts()

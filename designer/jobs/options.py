@@ -42,6 +42,8 @@ class Options:
     """Whether the model file has a trimmer fitted, whose layer every study has."""
     map_: tuple[Over, ...] = ()
     """Yield maps that are asked for."""
+    rare: bool = False
+    """Whether boards are drawn where they are lost."""
     cluster: str | None = None
     """Address of a Dask scheduler, or None."""
     blame: bool = True

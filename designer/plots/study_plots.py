@@ -28,6 +28,7 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.law_curves import LawCurve
 from designer.verdicts.verdict import Answer, Verdict
 from designer.workbench.prediction import PredictedStop
+from designer.yields.rare_losses import RareLosses
 from designer.yields.yield_count import Yield
 
 VERDICTS = {
@@ -111,6 +112,43 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
     right.set_xlabel("share of the samples [%]; counts inside")
     verdicts = {v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)}
     _verdict_key(figure, verdicts, dict.fromkeys(Verdict, "s"), 7)
+    return figure
+
+
+FEWEST_SHOWN = 1e-4
+"""Boards of a million: fewer stand at the axis's end."""
+
+
+@styled
+def rare_chart(rows: Sequence[tuple[str, RareLosses]]) -> Figure:
+    """Boards of a million that lose each response, with the 95 % interval, on a logarithmic axis; a
+    tick where a region that no search met would end."""
+    figure = new_figure(7.4, 0.31 * max(len(rows), 1) + 1.15)
+    axes = figure.subplots()
+    every = [v for _, r in rows for v in (*r.per_million, 1e6 * r.unseen)]
+    shown = [max(v, FEWEST_SHOWN) for v in every if v > 0.0]
+    low = 10.0 ** np.floor(np.log10(min(shown, default=1.0)))
+    high = 10.0 ** np.ceil(np.log10(max(shown, default=1.0)) + 0.05)
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    name_rows(axes, [label for label, _ in rows])
+    for i, (_, found) in enumerate(rows):
+        estimate, first, last = (max(v, low) for v in found.per_million)
+        axes.plot([1e6 * found.unseen], [i], "|", color=MUTED, ms=11, mew=1.2)
+        if not found.drawn_lost or found.per_million[0] < low:
+            few = "none was lost" if not found.drawn_lost else f"{found.per_million[0]:.1g}"
+            axes.text(low * 1.15, i, few, va="center", color=MUTED, size=8)
+            continue
+        axes.plot([first, last], [i, i], color=VERDICTS[Verdict.LOST], lw=2.0)
+        axes.plot([estimate], [i], MARKERS[Verdict.LOST], color=VERDICTS[Verdict.LOST], ms=6)
+    axes.set_xlabel("boards of a million that lose it, with the 95 % interval")
+    handles = [
+        Line2D([], [], color=VERDICTS[Verdict.LOST], marker=MARKERS[Verdict.LOST], lw=2.0,
+               label="lost"),
+        Line2D([], [], color=MUTED, marker="|", ms=11, mew=1.2, lw=0.0,
+               label="what an unseen region may hold"),
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside upper right", ncols=2)
     return figure
 
 

@@ -100,6 +100,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         _yields(data, pictures),
         _boards(data, pictures),
         _blame(data, pictures),
+        _rare(data, pictures),
         PageSection(
             "Where to sit",
             [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
@@ -273,6 +274,33 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
     blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
     blocks.append(_one("How to reach a response", tolerance_tables.recipes(data)))
     return PageSection("Yields", blocks, "yields")
+
+
+def _rare(data: ReportData, pictures: Pictures) -> PageSection:
+    if not data.study.rare:
+        return PageSection("", [])
+    note = SmallPrint(
+        "Boards are drawn where they are lost, and each counts by how likely it is (importance "
+        "sampling). The laws of the parts are bounded, so no board outlies its tolerances. What no "
+        "search met is not counted; plain boards, none of which was lost elsewhere, bound it."
+    )
+    wider = SmallPrint(
+        "Where one part alone is moved, all others are as they should be. Below 1 it is lost "
+        "within its tolerance."
+    )
+    return PageSection(
+        "Boards of a million",
+        [
+            note,
+            pictures.get("rare"),
+            tolerance_tables.rare(data),
+            _one("Where boards are lost", tolerance_tables.loss_regions(data)),
+            PageSection(
+                "How far tolerances may widen", [wider, tolerance_tables.tolerance_margins(data)]
+            ),
+        ],
+        "rare",
+    )
 
 
 def _boards(data: ReportData, pictures: Pictures) -> PageSection:

@@ -221,6 +221,10 @@ def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
         shows = "Largest multiplier and nearest grazing of every board, by response."
         svg = element(study_plots.margin_chart(labels, rows), shows)
         out["margins"] = Picture(caption=MARGINS, svg=svg, plot="margins")
+    if data.study.rare:
+        rare = [(labels[data.study.response_indices[r.question]], r) for r in data.study.rare]
+        shows = "Boards of a million that lose each response, as in the table."
+        out["rare"] = Picture(svg=element(study_plots.rare_chart(rare), shows))
     blames = [data.blame_of(i) for i in responses]
     if any(b is not None and b.subjects for b in blames):
         shows = (

@@ -18,6 +18,7 @@ from designer.report.response_tables import STARTED
 from designer.verdicts.verdict import BoardRow
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
+from designer.yields.rare_losses import WIDEST, LossRegion, RareLosses, ToleranceMargin
 from designer.yields.two_engine_yield import Combined
 from designer.yields.worst_corner import Corner
 from designer.yields.yield_count import Yield, count
@@ -196,6 +197,59 @@ def corners(data: ReportData) -> Table | None:
         "corners survived": lambda row: f"{row[1].survived} of {row[1].corners}",
     }
     return table_of(rows, columns, ("corners survived",))
+
+
+def rare(data: ReportData) -> Table | None:
+    """How many of a million boards lose each response, and what the estimate stands on."""
+    columns: dict[str, Callable[[RareLosses], str]] = {
+        "response": lambda r: _asked(data, r),
+        "lost of a million": lambda r: _millions(r.lost) if r.drawn_lost else "0",
+        "95 %": lambda r: f"{_millions(r.low)} to {_millions(r.high)}",
+        "boards asked": lambda r: f"{r.boards} and {r.pilots} before",
+        "of these lost": lambda r: str(r.drawn_lost),
+        "effective number": lambda r: f"{r.effective:.0f}",
+        "plain boards for as much": lambda r: (
+            words.NONE if math.isnan(r.gain) else f"{r.gain:.3g} times as many"
+        ),
+        "may be unseen": lambda r: f"up to {_millions(r.unseen)}",
+    }
+    return table_of(data.study.rare, columns, ("of these lost", "effective number"))
+
+
+def loss_regions(data: ReportData) -> Table | None:
+    """Where in the spread boards lose a response."""
+    rows = [(r, region) for r in data.study.rare for region in r.regions]
+    columns: dict[str, Callable[[tuple[RareLosses, LossRegion]], str]] = {
+        "response": lambda row: _asked(data, row[0]),
+        "found by": lambda row: row[1].found_by,
+        "becomes": lambda row: row[1].becomes,
+        "of the losses": lambda row: f"{100 * row[1].share:.2g} %",
+        "parts that lead there": lambda row: ", ".join(row[1].parts) or words.NONE,
+    }
+    return table_of(rows, columns)
+
+
+def tolerance_margins(data: ReportData) -> Table | None:
+    """By how much tolerances would have to widen until the first loss."""
+    rows = [(r, margin) for r in data.study.rare for margin in r.margins]
+    columns: dict[str, Callable[[tuple[RareLosses, ToleranceMargin]], str]] = {
+        "response": lambda row: _asked(data, row[0]),
+        "moved": lambda row: row[1].part or "all parts, to their worse ends",
+        "lost first at": lambda row: (
+            f"not up to {WIDEST:g} times its tolerance"
+            if row[1].widening is None
+            else f"{row[1].widening:.3g} times the tolerance"
+        ),
+    }
+    return table_of(rows, columns)
+
+
+def _asked(data: ReportData, found: RareLosses) -> str:
+    return words.name(data.checked[data.study.response_indices[found.question]])
+
+
+def _millions(share: float) -> str:
+    return f"{1e6 * share:.3g}"
 
 
 def maps(data: ReportData) -> Table | None:

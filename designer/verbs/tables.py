@@ -28,6 +28,7 @@ def design_written(
     printed. tables : shows it. after : what may be done next."""
     if outcome.shown:
         blame_status(answer)
+        _rare(answer.get("responses", ()))
     else:
         tables(answer)
     if outcome.folder is not None:
@@ -142,6 +143,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         say(f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
     _further(answer)
+    _rare(rows)
 
 
 def _counts(row: Mapping[str, Any]) -> dict[str, str]:
@@ -195,6 +197,38 @@ def _further(answer: Mapping[str, Any]) -> None:
         ),
         gap=1,
     )
+    _joint(answer)
+
+
+def _rare(rows: Sequence[Mapping[str, Any]]) -> None:
+    """How many of a million boards are lost, where that was asked for."""
+    asked = [r for r in rows if r.get("rare")]
+    if not asked:
+        return
+
+    def cells(row: Mapping[str, Any]) -> dict[str, str]:
+        found = row["rare"]
+        estimate, low, high = found["per_million"]
+        regions = [f"{g['becomes']} ({g['found_by']}) {100 * g['share']:.2g} %" for g in
+                   found["regions"]]  # fmt: skip
+        wide = next((m["widening"] for m in found["margins"] if not m["part"]), None)
+        return {
+            "lost of a million": f"{estimate:.3g}" if found["drawn_lost"] else "0",
+            "95 %": f"{low:.3g} to {high:.3g}",
+            "boards asked": str(found["boards"] + found["pilots"]),
+            "regions": "; ".join(regions[:2]) or ("none found" if found["pilots"] else "-"),
+            "first loss at": "-" if wide is None else f"{wide:.2g} × the tolerances",
+        }
+
+    table("Rare losses", ({**response_cells(r, rows), **cells(r)} for r in asked), gap=1)
+    unseen = max(r["rare"]["unseen"] for r in asked)
+    say(
+        f"A region of losses that no search met may hold up to {1e6 * unseen:.3g} of a million more"
+    )
+
+
+def _joint(answer: Mapping[str, Any]) -> None:
+    """Boards that show every response."""
     joint = answer.get("all_on_one_board") or {}
     counts = [
         f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"

@@ -72,6 +72,9 @@ def tolerance(
     reached: Annotated[
         bool, option("--reached", None, "Also from power-up, by the start recipe.")
     ] = False,
+    rare: Annotated[
+        bool, option("--rare", None, "Also how many of a million are lost, drawn where they are.")
+    ] = False,
     map_: Annotated[
         Sequence[Over],
         option(
@@ -122,6 +125,7 @@ def tolerance(
         resume=resume,
         tuned=tuned,
         reached=reached,
+        rare=rare,
         map_=tuple(dict.fromkeys(map_)),
         cluster=cluster,
         **stated_options(words),
@@ -130,7 +134,8 @@ def tolerance(
         return design_and_study(model, out, options, words, VERB.command, progress, shown)
     options.check()
     for name, value in (
-        ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_))
+        ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_)),
+        ("--rare", rare or None),
     ):  # fmt: skip
         if value not in (None, ""):
             expected = "no such option with --measured, whose boards are the samples"

@@ -23,6 +23,7 @@ from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
 from designer.yields import two_engine_yield
 from designer.yields.blame_analysis import Blame, BlameStatus
 from designer.yields.power_up import PowerUp
+from designer.yields.rare_losses import RareLosses
 from designer.yields.row_store import Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
@@ -105,6 +106,8 @@ class Study:
     """The blame by question; None where none was asked for."""
     maps: tuple[YieldMap, ...] = ()
     """Yield maps of questions; empty where none were asked for."""
+    rare: tuple[RareLosses, ...] = ()
+    """Estimates by boards that are drawn where they are lost; empty where none were asked for."""
     blame_wanted: bool = True
     """Whether a blame was asked for."""
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
@@ -178,6 +181,10 @@ class Study:
             else None
             for i in range(len(self.checked))
         )
+
+    def rare_of(self, index: int) -> RareLosses | None:
+        """The estimate for response number ``index``, if there is one."""
+        return next((r for r in self.rare if self.response_indices[r.question] == index), None)
 
     @property
     def blame_status(self) -> BlameStatus:

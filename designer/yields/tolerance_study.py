@@ -38,6 +38,7 @@ from designer.yields.blame_analysis import Blame, blame
 from designer.yields.blame_replay import BUDGET, extent_of
 from designer.yields.layers import LayerName, Runner, Task
 from designer.yields.power_up import power_up_block
+from designer.yields.rare_losses import counted_losses, rare_losses
 from designer.yields.row_store import BlockStore
 from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe_search import find_recipes
@@ -117,6 +118,10 @@ class Stores:
         """Where the finished yield maps are."""
         return StoredParts()
 
+    def rare(self, plan: StudyPlan) -> StoredParts:
+        """Where the finished estimates of rare losses are."""
+        return StoredParts()
+
 
 def check(
     synthesis: Synthesis,
@@ -145,6 +150,7 @@ def tolerance(
     blamed: bool = True,
     blame_budget: int = BUDGET,
     maps: Sequence[Over] = (),
+    rare: bool = False,
     seed: int = SEED,
     jobs: int | None = None,
     pool: SpicePool | None = None,
@@ -162,7 +168,8 @@ def tolerance(
     says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice`` about every board. tuned,
     reached, blamed : whether these are wanted; a fitted trimmer is always asked for. blame_budget :
     steps of the blame (``blame_replay``). maps : settings over which the yield is wanted
-    (``yield_maps.OVERS``). checked : of the same design, to save the time of the gate. pool : where
+    (``yield_maps.OVERS``). rare : whether boards are drawn where they are lost (``rare_losses``).
+    checked : of the same design, to save the time of the gate. pool : where
     ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
     to. runner : who computes blocks; this process if None. sampled : is given the study once the
     exact circuit has every board, before ngspice is asked. standing : is given the study once its
@@ -179,6 +186,9 @@ def tolerance(
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     indices = tuple(i for i in range(len(checked)) if i not in left_out)
+    if rare and synthesis.modelfile.measured is not None and synthesis.modelfile.measured.labels:
+        expected = "no list of measured boards, which are as many as there are"
+        raise InputError(None, "--rare", "spread.measured", expected)
     plan = plan_study(
         synthesis.modelfile,
         synthesis.design,
@@ -229,11 +239,13 @@ def tolerance(
     laps.end("further_layers")
     if blamed:
         study = replace(study, blame=work.stores.blame(study.plan, blame_budget))
-    if standing is not None and (maps or (blamed and study.blame is None)):
+    if standing is not None and (maps or rare or (blamed and study.blame is None)):
         standing(study)
         laps.end("first_report")
     if blamed and study.blame is None:
         study = work.blamed(study)
+    if rare:
+        study = work.drawn_where_lost(study)
     return work.mapped(study, maps) if maps else study
 
 
@@ -373,6 +385,22 @@ class StudyWork:
         )
         self.stores.put_blame(plan, result)
         return replace(study, blame=result)
+
+    def drawn_where_lost(self, study: Study) -> Study:
+        """With an estimate of each response's losses by boards that are drawn where they are."""
+        found, parts = [], self.stores.rare(study.plan)
+        for number, index in enumerate(study.response_indices):
+            name = f"rare {number}"
+            result = parts.get(name)
+            counted = study.yields[index]
+            if result is None and counted is not None:
+                result = counted_losses(number, counted)
+            if result is None:
+                step = self.progress.stage(f"boards where they are lost, response {index + 1}")
+                result = rare_losses(study.plan, number, jobs=self.jobs, progress=step)
+                parts.put({name: replace(result, seconds=0.0)})
+            found.append(result)
+        return replace(study, rare=tuple(found))
 
     def mapped(self, study: Study, overs: Sequence[Over]) -> Study:
         """With a yield map of each response over each of these settings."""

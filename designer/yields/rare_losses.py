@@ -1,0 +1,616 @@
+"""How many boards of a million lose a response: importance sampling of the parts.
+
+Where losses are rare, plain boards hardly show any. Here boards are drawn where they are lost
+(``tilted_cube``), and each counts by how likely it is. Where that is, is found in three ways: the
+linear limits of the nominal board (``margins``), boards whose parts are off by more than they may
+be, and the lost boards of pilot rounds, to whose means the tilts are moved (the cross-entropy
+method: R. Y. Rubinstein, D. P. Kroese, 2004). What no round meets is not counted: the answer says
+how much that can be, which plain boards bound.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from designer.base.arrays import Array, Index, Mask
+from designer.base.plain_json import plain
+from designer.base.progress import doing
+from designer.base.proportion import wilson
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.spread.board_quantities import between
+from designer.spread.spread import BOARD, part_of
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Question, StudyPlan, Verdict
+from designer.yields.margins import nominal_limits
+from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
+from designer.yields.worst_corner import LAST
+from designer.yields.yield_count import Yield
+
+MOST_BOARDS = 40_000
+"""Boards that the estimate may take, pilot rounds left out."""
+LEAST_BOARDS = 1_500
+"""Boards that it takes at least."""
+BLOCK = 500
+"""Boards at a time."""
+TARGET = 0.3
+"""Half-width of the interval over the estimate at which it ends."""
+PLAIN = 0.1
+"""Share of plain boards in the mixture; no weight is above 1 over it."""
+PILOTS, PILOT = 3, 600
+"""Rounds in which the tilts are moved, and boards of each."""
+ENOUGH = 50.0
+"""Effective number of lost boards, at least, of an estimate that ends before its most boards."""
+FEWEST = 6
+"""Lost boards of one kind that move a tilt."""
+CLEAR = 1.5
+"""Standard errors by which a coordinate's mean has to be off to move its tilt at all."""
+WIDE = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
+"""By how much more than they may be the parts of boards are off that look for further regions."""
+OFTEN = 0.05
+"""Share of lost boards at which they are wide enough."""
+NARROWED = 0.8
+"""Width of the next boards over that before, on the way back to what parts may be."""
+EXPLORED, STEP_BACK = 512, 400
+"""Boards of a width, and of a step on the way back."""
+MOST_REGIONS = 8
+"""Components of the mixture beside the plain one."""
+SHOWN_PARTS = 5
+"""Parts of a region that are named."""
+WIDEST = 10.0
+"""By how much tolerances are widened at most, to see where the first board is lost."""
+STEPS = 16
+"""Widths that are looked at, twice: over the whole range, then between two of them."""
+SINGLE = 8
+"""Parts that are moved alone."""
+PLENTY = 40
+"""Lost boards of a study: with so many its own count is as good, and nothing is drawn."""
+APART = 1.4
+"""Spread of lost boards along one way over the most that chance makes, above which they are two."""
+TAG = 0xAA5E
+"""Sets these boards apart from those of a study with the same seed."""
+QUANTILE = 1.959964
+"""Of the normal distribution, for 95 %, two-sided."""
+PATH = (0.3, 0.5, 0.65, 0.8, 0.9, 1.0, 1.15, 1.35, 1.7, 2.2, 3.0)
+"""Of the tilt that a linear limit foretells: where on its way the loss is looked for."""
+
+
+@dataclass(frozen=True)
+class LossRegion:
+    """A part of the spread in which boards lose the response."""
+
+    found_by: str
+    """What led there: a limit of the nominal board in words, wider boards, or lost ones."""
+    becomes: str
+    """What most of its lost boards show instead."""
+    share: float
+    """Of all losses, those that are most likely of this region."""
+    boards: int
+    """Lost boards of it that were drawn."""
+    parts: tuple[str, ...]
+    """Parts that lead there most, each with the end that does: "R203 high"."""
+
+
+@dataclass(frozen=True)
+class ToleranceMargin:
+    """How far parts may be off before the response is lost."""
+
+    part: str
+    """The part that is moved alone, to its worse end; "" for all parts of a region at theirs."""
+    widening: float | None
+    """The tolerance at which it is lost first, over its own; below 1 it is lost within it. None: up
+    to ``WIDEST`` it is not."""
+
+
+@dataclass(frozen=True)
+class RareLosses:
+    """How many boards lose one response."""
+
+    question: int
+    """Number of the question of the plan."""
+    lost: float
+    """Estimated share of the boards with an answer that lose it."""
+    low: float
+    """Lower end of the 95 % interval."""
+    high: float
+    """Upper end; where no board was lost, what the plain boards leave possible."""
+    unanswered: float
+    """Estimated share of boards without an answer, which count nowhere else."""
+    boards: int
+    """Boards of the estimate."""
+    pilots: int
+    """Boards that looked for the regions."""
+    drawn_lost: int
+    """Boards of the estimate that were lost."""
+    effective: float
+    """Effective number of lost boards: the square of their weights' sum over the sum of squares."""
+    largest_weight: float
+    """Of a lost board, over the mean weight of 1."""
+    gain: float
+    """Plain boards that the same interval would take, over those drawn, pilots included; nan
+    without a loss."""
+    unseen: float
+    """A region that no search met may hold this share at most: 95 % of what the plain boards
+    leave, among which none was lost outside the regions."""
+    narrow: bool
+    """Whether the interval is as narrow as was aimed at."""
+    regions: tuple[LossRegion, ...]
+    """The regions, the largest share first."""
+    margins: tuple[ToleranceMargin, ...]
+    """The worst corner of all regions, then single parts, the nearest to a loss first."""
+    seconds: float
+    """Wall time [s]."""
+
+    @property
+    def per_million(self) -> tuple[float, float, float]:
+        """Boards of a million that lose it: the estimate, and the ends of its interval."""
+        return 1e6 * self.lost, 1e6 * self.low, 1e6 * self.high
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; an undefined number is None."""
+        document: dict[str, Any] = plain({**asdict(self), "per_million": self.per_million})
+        return document
+
+
+@dataclass(frozen=True)
+class _Region:
+    """A component of the mixture, and what led to it."""
+
+    tilt: Array
+    found_by: str
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Boards that were asked. points : (N, coordinates). responses : of each what it shows."""
+
+    points: Array
+    component: Index
+    lost: Mask
+    unanswered: Mask
+    responses: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """What draws boards of one question and asks them."""
+
+    plan: StudyPlan
+    question: Question
+    jobs: int
+    progress: Callable[[], None]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.plan.spread.coordinates(self.plan.circuit)
+
+    def boards(self, points: Array) -> Boards:
+        return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
+
+    def asked(self, boards: Boards) -> list[tuple[Verdict, str]]:
+        """The verdict of each board and what it shows."""
+        q = self.question
+        out: list[tuple[Verdict, str]] = []
+        for first in range(0, len(boards), BLOCK):
+            some = range(first, min(first + BLOCK, len(boards)))
+            ensemble = Ensemble(boards.take(np.array(some)), jobs=self.jobs)
+            cases: list[Case] = [(i, q, q.excitation, q.start.start) for i in range(len(some))]
+            rows = settled(ensemble, cases, self.jobs, self.progress)
+            out += [(verdict, orbit.response) for orbit, verdict, _ in rows]
+        return out
+
+    def sample(self, points: Array, component: Index, wide: float = 1.0) -> _Sample:
+        """These boards asked; wide : by how much more off than they may be."""
+        boards = self.boards(points)
+        if wide != 1.0:
+            boards = between(boards, np.full(len(points), wide))
+        verdicts = self.asked(boards)
+        failed = np.array([v is Verdict.FAILED for v, _ in verdicts], dtype=bool)
+        fine = np.array([v is Verdict.OK for v, _ in verdicts], dtype=bool)
+        responses = tuple(response for _, response in verdicts)
+        return _Sample(points, component, ~fine & ~failed, failed, responses)
+
+
+def rare_losses(
+    plan: StudyPlan,
+    number: int,
+    *,
+    most: int = MOST_BOARDS,
+    target: float = TARGET,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> RareLosses:
+    """How many boards lose question ``number`` of a plan, on the exact circuit.
+
+    most : boards that the estimate may take. target : half-width of the 95 % interval over the
+    estimate at which it ends. progress : called once a board that was asked.
+
+    Raises
+    ------
+    ValueError : the boards are those of a list, which are as many as there are.
+    """
+    if plan.census or plan.labels:
+        raise ValueError("measured boards are counted, not drawn")
+    began = time.perf_counter()
+    question = plan.questions[number]
+    drawing = _Drawing(plan, question, jobs, progress)
+    stream = crc32(question.stream.encode("utf-8"))
+    rng = np.random.default_rng([plan.seed, stream, TAG])
+    doing("regions of loss")
+    regions, pilots, clear = _regions(drawing, rng)
+    cube = TiltedCube.of([r.tilt for r in regions], PLAIN, len(drawing.names))
+    samples: list[_Sample] = []
+    while True:
+        samples.append(drawing.sample(*cube.drawn(BLOCK, rng)))
+        result = _estimate(cube, samples)
+        count = sum(len(s.points) for s in samples)
+        doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
+        narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
+        narrow = narrow and result.effective >= ENOUGH
+        if count >= most or (narrow and count >= LEAST_BOARDS):
+            break
+    spent = pilots + count
+    plain_boards = clear + sum(int((s.component == 0).sum()) for s in samples)
+    outside = -math.log(0.05) / max(plain_boards, 1)
+    low, high = _interval(result.mean, result.error, outside)
+    gain = math.nan
+    if result.mean > 0.0 and result.error > 0.0:
+        gain = result.mean * (1.0 - result.mean) / result.error**2 / spent
+    return RareLosses(
+        question=number,
+        lost=result.mean,
+        low=low,
+        high=high,
+        unanswered=result.unanswered,
+        boards=count,
+        pilots=pilots,
+        drawn_lost=result.drawn_lost,
+        effective=result.effective,
+        largest_weight=result.largest,
+        gain=gain,
+        unseen=outside,
+        narrow=narrow,
+        regions=tuple(_named(drawing, cube, regions, samples)),
+        margins=tuple(_margins(drawing, regions)),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def counted_losses(number: int, counted: Yield) -> RareLosses | None:
+    """The same of what a study has counted, where it lost ``PLENTY`` boards; None where fewer."""
+    answered, lost = counted.samples - counted.failed, counted.lost + counted.grazing
+    if lost < PLENTY:
+        return None
+    low, high = wilson(lost, answered)
+    return RareLosses(
+        question=number,
+        lost=lost / answered,
+        low=low,
+        high=high,
+        unanswered=counted.failed / counted.samples,
+        boards=counted.samples,
+        pilots=0,
+        drawn_lost=lost,
+        effective=float(lost),
+        largest_weight=1.0,
+        gain=1.0,
+        unseen=0.0,
+        narrow=True,
+        regions=(),
+        margins=(),
+        seconds=0.0,
+    )
+
+
+def _interval(mean: float, error: float, outside: float) -> tuple[float, float]:
+    """95 % of an estimate: even in its logarithm, which keeps it above 0."""
+    if mean <= 0.0:
+        return 0.0, outside
+    spread = math.exp(QUANTILE * error / mean)
+    return mean / spread, min(mean * spread, 1.0)
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    mean: float
+    error: float
+    unanswered: float
+    drawn_lost: int
+    effective: float
+    largest: float
+
+
+def _estimate(cube: TiltedCube, samples: Sequence[_Sample]) -> _Estimate:
+    """Shares of lost boards and of those without an answer, each board by its weight; the error is
+    that within the components, of which each has as many boards as its share says."""
+    points = np.concatenate([s.points for s in samples])
+    component = np.concatenate([s.component for s in samples])
+    lost = np.concatenate([s.lost for s in samples])
+    failed = np.concatenate([s.unanswered for s in samples])
+    counts = np.bincount(component, minlength=len(cube.shares))
+    drawn = TiltedCube(cube.tilts, counts / counts.sum())
+    weights = drawn.weights(points)
+    hits, total = weights * lost, len(points)
+    variance = 0.0
+    for k, count in enumerate(counts.tolist()):
+        if count > 1:
+            variance += count * float(hits[component == k].var(ddof=1))
+    none = float((weights * failed).sum()) / total
+    answered = max(1.0 - none, 1e-12)
+    squares = float((hits**2).sum())
+    return _Estimate(
+        float(hits.sum()) / total / answered,
+        math.sqrt(variance) / total / answered,
+        none,
+        int(lost.sum()),
+        float(hits.sum()) ** 2 / squares if squares else 0.0,
+        float(hits.max(initial=0.0)),
+    )
+
+
+def _regions(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region], int, int]:
+    """Components of the mixture, the boards that were asked for them, and of those the plain
+    ones."""
+    regions = list(_by_limits(drawing))
+    asked = len(PATH) * len(regions)
+    wide, spent = _by_wider_boards(drawing, rng)
+    regions, asked = [*regions, *wide], asked + spent
+    clear = 0
+    for _ in range(PILOTS):
+        some = regions[:MOST_REGIONS]
+        cube = TiltedCube.of([r.tilt for r in some], 0.3, len(drawing.names))
+        sample = drawing.sample(*cube.drawn(PILOT, rng))
+        asked += len(sample.points)
+        clear += int((sample.component == 0).sum())
+        regions = _moved(some, cube, sample, drawing.names) or some
+    return regions[:MOST_REGIONS], asked, clear
+
+
+def _tiltable(names: Sequence[str]) -> Array:
+    """(coordinates,) 1 where a coordinate may be tilted: which board of a list it is has no
+    order."""
+    return np.array([0.0 if name == BOARD else 1.0 for name in names])
+
+
+def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
+    """From each linear limit of the nominal board the tilt that leads to it, as far as boards at
+    the tilt's means are lost."""
+    plan, question = drawing.plan, drawing.question
+    if not question.periodic:
+        return
+    boards = plan.boards(range(EXPLORED))
+    margin = nominal_limits(plan.circuit, question, boards, jobs=drawing.jobs)
+    if not margin.limits:
+        return
+    size = len(drawing.names)
+    ends = np.full((2 * size, size), 0.5)
+    for k in range(size):
+        ends[2 * k, k], ends[2 * k + 1, k] = 0.25, 0.75
+    each = margin.each(drawing.boards(ends))
+    middle = margin.each(drawing.boards(np.full((1, size), 0.5)))[0]
+    slopes = 2.0 * (each[1::2] - each[0::2]) * _tiltable(drawing.names)[:, None]
+    for j, limit in enumerate(margin.limits):
+        way = -slopes[:, j]
+        if not np.abs(way).max() > 0.0:
+            continue
+        strength = _strength(way, float(middle[j]))
+        tilts = np.clip(np.outer(strength * np.array(PATH), way), -STEEPEST, STEEPEST)
+        verdicts = drawing.asked(drawing.boards(mean_of(tilts)))
+        lost = [k for k, (v, _) in enumerate(verdicts) if v not in (Verdict.OK, Verdict.FAILED)]
+        if lost:
+            yield _Region(tilts[lost[0]], limit.what)
+
+
+def _strength(way: Array, distance: float) -> float:
+    """The tilt along a way at whose mean a limit at this distance is reached; the steepest where
+    none is steep enough."""
+    low, high = 0.0, STEEPEST / float(np.abs(way).max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        moved = float(way @ (mean_of(middle * way) - 0.5))
+        low, high = (middle, high) if moved < distance else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region], int]:
+    """Of boards that are further off than they may be, at the least width at which enough are lost:
+    a tilt for each kind of loss, moved along as the width goes back to what parts may be."""
+    size, asked = len(drawing.names), 0
+    cube = TiltedCube.of([], PLAIN, size)
+    found, kinds = list[_Region](), set[str]()
+    for wide in WIDE:
+        points, component = cube.drawn(EXPLORED, rng)
+        sample = drawing.sample(points, component, wide)
+        asked += len(points)
+        if sample.lost.mean() < OFTEN:
+            continue
+        met = {r for r, lost in zip(sample.responses, sample.lost, strict=True) if lost}
+        last = bool(found)
+        found += [
+            _Region(tilt, f"boards {wide:g} times as far off")
+            for response, tilt in _tilts(sample, np.ones(len(points)), drawing.names)
+            if response not in kinds
+        ]
+        kinds |= met
+        if last:  # a width more, for kinds of loss that the first had too few of
+            break
+    while found and wide > 1.0:
+        wide = max(NARROWED * wide, 1.0)
+        cube = TiltedCube.of([r.tilt for r in found[:MOST_REGIONS]], PLAIN, size)
+        sample = drawing.sample(*cube.drawn(STEP_BACK, rng), wide)
+        asked += len(sample.points)
+        found = _moved(found[:MOST_REGIONS], cube, sample, drawing.names)
+    return found, asked
+
+
+def _tilts(
+    sample: _Sample,
+    weights: Array,
+    names: Sequence[str],
+    before: Array | None = None,
+) -> Iterator[tuple[str, Array]]:
+    """For each kind of loss of enough boards the response that they show, and the tilt whose means
+    are theirs. Of what chance may have made of a mean, beside that with the tilt ``before`` (none
+    where None), less is taken over the more it may (the positive part of W. James, C. Stein, 4th
+    Berkeley Symp. 1961)."""
+    may = _tiltable(names)
+    whole = before is not None
+    before = np.zeros(len(names)) if before is None else before
+    kinds = Counter(r for r, lost in zip(sample.responses, sample.lost, strict=True) if lost)
+    for response, count in kinds.most_common():
+        if count < FEWEST:
+            break
+        here = sample.lost & np.array([r == response for r in sample.responses], dtype=bool)
+        for mine in _sides(sample.points, weights, here) if not whole else (here,):
+            yield from ((response, t) for t in _tilt(sample, weights, mine, may, before))
+
+
+def _sides(points: Array, weights: Array, here: Mask) -> Iterator[Mask]:
+    """Lost boards of one kind in two, where they lie on both sides of the middle: losses by a part
+    that is too large, and by one that is too small, have a mean that says nothing.
+
+    They do where their spread along one way is more than chance makes of so many boards (V. A.
+    Marchenko, L. A. Pastur, 1967), and both sides have enough of them.
+    """
+    off, w = points[here] - 0.5, weights[here] / weights[here].sum()
+    count = 1.0 / (w**2).sum()
+    values, ways = np.linalg.eigh((off.T * w) @ off)
+    edge = (1.0 + math.sqrt(points.shape[1] / count)) ** 2 / 12.0
+    along = (points - 0.5) @ ways[:, -1] > 0.0
+    sides = [here & along, here & ~along]
+    apart = values[-1] > APART * edge and min(int(side.sum()) for side in sides) >= FEWEST
+    yield from sides if apart else [here]
+
+
+def _tilt(
+    sample: _Sample, weights: Array, mine: Mask, may: Array, before: Array
+) -> Iterator[Array]:
+    """The tilt whose means are those of these boards; none where it is no tilt."""
+    known, width = mean_of(before), width_of(before)
+    w, points = weights[mine], sample.points[mine]
+    mean = (w @ points) / w.sum()
+    effective = w.sum() ** 2 / (w**2).sum()
+    error = width / math.sqrt(max(effective, 1.0))
+    off = np.maximum(np.abs(mean - known) / error, 1e-9)
+    taken = may * np.maximum(1.0 - (CLEAR / off) ** 2, 0.0)
+    moved = tilt_of(np.clip(known + taken * (mean - known), 0.02, 0.98))
+    tilt = np.where(taken > 0.0, moved, before)
+    if tilt.any():
+        yield tilt
+
+
+def _moved(
+    regions: Sequence[_Region], cube: TiltedCube, sample: _Sample, names: Sequence[str]
+) -> list[_Region]:
+    """The regions moved to the means of their own lost boards; those of new kinds of loss join
+    them, those without a loss leave."""
+    densities = cube.densities(sample.points)
+    weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
+    out = []
+    for k, region in enumerate(regions, start=1):
+        mine = sample.lost & (likeliest == k)
+        if not mine.any():
+            continue
+        part = _Sample(sample.points, sample.component, mine, sample.unanswered, ("",) * len(mine))
+        tilt = next((t for _, t in _tilts(part, weights, names, region.tilt)), region.tilt)
+        out.append(_Region(tilt, region.found_by))
+    outside = _Sample(
+        sample.points,
+        sample.component,
+        sample.lost & (likeliest == 0),
+        sample.unanswered,
+        sample.responses,
+    )
+    out += [
+        _Region(tilt, f"plain boards that show {response}")
+        for response, tilt in _tilts(outside, weights, names)
+    ]
+    return out
+
+
+def _named(
+    drawing: _Drawing, cube: TiltedCube, regions: Sequence[_Region], samples: Sequence[_Sample]
+) -> list[LossRegion]:
+    """The regions with what was lost in them: each lost board is counted to the component that it
+    is likeliest of, the plain one's as a region of its own."""
+    points = np.concatenate([s.points for s in samples])
+    lost = np.concatenate([s.lost for s in samples])
+    responses = [r for s in samples for r in s.responses]
+    densities = cube.densities(points)
+    weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
+    total = float((weights * lost).sum())
+    named = []
+    for k, region in enumerate([_Region(cube.tilts[0], "elsewhere"), *regions]):
+        mine = lost & (likeliest == k)
+        if not mine.any():
+            continue
+        seen = Counter(responses[i] for i in np.flatnonzero(mine))
+        named.append(
+            LossRegion(
+                found_by=region.found_by,
+                becomes=seen.most_common(1)[0][0],
+                share=float(weights[mine].sum()) / total,
+                boards=int(mine.sum()),
+                parts=_leading(drawing.names, region.tilt),
+            )
+        )
+    return sorted(named, key=lambda r: -r.share)
+
+
+def _leading(names: Sequence[str], tilt: Array) -> tuple[str, ...]:
+    """The coordinates that are tilted most, with the ends that they lean to."""
+    order = np.argsort(-np.abs(tilt), kind="stable")[:SHOWN_PARTS]
+    ends = ((names[k], "high" if tilt[k] > 0.0 else "low") for k in order if tilt[k])
+    return tuple(f"{name if '.' in name else part_of(name)} {end}" for name, end in ends)
+
+
+def _margins(drawing: _Drawing, regions: Sequence[_Region]) -> Iterator[ToleranceMargin]:
+    """Of the corners that the regions lean to, and of single parts at the ends that they lean to.
+    Tolerances are widened in proportion, every law with them."""
+    if not regions:
+        return
+    doing("tolerance margins")
+    corners = np.array([_corner(region.tilt) for region in regions])
+    found = [w for w in _widenings(drawing, corners) if w is not None]
+    yield ToleranceMargin("", min(found, default=None))
+    lean = max((r.tilt for r in regions), key=lambda t: float(np.abs(t).max()))
+    order = np.argsort(-np.max([np.abs(r.tilt) for r in regions], axis=0), kind="stable")[:SINGLE]
+    alone = np.full((len(order), len(lean)), 0.5)
+    for row, k in enumerate(order):
+        tilts = [float(r.tilt[k]) for r in regions]
+        alone[row, k] = _corner(np.array([max(tilts, key=abs)]))[0]
+    each = zip(order.tolist(), _widenings(drawing, alone), strict=True)
+    margins = [ToleranceMargin(drawing.names[k], w) for k, w in each]
+    yield from sorted(margins, key=lambda m: math.inf if m.widening is None else m.widening)
+
+
+def _corner(tilt: Array) -> Array:
+    """The end of each coordinate that a tilt leans to; the middle of those that it leaves."""
+    return np.where(tilt > 0.0, LAST, np.where(tilt < 0.0, 0.0, 0.5))
+
+
+def _widenings(drawing: _Drawing, points: Array) -> list[float | None]:
+    """For each point (coordinates,) the width of the tolerances at which its board is lost first;
+    None where it is not up to ``WIDEST``."""
+    boards = drawing.boards(points)
+    low, high = np.full(len(points), 1.0 / WIDEST), np.full(len(points), WIDEST)
+    found = np.ones(len(points), dtype=bool)
+    for _ in range(2):
+        widths = np.geomspace(low, high, STEPS, axis=1)
+        rows = boards.take(np.repeat(np.arange(len(points)), STEPS))
+        verdicts = drawing.asked(between(rows, widths.ravel()))
+        lost = np.array([v not in (Verdict.OK, Verdict.FAILED) for v, _ in verdicts])
+        lost = lost.reshape(widths.shape)
+        found &= lost.any(axis=1)
+        first = lost.argmax(axis=1)
+        each = np.arange(len(points))
+        low, high = widths[each, np.maximum(first - 1, 0)], widths[each, first]
+    return [float(high[k]) if found[k] else None for k in range(len(points))]

@@ -1,0 +1,253 @@
+"""Rare losses: the densities by integrals, the estimate against probabilities in closed form."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from scipy.integrate import quad
+
+from designer.base.arrays import Array
+from designer.cli import entry
+from designer.verdicts.verdict import Verdict
+from designer.yields import rare_losses
+from designer.yields.margins import Margin
+from designer.yields.rare_losses import counted_losses
+from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
+from designer.yields.yield_count import Yield
+from tests.shared.model_text import SMALL
+
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
+
+# ---------------------------------------------------------------------------------------------
+# Densities
+
+
+@given(st.floats(-39.0, 39.0))
+def test_moments_of_a_tilt_are_their_integrals(tilt: float) -> None:
+    total = quad(lambda u: math.exp(tilt * u - abs(tilt)), 0.0, 1.0)[0]
+    mean = quad(lambda u: u * math.exp(tilt * u - abs(tilt)), 0.0, 1.0)[0] / total
+    square = quad(lambda u: u * u * math.exp(tilt * u - abs(tilt)), 0.0, 1.0)[0] / total
+    at = np.array([tilt])
+    assert mean_of(at)[0] == pytest.approx(mean, abs=1e-7)
+    assert width_of(at)[0] == pytest.approx(math.sqrt(square - mean**2), rel=1e-3)
+    assert tilt_of(mean_of(at))[0] == pytest.approx(
+        tilt, abs=1e-6 * max(1.0, math.exp(0.4 * abs(tilt)))
+    )
+
+
+def test_weights_are_the_mixtures() -> None:
+    """Their mean is 1, none is above 1 over the plain share, and they weigh moments back."""
+    tilts = [np.array([3.0, -2.0, 0.0]), np.array([0.0, 5.0, 5.0])]
+    cube = TiltedCube.of(tilts, 0.1, 3)
+    points, component = cube.drawn(200_000, np.random.default_rng(1))
+    weights = cube.weights(points)
+    assert np.bincount(component) == pytest.approx(len(points) * cube.shares, rel=0.01)
+    assert weights.mean() == pytest.approx(1.0, abs=0.01)
+    assert weights.max() <= 1.0 / 0.1
+    assert (weights[:, None] * points).mean(axis=0) == pytest.approx(0.5, abs=0.01)
+
+
+# ---------------------------------------------------------------------------------------------
+# The estimate, on boards whose losses are known in closed form
+
+
+def irwin_hall(count: int, threshold: float) -> float:
+    """Probability that the sum of so many uniform numbers is above a threshold, by its formula
+    (J. O. Irwin, P. Hall, Biometrika 19, 1927)."""
+    rest = count - threshold
+    terms = ((-1.0) ** k * math.comb(count, k) * (rest - k) ** count for k in range(int(rest) + 1))
+    return math.fsum(terms) / math.factorial(count)
+
+
+class _Boards:
+    """Stands for boards: their points, further off by ``wide``."""
+
+    def __init__(self, points: Array) -> None:
+        self.points = points
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def take(self, rows: Array) -> _Boards:
+        return _Boards(self.points[rows])
+
+
+def estimated(
+    monkeypatch: pytest.MonkeyPatch, size: int, lost: Callable[[Array], list[str]], seed: int
+) -> rare_losses.RareLosses:
+    """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
+    is fine. No linear limit is known."""
+
+    def asked(_: object, boards: _Boards) -> list[tuple[Verdict, str]]:
+        return [(Verdict.LOST if r else Verdict.OK, r) for r in lost(boards.points)]
+
+    def wider(boards: _Boards, share: Array) -> _Boards:
+        return _Boards(0.5 + share[:, None] * (boards.points - 0.5))
+
+    names = tuple(f"R{k}" for k in range(size))
+    spread = SimpleNamespace(coordinates=lambda _: names, from_cube=lambda _, cube: _Boards(cube))
+    question = SimpleNamespace(stream="1", periodic=False)
+    plan: Any = SimpleNamespace(
+        census=False, labels=(), seed=seed, questions=(question,), spread=spread, circuit=None,
+        modelled=lambda boards: boards,
+    )  # fmt: skip
+    monkeypatch.setattr(rare_losses._Drawing, "asked", asked)
+    monkeypatch.setattr(rare_losses, "between", wider)
+    return rare_losses.rare_losses(plan, 0)
+
+
+REPETITIONS = 60
+
+
+@pytest.mark.parametrize(("size", "threshold"), [(12, 9.6), (12, 10.3), (20, 15.6)])
+def test_the_interval_covers_a_probability_that_is_known(
+    monkeypatch: pytest.MonkeyPatch, size: int, threshold: float
+) -> None:
+    """One region: lost where the sum of all coordinates is above a threshold. Of 60 intervals of
+    95 % at least 52 cover: fewer have a chance below 1 in 200. Plain boards would take a hundred
+    times as many."""
+    truth = irwin_hall(size, threshold)
+    assert 1e-7 < truth < 1e-3
+
+    def lost(points: Array) -> list[str]:
+        return ["1-0-0" if s > threshold else "" for s in points.sum(axis=1)]
+
+    found = [estimated(monkeypatch, size, lost, seed) for seed in range(REPETITIONS)]
+    covered = sum(r.low <= truth <= r.high for r in found)
+    assert covered >= 52
+    assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
+    assert np.median([r.gain for r in found]) > 5.0
+    assert all(r.largest_weight <= 1.0 / rare_losses.PLAIN for r in found)
+    assert all(len(r.regions) >= 1 and r.regions[0].becomes == "1-0-0" for r in found)
+
+
+def test_two_regions_that_lie_apart_are_both_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lost where the first six are large, and, as something else, where the last six are small."""
+    truth = irwin_hall(6, 5.2) + irwin_hall(6, 5.4)
+    truth -= irwin_hall(6, 5.2) * irwin_hall(6, 5.4)
+
+    def lost(points: Array) -> list[str]:
+        first, last = points[:, :6].sum(axis=1), (1.0 - points[:, 6:]).sum(axis=1)
+        return [
+            "1-0-0" if a > 5.2 else "clipped" if b > 5.4 else ""
+            for a, b in zip(first, last, strict=True)
+        ]
+
+    found = [estimated(monkeypatch, 12, lost, seed) for seed in range(20)]
+    assert sum(r.low <= truth <= r.high for r in found) >= 16
+    kinds = [{region.becomes for region in r.regions} for r in found]
+    assert sum(kind == {"1-0-0", "clipped"} for kind in kinds) >= 18
+
+
+def test_losses_on_both_sides_of_the_middle_are_two_regions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As what is lost both ways shows the same, only where it lies tells the two apart."""
+    truth = 2.0 * irwin_hall(12, 9.8)
+
+    def lost(points: Array) -> list[str]:
+        return ["1-0-0" if abs(s - 6.0) > 3.8 else "" for s in points.sum(axis=1)]
+
+    found = [estimated(monkeypatch, 12, lost, seed) for seed in range(20)]
+    assert sum(r.low <= truth <= r.high for r in found) >= 16
+
+
+def test_boards_that_are_never_lost_leave_what_plain_boards_leave(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All boards are plain then, and 3 over their number is 95 % of what may be."""
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 2000)
+    result = estimated(monkeypatch, 5, lambda points: [""] * len(points), 1)
+    assert (result.lost, result.low, result.regions, result.margins) == (0.0, 0.0, (), ())
+    assert math.isnan(result.gain)
+    assert result.high == result.unseen == pytest.approx(3.0 / result.boards, rel=0.6)
+
+
+def test_margins_are_the_widths_at_which_a_corner_and_a_part_are_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Lost where 3 u0 + u1 + … is above its middle by 1.8. Alone, coordinate 0 has to be off by
+    0.6, which is 1.2 of its tolerance; all together reach it at 1.8/3."""
+
+    def lost(points: Array) -> list[str]:
+        sums = 3.0 * (points[:, 0] - 0.5) + (points[:, 1:4] - 0.5).sum(axis=1)
+        return ["1-0-0" if s > 1.8 else "" for s in sums]
+
+    result = estimated(monkeypatch, 4, lost, 3)
+    everything, first, *others = result.margins
+    assert everything.part == ""
+    assert everything.widening == pytest.approx(1.8 / 3.0, rel=0.05)
+    assert first.part == "R0"
+    assert first.widening == pytest.approx(1.2, rel=0.05)
+    assert [m.widening for m in others] == [pytest.approx(3.6, rel=0.05)] * 3
+
+
+def test_plenty_of_losses_are_counted_as_they_are() -> None:
+    few = Yield(ok=170, lost=20, grazing=5, failed=5)
+    many = Yield(ok=150, lost=35, grazing=10, failed=5)
+    assert counted_losses(0, few) is None
+    counted = counted_losses(0, many)
+    assert counted is not None
+    assert counted.lost == pytest.approx(45 / 195)
+    assert counted.low < counted.lost < counted.high
+
+
+# ---------------------------------------------------------------------------------------------
+# In a folder
+
+
+def test_the_verb_writes_it_and_takes_it_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 600)
+    monkeypatch.setattr(rare_losses, "PILOT", 100)
+    monkeypatch.setattr(rare_losses, "EXPLORED", 128)
+    monkeypatch.setattr(rare_losses, "STEP_BACK", 100)
+    model, folder = tmp_path / "model.toml", tmp_path / "d"
+    model.write_text(SMALL, "utf-8")
+    command = ["tolerance", str(model), "--out", str(folder), "--rung", "exact", "--samples", "20"]
+    assert entry.status([*command, "--no-blame", "--rare"]) == 0
+    assert "Rare losses" in capsys.readouterr().err
+    document = json.loads((folder / "tolerance.json").read_text("utf-8"))
+    found = [r["rare"] for r in document["responses"]]
+    assert all(r["low"] <= r["lost"] <= r["high"] for r in found)
+    assert "Boards of a million" in (folder / "report.md").read_text("utf-8")
+    assert document["cost"]["rare_seconds"] > 0.0
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("drawn twice")
+
+    monkeypatch.setattr("designer.yields.tolerance_study.rare_losses", never)
+    assert entry.status(["tolerance", str(folder), "--tuned"]) == 0
+    again = json.loads((folder / "tolerance.json").read_text("utf-8"))
+    assert [r["rare"] for r in again["responses"]] == found
+
+
+def test_boards_of_a_list_are_counted_and_not_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "boards.csv").write_text("part,value,board\nR100,10k,a\nR100,10.1k,b\n", "utf-8")
+    model = tmp_path / "model.toml"
+    model.write_text(SMALL + '\n[spread]\nmeasured = "boards.csv"\n', "utf-8")
+    command = ["tolerance", str(model), "--out", str(tmp_path / "d"), "--rung", "exact", "--rare"]
+    assert entry.status(command) == 2
+    assert "--rare" in capsys.readouterr().err
+
+
+def test_no_limit_is_asked_for_without_a_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motion without a period has no orbit that could be followed to a limit."""
+
+    def never(*_: object, **__: object) -> Margin:
+        raise AssertionError("followed")
+
+    monkeypatch.setattr(rare_losses, "nominal_limits", never)
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 500)
+    estimated(monkeypatch, 3, lambda points: [""] * len(points), 2)
