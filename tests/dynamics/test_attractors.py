@@ -133,7 +133,7 @@ def test_an_undamped_motion_has_settled_without_a_period() -> None:
 
     def orbit(damping: float) -> Orbit:
         system = SecondOrderSystem(
-            np.eye(1), np.array([[damping]]), np.eye(1), np.ones(1), ()
+            np.ones(1), np.array([[damping]]), np.eye(1), np.ones(1), ()
         ).piecewise_linear()
         return settle(Flow(system, Drive(np.sqrt(2.0))), np.array([0.7, 0.1]))
 
