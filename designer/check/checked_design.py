@@ -51,10 +51,15 @@ class CheckedResponse:
     """Flow of the design's circuit at this response; None as ``design`` is."""
 
     @property
+    def periodic(self) -> bool:
+        """Whether an n-p-q is wanted, or shown where nothing is: only then it can be followed."""
+        return self.model.spec.completed(self.circuit).periodic
+
+    @property
     def exponents(self) -> dict[str, tuple[float, float]]:
         """Largest Lyapunov exponent and its standard error of each engine that has measured one of
         a motion without a period, per unit of the model's time."""
-        seconds = self.model.omega / (2.0 * math.pi * self.excitation.frequency)
+        seconds = self.excitation.seconds(self.model.omega)
         of = {"model": (self.model.orbit, 1.0), "circuit": (self.circuit, seconds)}
         if self.ngspice is not None:
             of["ngspice"] = self.ngspice, seconds

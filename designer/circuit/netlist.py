@@ -508,6 +508,10 @@ class Excitation:
     offset: float = 0.0
     """DC offset [V]."""
 
+    def seconds(self, omega: float) -> float:
+        """One unit of a model's time [s], where its drive has the frequency ``omega``."""
+        return omega / (2.0 * math.pi * self.frequency)
+
     @property
     def drive(self) -> Drive:
         """The voltage at the generator's net, as the exact circuit is driven by it."""

@@ -180,6 +180,14 @@ def _harmonics() -> Accepts:
     return Accepts(expected, check, json=json)
 
 
+OfPhase = Annotated[float | None, _angle()]
+OfWaveform = Annotated[Waveform | None, choice("square", "triangle", "sawtooth")]
+OfTerms = Annotated[
+    int | None, whole_number(f"a whole number from 1 to {MOST_HARMONICS}", 1, MOST_HARMONICS)
+]
+"""Keys that a force and the ground's motion have alike."""
+
+
 @dataclass(frozen=True)
 class Force(FileTable):
     """A force on a mass: amplitude · sin(ωt + phase) + constant, and harmonics of it."""
@@ -190,14 +198,11 @@ class Force(FileTable):
     """Amplitude; negative: in antiphase."""
     constant: Annotated[float, signed("N", "a force")] = 0.0
     """Constant part, such as a weight or a preload."""
-    phase: Annotated[float | None, _angle()] = None
+    phase: OfPhase = None
     """Of the force, before the drive's sine; None: in phase."""
-    waveform: Annotated[Waveform | None, choice("square", "triangle", "sawtooth")] = None
+    waveform: OfWaveform = None
     """Shape with the peak ``amplitude``, in the place of the sine."""
-    terms: Annotated[
-        int | None,
-        whole_number(f"a whole number from 1 to {MOST_HARMONICS}", 1, MOST_HARMONICS),
-    ] = None
+    terms: OfTerms = None
     """How many harmonics that the waveform has are kept, the first among them."""
     harmonics: Annotated[Harmonics, _harmonics()] = ()
     """Forces amplitude · sin(nωt + phase) beside it."""
@@ -337,14 +342,11 @@ class BaseTable(FileTable):
     drive frequency."""
     stops: Annotated[BaseStops, choice("base", "fixed")] = "base"
     """Whether the stops between a mass and ground move with it or stay."""
-    phase: Annotated[float | None, _angle()] = None
+    phase: OfPhase = None
     """Of the motion, before the drive's sine; None: in phase."""
-    waveform: Annotated[Waveform | None, choice("square", "triangle", "sawtooth")] = None
+    waveform: OfWaveform = None
     """Shape with the peak ``amplitude``, in the place of the sine."""
-    terms: Annotated[
-        int | None,
-        whole_number(f"a whole number from 1 to {MOST_HARMONICS}", 1, MOST_HARMONICS),
-    ] = None
+    terms: OfTerms = None
     """How many harmonics that the waveform has are kept, the first among them."""
     harmonics: Annotated[BaseHarmonics, _base_harmonics()] = ()
     """Waves amplitude · sin(nωt + phase) beside it: displacements where ``amplitude`` is one,

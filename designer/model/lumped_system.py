@@ -34,6 +34,7 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
+from designer.model.matrices import Matrices
 from designer.model.mechanics import SINE, HarmonicForce, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
@@ -64,8 +65,7 @@ def check(system: Elements) -> None:
         _refuse("mass", len(system.masses), f"at most {MOST_MASSES} masses")
     _check_names(system)
     if system.matrices is not None:
-        _check_alone(system)
-        system.matrices.check()
+        _check_matrices(system, system.matrices)
     for gap in system.gaps:
         _check_gap(gap)
     for law in system.laws:
@@ -82,12 +82,21 @@ def check(system: Elements) -> None:
     _check_driven(system)
 
 
-def _check_alone(system: Elements) -> None:
-    """Matrices stand in the place of springs and dampers."""
+def _check_matrices(system: Elements, matrices: Matrices) -> None:
+    """Matrices stand in the place of springs and dampers, and hold every mass as these do."""
     for key, elements in (("spring", system.springs), ("damper", system.dampers)):
         if elements:
             expected = "none beside [matrices], which has them; or no [matrices]"
             _refuse(key, f"{len(elements)} tables [[{key}]]", expected)
+    for key in ("mass", "stiffness", "damping"):
+        for value in chain.from_iterable(getattr(matrices, key)):
+            _check_size(f"matrices.{key}", value, "numbers")
+    matrices.check()
+    if not system.nonlinear:  # what laws hold is known where they are
+        values = np.linalg.eigvalsh(matrices.stiffness_matrix)
+        if not values[0] > ROUNDED * np.abs(values).max():
+            expected = "a positive definite matrix: it holds every mass"
+            _refuse("matrices.stiffness", "a motion that nothing holds", expected)
 
 
 def _refuse(field: str, found: object, expected: str) -> NoReturn:

@@ -146,11 +146,12 @@ class SecondOrderSystem:
         of the drive itself."""
         own = (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
         waves = {wave.order: np.stack([wave.sine, wave.cosine]) for wave in own}
-        inertia = self.mass_matrix.sum(axis=1)
-        for n, *parts in self.base_shape if self.ground_moves else ():
-            acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
-            before = waves.get(n, np.zeros((2, self.size)))
-            waves[n] = before + np.outer(np.array(parts) * acceleration, inertia)
+        if self.ground_moves:
+            inertia = self.mass_matrix.sum(axis=1)
+            for n, *parts in self.base_shape:
+                acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
+                before = waves.get(n, np.zeros((2, self.size)))
+                waves[n] = before + np.outer(np.array(parts) * acceleration, inertia)
         return tuple(HarmonicForce(n, *waves[n]) for n in sorted(waves))
 
     @property

@@ -282,7 +282,7 @@ def _rare(data: ReportData, pictures: Pictures) -> PageSection:
     note = SmallPrint(
         "Boards are drawn where they are lost, and each counts by how likely it is (importance "
         "sampling). The laws of the parts are bounded, so no board outlies its tolerances. What no "
-        "search met is not counted; plain boards, none of which was lost elsewhere, bound it."
+        "search met is not counted; the plain boards that were lost elsewhere, if any, bound it."
     )
     wider = SmallPrint(
         "Where one part alone is moved, all others are as they should be. Below 1 it is lost "

@@ -94,7 +94,7 @@ def _low_yields(data: ReportData) -> Iterator[Remedy]:
     )
     if parts := _blamed_parts(data, place):
         text += f" Most losses would be avoided if {parts} were exact."
-    if data.checked[place].model.spec.completed(data.checked[place].circuit).periodic:
+    if all(c.periodic for c in data.checked):
         yield Remedy(text, f"designer search DIR --yield {WANTED:g}")
     else:  # a search follows orbits
         yield Remedy(text, "designer tolerance DIR --tuned --reached")

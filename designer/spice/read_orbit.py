@@ -96,21 +96,29 @@ class Read:
 def strobes_after(
     waveforms: Waveforms, period: float, nets: tuple[str, ...], shift: Array
 ) -> Array:
-    """(k, states) states at the ends of the run's periods but the first; as of ``Reading``."""
-    time = waveforms.axis
-    x = np.stack([waveforms.signals[net] for net in nets], axis=1) - shift
+    """(k, states) states at the end of each of the run's periods. period, nets, shift : as of
+    ``Reading``."""
+    states = _states(waveforms, nets, shift)
+    return _at(waveforms.axis, states, _marks(waveforms.axis, period, 1))
+
+
+def _states(waveforms: Waveforms, nets: tuple[str, ...], shift: Array) -> Array:
+    """(k, states) at the run's own points; as of ``Reading``."""
+    return np.asarray(np.stack([waveforms.signals[net] for net in nets], axis=1) - shift)
+
+
+def _marks(time: Array, period: float, first: int) -> Array:
+    """(k,) times of the strobes from number ``first`` on, the last no later than the run's end."""
     last = int(np.floor(time[-1] / period * (1.0 + 1e-9)))
-    marks = np.minimum(np.arange(1, last + 1) * period, time[-1])
-    return _at(time, x, marks)
+    return np.asarray(np.minimum(np.arange(first, last + 1).astype(float) * period, time[-1]))
 
 
 def read(waveforms: Waveforms, reading: Reading) -> Read:
     """Classify the run after ``reading.discard`` periods."""
     time = waveforms.axis
-    x = np.stack([waveforms.signals[net] for net in reading.nets], axis=1) - reading.shift
-    last = int(np.floor(time[-1] / reading.period * (1.0 + 1e-9)))
-    marks = np.arange(reading.discard, last + 1).astype(float) * reading.period
-    marks[-1] = min(marks[-1], time[-1])
+    x = _states(waveforms, reading.nets, reading.shift)
+    marks = _marks(time, reading.period, reading.discard)
+    last = reading.discard + len(marks) - 1
     strobes = _at(time, x, marks)
     settled = time >= marks[0]
     # The window opens and closes on exact strobes, so that n periods hold n periods' impacts.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.si_unit import is_angular, value_text
-from designer.dynamics.counts import read_counts
+from designer.dynamics.orbit import WITHOUT_PERIOD
 from designer.verbs.console import say
 
 Step = tuple[str, str]
@@ -54,7 +54,7 @@ def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     yield from after_response(folder, responses)
     low = any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses)
     # A search follows orbits.
-    if low and all(read_counts(r["expected"] or r["circuit"]) for r in responses):
+    if low and not any((r["expected"] or r["circuit"]) in WITHOUT_PERIOD for r in responses):
         yield _step("the cheapest cure", "search", folder, "--yield", GOOD)
     if _board(folder) is None:
         yield _step("the KiCad project, its board routed", "export", folder, "--routed")

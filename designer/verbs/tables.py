@@ -197,7 +197,14 @@ def _further(answer: Mapping[str, Any]) -> None:
         ),
         gap=1,
     )
-    _joint(answer)
+    joint = answer.get("all_on_one_board") or {}
+    counts = [
+        f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
+        for kind, y in joint.items()
+        if y is not None
+    ]
+    if counts:
+        say(f"All on one board: {', '.join(counts)}")
 
 
 def _rare(rows: Sequence[Mapping[str, Any]]) -> None:
@@ -221,22 +228,9 @@ def _rare(rows: Sequence[Mapping[str, Any]]) -> None:
         }
 
     table("Rare losses", ({**response_cells(r, rows), **cells(r)} for r in asked), gap=1)
-    unseen = max(r["rare"]["unseen"] for r in asked)
-    say(
-        f"A region of losses that no search met may hold up to {1e6 * unseen:.3g} of a million more"
-    )
-
-
-def _joint(answer: Mapping[str, Any]) -> None:
-    """Boards that show every response."""
-    joint = answer.get("all_on_one_board") or {}
-    counts = [
-        f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
-        for kind, y in joint.items()
-        if y is not None
-    ]
-    if counts:
-        say(f"All on one board: {', '.join(counts)}")
+    unseen = 1e6 * max(r["rare"]["unseen"] for r in asked)
+    if unseen:
+        say(f"A region of losses that no search met may hold up to {unseen:.3g} of a million more")
 
 
 def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:

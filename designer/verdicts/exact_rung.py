@@ -10,7 +10,6 @@ from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import Excitation
-from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle, with_exponent
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -39,6 +38,11 @@ def settled(
     orbits = ensemble.settle(
         boards, drives, np.array(starts), jobs=jobs, brief=brief, progress=progress
     )
+    if not brief:
+        orbits = [
+            _decidable(orbit, question, excitation, ensemble, board)
+            for (board, question, excitation, _), orbit in zip(cases, orbits, strict=True)
+        ]
     return [(orbit, *q.judge(orbit)) for q, orbit in zip(questions, orbits, strict=True)]
 
 
@@ -94,7 +98,7 @@ def _settled_boards(
     wanted = [images(_nominal_displacement(plan, q), mirror=twins) for q in plan.questions]
     for (i, number), response in zip(pairs, settled, strict=True):
         question = plan.questions[number]
-        orbit = _decidable(response.orbit, question, boards.reduction, i)
+        orbit = _decidable(response.orbit, question, question.excitation, boards, i)
         verdict, reason = question.judge(orbit)
         waveform = float("nan")
         if orbit.status is OrbitStatus.PERIODIC:
@@ -116,7 +120,7 @@ def _settled_boards(
 
 
 def _decidable(
-    orbit: Orbit, question: Question, reduction: Callable[[int], Reduction], board: int
+    orbit: Orbit, question: Question, excitation: Excitation, ensemble: Ensemble, board: int
 ) -> Orbit:
     """The orbit of a board, with its exponent to a smaller error where a least one is wanted and
     the first estimate does not tell."""
@@ -125,7 +129,7 @@ def _decidable(
         return orbit
     if question.judge(orbit)[0] is not Verdict.FAILED:
         return orbit
-    return with_exponent(Flow(reduction(board).system(), question.excitation.drive), orbit)
+    return with_exponent(Flow(ensemble.reduction(board).system(), excitation.drive), orbit)
 
 
 def images(wanted: Array, *, mirror: bool = False) -> Array:

@@ -6,7 +6,6 @@ A verdict is decided on the exact circuit rung, started on the nominal design's 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -70,8 +69,7 @@ class Question:
 
     def judge(self, orbit: Orbit) -> tuple[Verdict, str]:
         """Verdict and reason of a board with this orbit."""
-        seconds = self.omega / (2.0 * math.pi * self.excitation.frequency)
-        return judge(orbit, self.spec, self.start, seconds)
+        return judge(orbit, self.spec, self.start, self.excitation.seconds(self.omega))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 from zlib import crc32
 
@@ -27,7 +27,7 @@ from designer.base.proportion import wilson
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.board_quantities import between
-from designer.spread.spread import BOARD, part_of
+from designer.spread.spread import BOARD
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.margins import nominal_limits
@@ -138,8 +138,8 @@ class RareLosses:
     """Plain boards that the same interval would take, over those drawn, pilots included; nan
     without a loss."""
     unseen: float
-    """A region that no search met may hold this share at most: 95 % of what the plain boards
-    leave, among which none was lost outside the regions."""
+    """A region that no search met may hold this share at most, by 95 %: what the plain boards leave
+    of which none, or so many, were lost outside the regions."""
     narrow: bool
     """Whether the interval is as narrow as was aimed at."""
     regions: tuple[LossRegion, ...]
@@ -177,6 +177,16 @@ class _Sample:
     lost: Mask
     unanswered: Mask
     responses: tuple[str, ...]
+
+    def joined(self, other: _Sample) -> _Sample:
+        """Both, one after the other."""
+        return _Sample(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.component, other.component]),
+            np.concatenate([self.lost, other.lost]),
+            np.concatenate([self.unanswered, other.unanswered]),
+            (*self.responses, *other.responses),
+        )
 
 
 @dataclass(frozen=True)
@@ -247,19 +257,21 @@ def rare_losses(
     doing("regions of loss")
     regions, pilots, clear = _regions(drawing, rng)
     cube = TiltedCube.of([r.tilt for r in regions], PLAIN, len(drawing.names))
-    samples: list[_Sample] = []
+    sample = drawing.sample(*cube.drawn(BLOCK, rng))
     while True:
-        samples.append(drawing.sample(*cube.drawn(BLOCK, rng)))
-        result = _estimate(cube, samples)
-        count = sum(len(s.points) for s in samples)
+        result = _estimate(cube, sample)
+        count = len(sample.points)
         doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
         narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
         narrow = narrow and result.effective >= ENOUGH
         if count >= most or (narrow and count >= LEAST_BOARDS):
             break
+        sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
     spent = pilots + count
-    plain_boards = clear + sum(int((s.component == 0).sum()) for s in samples)
-    outside = -math.log(0.05) / max(plain_boards, 1)
+    elsewhere = (
+        sample.lost & (sample.component == 0) & (cube.densities(sample.points).argmax(1) == 0)
+    )
+    outside = _outside(int(elsewhere.sum()), clear + int((sample.component == 0).sum()))
     low, high = _interval(result.mean, result.error, outside)
     gain = math.nan
     if result.mean > 0.0 and result.error > 0.0:
@@ -278,7 +290,7 @@ def rare_losses(
         gain=gain,
         unseen=outside,
         narrow=narrow,
-        regions=tuple(_named(drawing, cube, regions, samples)),
+        regions=tuple(_named(drawing, cube, regions, sample)),
         margins=tuple(_margins(drawing, regions)),
         seconds=time.perf_counter() - began,
     )
@@ -310,6 +322,14 @@ def counted_losses(number: int, counted: Yield) -> RareLosses | None:
     )
 
 
+def _outside(lost: int, plain_boards: int) -> float:
+    """What may lie outside the regions, by 95 %: of so many plain boards so many were lost there
+    (the exact upper end of a Poisson count: 3 over the boards where none was)."""
+    from scipy.stats import chi2  # takes a second
+
+    return float(0.5 * chi2.ppf(0.95, 2 * (lost + 1))) / max(plain_boards, 1)
+
+
 def _interval(mean: float, error: float, outside: float) -> tuple[float, float]:
     """95 % of an estimate: even in its logarithm, which keeps it above 0."""
     if mean <= 0.0:
@@ -328,29 +348,25 @@ class _Estimate:
     largest: float
 
 
-def _estimate(cube: TiltedCube, samples: Sequence[_Sample]) -> _Estimate:
+def _estimate(cube: TiltedCube, sample: _Sample) -> _Estimate:
     """Shares of lost boards and of those without an answer, each board by its weight; the error is
     that within the components, of which each has as many boards as its share says."""
-    points = np.concatenate([s.points for s in samples])
-    component = np.concatenate([s.component for s in samples])
-    lost = np.concatenate([s.lost for s in samples])
-    failed = np.concatenate([s.unanswered for s in samples])
-    counts = np.bincount(component, minlength=len(cube.shares))
+    counts = np.bincount(sample.component, minlength=len(cube.shares))
     drawn = TiltedCube(cube.tilts, counts / counts.sum())
-    weights = drawn.weights(points)
-    hits, total = weights * lost, len(points)
+    weights = drawn.weights(sample.points)
+    hits, total = weights * sample.lost, len(sample.points)
     variance = 0.0
     for k, count in enumerate(counts.tolist()):
         if count > 1:
-            variance += count * float(hits[component == k].var(ddof=1))
-    none = float((weights * failed).sum()) / total
+            variance += count * float(hits[sample.component == k].var(ddof=1))
+    none = float((weights * sample.unanswered).sum()) / total
     answered = max(1.0 - none, 1e-12)
     squares = float((hits**2).sum())
     return _Estimate(
         float(hits.sum()) / total / answered,
         math.sqrt(variance) / total / answered,
         none,
-        int(lost.sum()),
+        int(sample.lost.sum()),
         float(hits.sum()) ** 2 / squares if squares else 0.0,
         float(hits.max(initial=0.0)),
     )
@@ -451,26 +467,19 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     return found, asked
 
 
-def _tilts(
-    sample: _Sample,
-    weights: Array,
-    names: Sequence[str],
-    before: Array | None = None,
-) -> Iterator[tuple[str, Array]]:
+def _tilts(sample: _Sample, weights: Array, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
     """For each kind of loss of enough boards the response that they show, and the tilt whose means
-    are theirs. Of what chance may have made of a mean, beside that with the tilt ``before`` (none
-    where None), less is taken over the more it may (the positive part of W. James, C. Stein, 4th
-    Berkeley Symp. 1961)."""
-    may = _tiltable(names)
-    whole = before is not None
-    before = np.zeros(len(names)) if before is None else before
+    are theirs."""
+    may, none = _tiltable(names), np.zeros(len(names))
     kinds = Counter(r for r, lost in zip(sample.responses, sample.lost, strict=True) if lost)
     for response, count in kinds.most_common():
         if count < FEWEST:
             break
         here = sample.lost & np.array([r == response for r in sample.responses], dtype=bool)
-        for mine in _sides(sample.points, weights, here) if not whole else (here,):
-            yield from ((response, t) for t in _tilt(sample, weights, mine, may, before))
+        for mine in _sides(sample.points, weights, here):
+            tilt = _tilt(sample.points[mine], weights[mine], may, none)
+            if tilt.any():
+                yield response, tilt
 
 
 def _sides(points: Array, weights: Array, here: Mask) -> Iterator[Mask]:
@@ -490,21 +499,21 @@ def _sides(points: Array, weights: Array, here: Mask) -> Iterator[Mask]:
     yield from sides if apart else [here]
 
 
-def _tilt(
-    sample: _Sample, weights: Array, mine: Mask, may: Array, before: Array
-) -> Iterator[Array]:
-    """The tilt whose means are those of these boards; none where it is no tilt."""
+def _tilt(points: Array, weights: Array, may: Array, before: Array) -> Array:
+    """The tilt whose means are those of these lost boards.
+
+    Of what chance may have made of a mean, beside that with the tilt ``before``, less is taken over
+    the more it may (the positive part of W. James, C. Stein, 4th Berkeley Symp. 1961). may : 1
+    where a coordinate may be tilted.
+    """
     known, width = mean_of(before), width_of(before)
-    w, points = weights[mine], sample.points[mine]
-    mean = (w @ points) / w.sum()
-    effective = w.sum() ** 2 / (w**2).sum()
+    mean = (weights @ points) / weights.sum()
+    effective = weights.sum() ** 2 / (weights**2).sum()
     error = width / math.sqrt(max(effective, 1.0))
     off = np.maximum(np.abs(mean - known) / error, 1e-9)
     taken = may * np.maximum(1.0 - (CLEAR / off) ** 2, 0.0)
     moved = tilt_of(np.clip(known + taken * (mean - known), 0.02, 0.98))
-    tilt = np.where(taken > 0.0, moved, before)
-    if tilt.any():
-        yield tilt
+    return np.where(taken > 0.0, moved, before)
 
 
 def _moved(
@@ -514,21 +523,15 @@ def _moved(
     them, those without a loss leave."""
     densities = cube.densities(sample.points)
     weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
-    out = []
+    may, out = _tiltable(names), list[_Region]()
     for k, region in enumerate(regions, start=1):
         mine = sample.lost & (likeliest == k)
-        if not mine.any():
-            continue
-        part = _Sample(sample.points, sample.component, mine, sample.unanswered, ("",) * len(mine))
-        tilt = next((t for _, t in _tilts(part, weights, names, region.tilt)), region.tilt)
-        out.append(_Region(tilt, region.found_by))
-    outside = _Sample(
-        sample.points,
-        sample.component,
-        sample.lost & (likeliest == 0),
-        sample.unanswered,
-        sample.responses,
-    )
+        tilt = region.tilt
+        if mine.sum() >= FEWEST:
+            tilt = _tilt(sample.points[mine], weights[mine], may, region.tilt)
+        if mine.any():
+            out.append(_Region(tilt if tilt.any() else region.tilt, region.found_by))
+    outside = replace(sample, lost=sample.lost & (likeliest == 0))
     out += [
         _Region(tilt, f"plain boards that show {response}")
         for response, tilt in _tilts(outside, weights, names)
@@ -537,22 +540,19 @@ def _moved(
 
 
 def _named(
-    drawing: _Drawing, cube: TiltedCube, regions: Sequence[_Region], samples: Sequence[_Sample]
+    drawing: _Drawing, cube: TiltedCube, regions: Sequence[_Region], sample: _Sample
 ) -> list[LossRegion]:
     """The regions with what was lost in them: each lost board is counted to the component that it
     is likeliest of, the plain one's as a region of its own."""
-    points = np.concatenate([s.points for s in samples])
-    lost = np.concatenate([s.lost for s in samples])
-    responses = [r for s in samples for r in s.responses]
-    densities = cube.densities(points)
+    densities = cube.densities(sample.points)
     weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
-    total = float((weights * lost).sum())
+    total = float((weights * sample.lost).sum())
     named = []
     for k, region in enumerate([_Region(cube.tilts[0], "elsewhere"), *regions]):
-        mine = lost & (likeliest == k)
+        mine = sample.lost & (likeliest == k)
         if not mine.any():
             continue
-        seen = Counter(responses[i] for i in np.flatnonzero(mine))
+        seen = Counter(sample.responses[i] for i in np.flatnonzero(mine))
         named.append(
             LossRegion(
                 found_by=region.found_by,
@@ -569,7 +569,7 @@ def _leading(names: Sequence[str], tilt: Array) -> tuple[str, ...]:
     """The coordinates that are tilted most, with the ends that they lean to."""
     order = np.argsort(-np.abs(tilt), kind="stable")[:SHOWN_PARTS]
     ends = ((names[k], "high" if tilt[k] > 0.0 else "low") for k in order if tilt[k])
-    return tuple(f"{name if '.' in name else part_of(name)} {end}" for name, end in ends)
+    return tuple(f"{name} {end}" for name, end in ends)
 
 
 def _margins(drawing: _Drawing, regions: Sequence[_Region]) -> Iterator[ToleranceMargin]:

@@ -85,7 +85,7 @@ class TiltedCube:
         """(N, components) density of each component, times its share, over that of plain boards."""
         small = np.abs(self.tilts) < _SMALL
         safe = np.where(small, 1.0, np.abs(self.tilts))
-        # log(λ/(e^λ - 1)) is even in λ but for λ itself: λ u - log of the mean of e^(λ u).
+        # Log of the mean of e^(λu), (e^λ - 1)/λ: for λ < 0 that of -λ, less by -λ.
         scale = np.where(small, self.tilts / 2.0, np.log(np.expm1(safe) / safe))
         scale = np.where(~small & (self.tilts < 0.0), scale - safe, scale)
         return np.asarray(np.exp(points @ self.tilts.T - scale.sum(axis=1)) * self.shares)

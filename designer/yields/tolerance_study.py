@@ -182,13 +182,14 @@ def tolerance(
     at_least("--samples", samples, 1)
     at_least("--seed", seed, 0)
     at_least("--jobs", jobs, 1)
+    listed = synthesis.modelfile.measured if rare else None
+    if listed is not None and listed.labels:
+        expected = "no list of measured boards, which are as many as there are"
+        raise InputError(None, "--rare", "spread.measured", expected)
     pool = None if rung == "exact" else pool
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     indices = tuple(i for i in range(len(checked)) if i not in left_out)
-    if rare and synthesis.modelfile.measured is not None and synthesis.modelfile.measured.labels:
-        expected = "no list of measured boards, which are as many as there are"
-        raise InputError(None, "--rare", "spread.measured", expected)
     plan = plan_study(
         synthesis.modelfile,
         synthesis.design,

@@ -20,26 +20,11 @@ from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of
 from designer.model.system_equations import equations_of
 from designer.synthesis.part_checks import check_system
+from tests.shared.system_text import clearance, system_text
 
-BLOCK = """
-format = 2
-[[mass]]
-name = "a"
-mass = 2.0
-[[spring]]
-between = ["a", "ground"]
-stiffness = 3.0
-[[damper]]
-between = ["a", "ground"]
-damping = 0.4
-"""
-STOP = """
-[[clearance]]
-name = "S"
-between = ["a", "ground"]
-upper = 0.3
-stiffness = 20.0
-"""
+GROUNDED = ("a", "ground")
+BLOCK = system_text({"a": 2.0}, {GROUNDED: 3.0}, {GROUNDED: 0.4})
+STOP = clearance("S", *GROUNDED, upper=0.3, stiffness=20.0)
 OMEGA = 0.8
 SHAPES = {
     "a phase": ('phase = "70 deg"', [(1, 0.3, math.radians(70.0))]),

@@ -16,6 +16,7 @@ from designer.fidelity.system_runge_kutta import rates_of
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.model.system_equations import equations_of, number_of
+from tests.shared.system_text import clearance, system_text
 
 Matrix = list[list[float]]
 
@@ -102,27 +103,11 @@ def test_the_fixed_step_integrator_has_the_same_equations(seed: int) -> None:
 
 
 def test_springs_written_as_matrices_are_the_same_system() -> None:
-    springs = """
-format = 2
-[[mass]]
-name = "a"
-mass = 1.0
-[[mass]]
-name = "b"
-mass = 2.0
-[[spring]]
-between = ["a", "ground"]
-stiffness = 3.0
-[[spring]]
-between = ["a", "b"]
-stiffness = 1.5
-[[damper]]
-between = ["a", "ground"]
-damping = 0.2
-[[damper]]
-between = ["a", "b"]
-damping = 0.1
-"""
+    springs = system_text(
+        {"a": 1.0, "b": 2.0},
+        {("a", "ground"): 3.0, ("a", "b"): 1.5},
+        {("a", "ground"): 0.2, ("a", "b"): 0.1},
+    )
     matrices = """
 format = 2
 [matrices]
@@ -132,7 +117,7 @@ stiffness = [[4.5, -1.5], [-1.5, 1.5]]
 damping = [[0.3, -0.1], [-0.1, 0.1]]
 """
     base = '[base]\namplitude = 0.3\nstops = "fixed"\n'
-    gap = '[[clearance]]\nname = "A"\nbetween = ["b", "ground"]\nupper = 0.4\nstiffness = 9.0\n'
+    gap = clearance("A", "b", "ground", upper=0.4, stiffness=9.0)
     of = gap.replace('between = ["b", "ground"]', "of = { b = 1.0 }")
     one, two, three = (
         parse_model_file(head + base + end).model
@@ -188,6 +173,9 @@ def test_a_numpy_file_is_written_out(tmp_path: Path) -> None:
         ("[[1.0, 0.0], [0.0]]", "stiffness", ""),
         ("[[1.0, 0.0], [0.0, inf]]", "stiffness", ""),
         ("[[1.0, 0.0], [0.0, true]]", "stiffness", ""),
+        ("[[1e308, 0.0], [0.0, 1.0]]", "stiffness", "1e+308"),
+        ("[[1.0, 2.0], [2.0, 1.0]]", "stiffness", "nothing holds"),
+        ("[[1.0, 0.0], [0.0, 0.0]]", "stiffness", "nothing holds"),
     ],
 )
 def test_what_is_no_matrix_is_refused(

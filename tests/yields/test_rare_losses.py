@@ -171,6 +171,12 @@ def test_boards_that_are_never_lost_leave_what_plain_boards_leave(
     assert result.high == result.unseen == pytest.approx(3.0 / result.boards, rel=0.6)
 
 
+@pytest.mark.parametrize(("lost", "end"), [(0, 2.996), (1, 4.744), (2, 6.296)])
+def test_what_lies_outside_is_bounded_by_a_poisson_count(lost: int, end: float) -> None:
+    """95 %, one-sided: as tables of the Poisson distribution have it."""
+    assert rare_losses._outside(lost, 1000) == pytest.approx(end / 1000, rel=1e-3)
+
+
 def test_margins_are_the_widths_at_which_a_corner_and_a_part_are_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
