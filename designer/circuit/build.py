@@ -178,10 +178,16 @@ def _integrator(
     for place in places if state % 2 else ():
         bends = place.clearance.bend_of
         force = f"force of {bends} on M{mass + 1}" if bends else f"stop force on M{mass + 1}"
-        if place.clearance.mass == mass:
-            parts += resistors(place.part("R50"), place.output, node, force)
-        if place.clearance.other == mass:
-            parts += resistors(place.part("R51"), place.reaction, node, force)
+        for end, own, source in (
+            (place.clearance.mass, "50", place.output),
+            (place.clearance.other, "51", place.reaction),
+        ):
+            if end != mass:
+                continue
+            parts += resistors(place.part(f"R{own}"), source, node, force)
+            if place.clearance.damping:
+                name = place.part(f"C{own}")
+                parts.append(Capacitor(name, source, node, values[name], f"damper of the {force}"))
     return parts
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -166,24 +167,27 @@ def _log(value: float, want: float) -> float:
 def _slopes(
     zone: DeadZoneReading, model: SecondOrderSystem, *, several: bool
 ) -> dict[str, _Coefficient]:
-    """The force of each stop on each mass, by each displacement, or velocity."""
+    """The force of each stop on each mass, by each displacement, velocity, or both."""
     clearance = zone.clearance
     row = model.displacement(clearance)
     masses = [i for i in (clearance.mass, clearance.other) if i is not None]
     stops = dict(clearance.sides)
-    out, prime = {}, "'" if clearance.quantity == "velocity" else ""
+    out = {}
+    end = f" {clearance.name}" if several else ""
     for side, slope in zone.slopes.items():
-        kind = "bend slope" if clearance.bend_of else "stop slope"
-        words = {0: kind, 1: f"upper {kind}", -1: f"lower {kind}"}
+        word = {0: "", 1: "upper ", -1: "lower "}[side]
         stiffness = (clearance.first if side == 0 else stops[side]).stiffness
-        for i in masses:
-            for j in masses:
-                own = i == j == clearance.mass
-                name = words[side] + (f" {clearance.name}" if several else "")
-                name += "" if own else f" x{i + 1}' x{j + 1}{prime}"
-                want = -stiffness * row[i] * row[j] / model.mass[i]
-                column = clearance.watched + 2 * (j - clearance.mass)
-                out[name] = _entry(2 * i + 1, column, slope[2 * i + 1, column], want)
+        kind = "bend slope" if clearance.bend_of else "stop slope"
+        forces = [(kind, stiffness, clearance.quantity == "velocity")]
+        if clearance.damping:
+            forces.append(("stop damping", clearance.damping, True))
+        for (what, factor, velocity), i, j in product(forces, masses, masses):
+            name = f"{word}{what}{end}"
+            if not i == j == clearance.mass:
+                name += f" x{i + 1}' x{j + 1}" + ("'" if velocity else "")
+            want = -factor * row[i] * row[j] / model.mass[i]
+            column = 2 * j + velocity
+            out[name] = _entry(2 * i + 1, column, slope[2 * i + 1, column], want)
     return out
 
 

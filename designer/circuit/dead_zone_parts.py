@@ -14,7 +14,7 @@ from designer.base.errors import InputError
 from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
 from designer.catalog.parts_catalog import Catalog
-from designer.circuit.dead_zone_place import SUM, DeadZonePlace, part_of
+from designer.circuit.dead_zone_place import FEEDBACK, DeadZonePlace, part_of
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode, Part, Section
 from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
 from designer.circuit.resistors import Resistors
@@ -38,7 +38,7 @@ class DeadZoneStage:
     reference: ReferenceEntry | None = None
     """The reference of thresholds and constant forces; None where nothing needs one."""
     apart: frozenset[int] = frozenset()
-    """Clearances, by their place in the order, whose two halves have an output each."""
+    """Clearances, by their place in the order, whose halves have an output each."""
 
     @property
     def feeds(self) -> Mapping[int, str]:
@@ -88,6 +88,11 @@ class DeadZoneStage:
         if clearance.bend_of:
             found = f'"saturation", with bends of {clearance.bend_of}'
             expected = f"{_RECTIFIER}; an amplifier that clips makes a clearance alone"
+        elif clearance.damping:
+            found = f'"saturation", with damping in the stops of clearance {name}'
+            expected = (
+                f"{_RECTIFIER}; inside a clearance an amplifier that clips is never quite flat"
+            )
         elif any(stop.gap <= 0.0 for stop in stops):
             found = f'"saturation", with the stop of clearance {name} in contact at rest'
             expected = f"{_RECTIFIER}; an amplifier that clips is linear where nothing moves"
@@ -123,8 +128,11 @@ def dead_zone_stage(
     kind = stage_kind(spec, system.dead_zones)
     if kind == "rectifier":
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-        indices = range(len(system.dead_zones))
-        apart = frozenset(i for i in indices if all(part_of(i, name) in parts for name in SUM))
+        apart = frozenset(
+            index
+            for index, zone in enumerate(system.dead_zones)
+            if zone.damping or part_of(index, FEEDBACK) in parts
+        )
         return DeadZoneStage(kind, diode, reference, apart)
     if system.wired.constant.any():
         return DeadZoneStage(kind, None, catalog.reference(spec.reference))

@@ -15,8 +15,10 @@ from designer.model.clearance import Clearance
 
 OUTPUT = "fv"
 """Net of a stage's output where there is one clearance."""
-SUM = ("R210", "R211", "R212")
-"""Of the amplifier that sums both halves of a rectifier: of the upper, of the lower, feedback."""
+SUMMED = {1: "R210", -1: "R211"}
+"""Into the amplifier that sums the halves of a rectifier, by side: 1 upper, -1 lower."""
+FEEDBACK = "R212"
+"""Of that amplifier."""
 PLAIN = 5
 """Clearances whose numbers follow the paper's; further ones would meet those of inverters."""
 BEYOND = 2000
@@ -44,7 +46,8 @@ class DeadZonePlace:
     has the displacement's sign, unless something inverts it or its stiffness takes from a slope."""
     apart: bool = False
     """Whether each half of a rectifier has an output of its own, which an inverting amplifier
-    sums: a half then drives nothing of the other one, however unequal they are."""
+    sums: a half then drives nothing of the other one, however unequal they are, and the sum drives
+    a capacitor either way, as a diode cannot."""
 
     def part(self, first: str) -> str:
         """The name of a part that is called so in the first clearance's stage."""
@@ -80,20 +83,27 @@ class DeadZonePlace:
 
     @property
     def sum_resistors(self) -> tuple[str, ...]:
-        """Resistors of the amplifier that sums both halves, equal; none where they share their
-        output."""
-        return tuple(self.part(name) for name in SUM) if self.apart else ()
+        """Resistors of the amplifier that sums the halves, equal, the feedback last; none where
+        the halves drive the stage's output themselves."""
+        if not self.apart:
+            return ()
+        inputs = [name for side, name in SUMMED.items() if side in self.clearance.positions]
+        return tuple(self.part(name) for name in (*inputs, FEEDBACK))
 
     def summed(self, resistors: Resistors) -> list[Part]:
-        """The amplifier that sums both halves; nothing where they share their output."""
+        """The amplifier that sums the halves; nothing where they drive the stage's output."""
         if not self.apart:
             return []
         role, node = "sum of the dead zone", self.net("d3")
-        upper, lower, back = self.sum_resistors
+        *inputs, back = self.sum_resistors
+        halves = zip(inputs, self.clearance.positions, strict=True)
         return [
             Section(self.section("U3D"), node, GROUND, self.output, role),
-            *resistors(upper, self.half_output(1), node, role),
-            *resistors(lower, self.half_output(-1), node, role),
+            *(
+                p
+                for name, side in halves
+                for p in resistors(name, self.half_output(side), node, role)
+            ),
             *resistors(back, node, self.output, role),
         ]
 

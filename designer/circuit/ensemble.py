@@ -318,6 +318,7 @@ class Ensemble:
             room.ints,
             room.width,
             room.far,
+            bool(self.boards.circuit.dependent_capacitors),
             closely,
             room.unit,
             answers,

@@ -8,7 +8,7 @@ from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Sectio
 from designer.dynamics.piecewise_linear import ModeKey
 
 CLOSED = 1e3
-"""Conductance [S] of a capacitor at signal frequencies and of a diode that conducts."""
+"""Conductance [S] of the largest capacitor at signal frequencies and of a diode that conducts."""
 OPEN = 1e-15
 """Conductance [S] from every net to ground, so that none is without an answer."""
 
@@ -37,8 +37,9 @@ def feedback_share(circuit: Circuit, section: Section, key: ModeKey) -> float:
 
     for r in circuit.resistors:
         join(r.a, r.b, 1.0 / r.value)
+    largest = max((c.value for c in circuit.capacitors), default=1.0)
     for c in circuit.capacitors:
-        join(c.plus, c.minus, CLOSED)
+        join(c.plus, c.minus, CLOSED * c.value / largest)
     for reference in circuit.references:
         join(reference.cathode, reference.anode, CLOSED)
     positions = key[len(circuit.sections) :]

@@ -93,7 +93,8 @@ class Resistor:
 
 @dataclass(frozen=True)
 class Capacitor:
-    """A capacitor; its voltage, v(plus) - v(minus), is a state of the circuit."""
+    """A capacitor; its voltage, v(plus) - v(minus), is a state of the circuit, or follows from the
+    states (``Circuit.dependent_capacitors``)."""
 
     name: str
     """Its name in the circuit."""
@@ -321,6 +322,11 @@ class Circuit:
     @cached_property
     def capacitors(self) -> tuple[Capacitor, ...]:
         return tuple(p for p in self.parts if isinstance(p, Capacitor))
+
+    @cached_property
+    def dependent_capacitors(self) -> tuple[Capacitor, ...]:
+        """Those whose voltages the states decide: the dampers of stops."""
+        return tuple(c for c in self.capacitors if c.name not in self.states)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:

@@ -1,6 +1,8 @@
 """The modified nodal equations of a board, or of many at once, and what is read from them.
 
-Capacitors are voltage sources (their voltages are the states), op-amps either a virtual short
+Capacitors whose voltages are the states are voltage sources; one whose voltage follows from them
+carries C times its rate, which the states' rates say and which moves these in turn, so both are
+solved for together. Op-amps are either a virtual short
 v+ - v- + offset = v_out/gain or, at a limit, a fixed output voltage. Diodes carry no current or
 drop a constant voltage and that of their series resistance, without which a diode between two
 op-amps' outputs would have no answer.
@@ -104,21 +106,55 @@ class NodalEquations:
 
     def solved(self, key: ModeKey, solver: Solver) -> Solution:
         """What holds in a mode, its equations solved by ``solver``."""
-        return self.solution(solver(*self.of(key), key))
+        return self.answer(*self.of(key), key, solver)
+
+    def answer(self, G: Array, right: Array, key: ModeKey, solver: Solver) -> Solution:
+        """What holds where G y = right, with the currents of the dependent capacitors.
+
+        Such a capacitor joins outputs, which its current does not move, to summing nodes, and the
+        generator drives neither at once: so its voltage is a function of the states alone, of
+        those that are capacitors' voltages.
+        """
+        dependent, n = self.circuit.dependent_capacitors, len(self.circuit.states)
+        if not dependent:
+            return self.solution(solver(G, right, key))
+        columns = right.shape[-1]
+        amperes = np.zeros((*right.shape[:-1], len(dependent)))
+        for k, cap in enumerate(dependent):
+            for net, sign in ((cap.plus, -1.0), (cap.minus, 1.0)):
+                if net != GROUND:
+                    amperes[..., self._nets[net], k] = sign
+        y = solver(G, np.concatenate([right, amperes], axis=-1), key)
+        wide = self.solution(y)
+        rates = self.capacitor_rates(wide)
+        farads = np.stack([np.asarray(self.board.values[cap.name]) for cap in dependent], axis=-1)
+        across = np.stack(
+            [wide.voltage[cap.plus] - wide.voltage[cap.minus] for cap in dependent], axis=-2
+        )
+        # i = C d/dt(across), and the rates are rates[known] + rates[own] i.
+        slope = farads[..., None] * np.einsum("...ki,...ij->...kj", across[..., :n], rates)
+        own = np.eye(len(dependent)) - slope[..., columns:]
+        current = np.linalg.solve(own, slope[..., :columns])
+        more = np.einsum("...yk,...kj->...yj", y[..., columns:], current)
+        return self.solution(y[..., :columns] + more)
 
     def solution(self, y: Array) -> Solution:
         """y (..., size, n + 2) by names."""
         c, first = self.circuit, self._first
         voltage = {net: y[..., i, :] for net, i in self._nets.items()}
-        voltage[GROUND] = np.zeros((*self.lead, len(self.states) + 2))
+        voltage[GROUND] = np.zeros((*self.lead, y.shape[-1]))
         # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
-        amps = {cap.name: y[..., i, :] for i, cap in enumerate(c.capacitors, first["capacitors"])}
+        amps = {cap: y[..., i, :] for i, cap in enumerate(c.states, first["states"])}
         amps |= {d.name: y[..., i, :] for i, d in enumerate(self._diodes, first["diodes"])}
         out = {s.name: -y[..., i, :] for i, s in enumerate(self._sections, first["sections"])}
         return Solution(voltage, amps, out)
 
     def rates(self, key: ModeKey, solved: Solution) -> Array:
         """(..., n, n + 2): how fast each state changes in a mode."""
+        return self.capacitor_rates(solved)
+
+    def capacitor_rates(self, solved: Solution) -> Array:
+        """(..., c, n + 2): how fast the voltage of each of the c state capacitors changes."""
         values = self.board.values
         names = self.circuit.states
         rows = [solved.current[name] / np.asarray(values[name])[..., None] for name in names]
@@ -239,9 +275,10 @@ class NodalEquations:
                 if here != GROUND:
                     stamp(self._nets[here], here, g)
                     stamp(self._nets[here], there, -g)
-        for i, cap in enumerate(c.capacitors, nodes):
-            source(i, cap.plus, cap.minus)
-            right[..., i, c.states.index(cap.name)] = 1.0
+        capacitors = {cap.name: cap for cap in c.capacitors}
+        for k, name in enumerate(c.states):
+            source(nodes + k, capacitors[name].plus, capacitors[name].minus)
+            right[..., nodes + k, k] = 1.0
         for i, s in enumerate(c.sections, first["sections"]):
             current(s.output, i, 1.0)
             for net in (s.inverting, s.noninverting):
@@ -271,7 +308,7 @@ def plus(row: Array, constant: Any) -> Array:
 def _layout(circuit: Circuit, nodes: int) -> Mapping[str, int]:
     """First unknown of each group of branches; the nets' voltages come before them all."""
     groups = {
-        "capacitors": circuit.capacitors,
+        "states": circuit.states,
         "sections": circuit.sections,
         "diodes": circuit.diodes,
         "references": circuit.references,

@@ -90,7 +90,7 @@ class LaggingEquations(NodalEquations):
         G, right = self.of(key)
         self._delay(key, self.circuit.sections, static, speeds, right)
         self._charge(key, static, speeds, right)
-        return self.solution(solver(G, right, key))
+        return self.answer(G, right, key, solver)
 
     def rates(self, key: ModeKey, solved: Solution) -> Array:
         """As of ``NodalEquations``, with the outputs that cross."""
@@ -126,7 +126,7 @@ class LaggingEquations(NodalEquations):
         """What holds in a mode without any lag."""
         known = self._static.get(key)
         if known is None:
-            known = self._static[key] = self.solution(self._solver(*self.of(key), key))
+            known = self._static[key] = self.answer(*self.of(key), key, self._solver)
         return known
 
     def _guided(self, key: ModeKey) -> Solution:
@@ -138,7 +138,7 @@ class LaggingEquations(NodalEquations):
             G, right = self.of(key)
             others = [s for s in self.circuit.sections if s not in self._swinging]
             self._delay(key, others, static, self._rates(key, static, static), right)
-            known = self._guiding[key] = self.solution(self._solver(G, right, key))
+            known = self._guiding[key] = self.answer(G, right, key, self._solver)
         return known
 
     def _delay(
@@ -168,7 +168,7 @@ class LaggingEquations(NodalEquations):
 
     def _rates(self, key: ModeKey, solved: Solution, guiding: Solution) -> Array:
         """(..., n, n + 2): capacitors by ``solved``, outputs that cross by ``guiding``."""
-        capacitors = super().rates(key, solved)
+        capacitors = self.capacitor_rates(solved)
         if not self._swinging:
             return capacitors
         rows = [
@@ -189,7 +189,7 @@ class LaggingEquations(NodalEquations):
     def _slaved(self, section: Section, guiding: Solution) -> Array:
         """(..., n + 2) rate of an output that follows the static equations: what strays from them
         dies out as fast as the fastest capacitor changes."""
-        capacitors = super().rates((), guiding)
+        capacitors = self.capacitor_rates(guiding)
         n = capacitors.shape[-2]
         row = guiding.voltage[section.output]
         rate = np.einsum("...i,...ij->...j", row[..., :n], capacitors)

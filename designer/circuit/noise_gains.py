@@ -27,10 +27,10 @@ class SectionStage:
     integrates: bool
     """Whether a capacitor closes its loop."""
     gain: float
-    """Noise gain of a ratio stage; for an integrator 1."""
+    """Noise gain of a ratio stage; of an integrator that of its capacitors, 1 where it has one."""
     corner: float
-    """Frequency [Hz] of an integrator by which its noise gain times frequency exceeds the
-    frequency; 0 for a ratio stage."""
+    """Frequency [Hz] of an integrator by which its noise gain times frequency exceeds ``gain``
+    times the frequency; 0 for a ratio stage."""
 
     def bandwidth(self, frequency: float) -> float:
         """Noise gain times frequency [Hz], both at this frequency [Hz]."""
@@ -46,16 +46,17 @@ def stages(circuit: Circuit) -> Iterator[SectionStage]:
         at_node = [w for w in wires if node in (w.a, w.b)]
         total = sum(w.siemens for w in at_node)
         back = sum(w.siemens for w in at_node if w.other(node) in outputs)
-        farads = sum(
-            c.value
-            for c in circuit.capacitors
-            if node in c.nets and (set(c.nets) - {node}) <= outputs
-        )
+        there = [c for c in circuit.capacitors if node in c.nets]
+        farads = sum(c.value for c in there if (set(c.nets) - {node}) <= outputs)
         yield SectionStage(
             section=s,
             outputs=outputs,
             load=loads[s.name],
             integrates=farads > 0.0,
-            gain=1.0 if farads > 0.0 else total / back if back > 0.0 else float("inf"),
+            gain=sum(c.value for c in there) / farads if farads > 0.0 else _ratio(total, back),
             corner=total / (2.0 * np.pi * farads) if farads > 0.0 else 0.0,
         )
+
+
+def _ratio(total: float, back: float) -> float:
+    return total / back if back > 0.0 else float("inf")

@@ -86,7 +86,7 @@ class Reduction:
             velocity=velocity,
             mirror=self._equations.mirror if self._even() else None,
             reflection=self._equations.mirror,
-            continuous=self._equations.states == c.states,
+            continuous=self._equations.states == c.states and not c.dependent_capacitors,
             working=c.working,
         )
 

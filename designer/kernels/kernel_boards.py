@@ -256,6 +256,7 @@ def respond_all(
     ints: Int,
     width: int,
     far: int,
+    leaps: bool,
     closely: bool,
     unit: Unit,
     answers: Answers,
@@ -263,8 +264,8 @@ def respond_all(
     """Each of E questions: board which[e] under drives[e] from starts[e].
 
     which : (E,); drives : (E, 4) as ``DrivenModes.drive``; starts : (E, n). stages : of settling,
-    after which a question is left to the caller. data, ints, width, far, closely, unit : as of
-    ``DrivenModes``.
+    after which a question is left to the caller. data, ints, width, far, leaps, closely, unit : as
+    of ``DrivenModes``.
     """
     n = len(unit)
     trail = RunTrail(
@@ -284,7 +285,7 @@ def respond_all(
         if not same:
             ints[:, FILLED] = 0
         driven = DrivenModes(
-            modes, which[e], drives[e], data, ints, width, far, False, closely, unit
+            modes, which[e], drives[e], data, ints, width, far, leaps, closely, unit
         )
         period = 2.0 * np.pi / drives[e, 0]
         board = DrivenBoard(driven, period, anchors, trail, missing)

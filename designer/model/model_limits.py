@@ -114,7 +114,7 @@ LIMITS = (
     ModelLimit(
         "damping in the stops",
         "`C0`",
-        f"format = 2, damping of a [[clearance]], which no circuit makes; {_REWRITTEN}",
+        f"format = 2, damping or restitution of a [[clearance]]; {_REWRITTEN}",
         (1,),
         keys=r"[Cc]_?0",
     ),
@@ -162,8 +162,8 @@ LIMITS = (
     ModelLimit(
         "a coefficient of restitution, but as restitution of a [[clearance]] of format 2",
         "`restitution`",
-        "restitution of a [[clearance]] of format 2, whose stops have a stiffness; no circuit "
-        "makes it",
+        "restitution of a [[clearance]] of format 2, whose stops have a stiffness, or their "
+        "damping",
         tables=r"restitution|impacts?",
         keys=r"\w*restitution\w*|cor|e|rigid",
     ),

@@ -97,7 +97,7 @@ def write(
     ]
     lines += _sources(circuit, board, rung)
     lines += resistors(circuit, board)
-    lines += capacitors(circuit, board, initial)
+    lines += capacitors(circuit, board, initial, drive.offset)
     lines += diodes(circuit, charge=rung != "ideal")
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
     lines += [
@@ -209,14 +209,35 @@ def resistors(circuit: Circuit, board: Board) -> list[str]:
     return [f"{r.name} {r.a} {r.b} {literal(board.values[r.name])}" for r in circuit.resistors]
 
 
-def capacitors(circuit: Circuit, board: Board, initial: Array | None) -> list[str]:
-    """The element lines of the capacitors, with their voltages at t = 0."""
-    start = dict(zip(circuit.states, initial if initial is not None else (), strict=False))
+def capacitors(
+    circuit: Circuit, board: Board, initial: Array | None, generator: float
+) -> list[str]:
+    """The element lines of the capacitors, with their voltages at t = 0. generator : its voltage
+    then [V]."""
+    states = np.zeros(len(circuit.states)) if initial is None else initial
+    start = dict(zip(circuit.states, states, strict=True))
+    start |= _following(circuit, board, states, generator)
     return [
         f"{c.name} {c.plus} {c.minus} {literal(board.values[c.name])} "
         f"IC={literal(start.get(c.name, 0.0))}"
         for c in circuit.capacitors
     ]
+
+
+def _following(circuit: Circuit, board: Board, states: Array, generator: float) -> dict[str, float]:
+    """Voltages of the capacitors that follow from the states; 0 V where no mode holds at these."""
+    if not circuit.dependent_capacitors:
+        return {}
+    reduction = Reduction(circuit, board)
+    try:
+        voltage = reduction.solution(reduction.system().mode_at(states, generator)).voltage
+    except ArithmeticError:
+        return {}
+    inputs = np.concatenate([states, [generator, 1.0]])
+    return {
+        c.name: float((voltage[c.plus] - voltage[c.minus]) @ inputs)
+        for c in circuit.dependent_capacitors
+    }
 
 
 def diode_names(circuit: Circuit) -> dict[str, str]:

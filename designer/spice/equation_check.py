@@ -222,8 +222,9 @@ def _impedance(
     for zone, side in zip(model.dead_zones, sides, strict=True):
         if side:
             row = model.displacement(zone)
-            stiffness = dict(zone.sides)[side].stiffness
-            terms.append((stiffness * np.outer(row, row)).astype(complex))
+            both = np.outer(row, row)
+            terms.append((dict(zone.sides)[side].stiffness * both).astype(complex))
+            terms.append(1j * omega * zone.damping * both)
     return terms, np.linalg.solve(sum(terms), drive_of(model).astype(complex))
 
 

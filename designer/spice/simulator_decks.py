@@ -103,7 +103,7 @@ def _block(circuit: Circuit, board: Board, run: ResponseRun, number: int, count:
         # Half a turn of phase, so that the model's sine and the circuit agree (``Excitation``).
         f"{circuit.generator.name} {circuit.generator.net} 0 "
         f"SIN({literal(drive.offset)} {literal(-drive.amplitude)} {literal(drive.frequency)})",
-        *deck.capacitors(circuit, board, run.initial),
+        *deck.capacitors(circuit, board, run.initial, run.excitation.offset),
         f".tran {step} {literal(run.stop_time)} 0 {step} uic",
     ]
     state = "switched on" if first else "switched off: a star stands before each line"

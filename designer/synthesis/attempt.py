@@ -103,7 +103,8 @@ class Order:
         Unreachable : no value of the series can be bought.
         """
         opamp = catalog.opamp(spec.opamp)
-        stage = replace(dead_zone_stage(model, spec, catalog), apart=apart)
+        stage = dead_zone_stage(model, spec, catalog)
+        stage = replace(stage, apart=stage.apart | apart)
         unit = unit_circuit(model, spec, catalog, stage)
         resistors = buyable("resistor", spec, catalog)
         capacitors = buyable("capacitor", spec, catalog)
@@ -250,7 +251,7 @@ def attempt(
 
     thrifty : take values that the linear block has for whatever only sets a level.
     """
-    values = _bought(order, linear)
+    values = _bought(order, linear.values)
     inverters = _inverters(order, limits, values, thrifty)
     if isinstance(inverters, Shortfall):
         return inverters
@@ -266,13 +267,13 @@ def completed(
 ) -> Attempt | Shortfall:
     """A circuit with this linear block and these stages, whose resistors that only set a level are
     still to be chosen; or what leaves none."""
-    values = _bought(order, linear)
+    values = _bought(order, linear.values)
     inverters = _inverters(order, limits, values, thrifty=False)
     if isinstance(inverters, Shortfall):
         return inverters
     values |= inverters
     if stages is not None:
-        own = {name: nearest(order.resistors, value) for name, value in stages.values.items()}
+        own = _bought(order, stages.values)
         whole = all_stages.with_levels(_question(order, limits), values, own)
         if isinstance(whole, str):
             return Shortfall(whole, False)
@@ -280,11 +281,11 @@ def completed(
     return _driven(order, limits, linear, stages, values, thrifty=False)
 
 
-def _bought(order: Order, linear: LinearBlock) -> dict[str, float]:
-    """The values of a linear block as the catalogue has them."""
+def _bought(order: Order, values: Mapping[str, float]) -> dict[str, float]:
+    """Chosen values as the catalogue has them."""
     return {
         name: nearest(order.resistors if name.startswith("R") else order.capacitors, value)
-        for name, value in linear.values.items()
+        for name, value in values.items()
     }
 
 

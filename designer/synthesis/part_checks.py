@@ -104,14 +104,6 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
         )
         raise InputError(None, "force.phase", "forces of another phase than the drive", expected)
     for clearance in system.clearances:
-        if clearance.damping:
-            raise InputError(
-                None,
-                f"clearance {clearance.name}.damping",
-                clearance.damping,
-                "none for a circuit, restitution neither: a force that jumps at the contact has no "
-                "stage; the dissipation of short contacts is near that of larger [[damper]] values",
-            )
         jumps = [stop.jump for _, stop in clearance.sides if stop.jump]
         if jumps:
             raise InputError(
@@ -138,17 +130,25 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
             "changes with the frequency",
         )
     zones = system.dead_zones
+    for zone in zones:
+        if zone.damping and len({stop.stiffness for _, stop in zone.sides}) > 1:
+            raise InputError(
+                None,
+                f"clearance {zone.name}.damping",
+                zone.damping,
+                "for a circuit stops of one stiffness, or a [[clearance]] for each: one capacitor "
+                "damps both",
+            )
     if len(zones) > MOST_DEAD_ZONES:
         raise InputError(None, "circuit", *_too_many(system))
     refusal = stage_refusal(zones, stage_kind(spec, zones))
     if refusal is not None:
         raise refusal
-    limiting = [zone.bend_of for zone in zones if zone.limits]
+    scaled = [f"a force that limits ({zone.bend_of})" for zone in zones if zone.limits]
+    scaled += [f"stops with damping ({zone.name})" for zone in zones if zone.damping]
     for key, value in (("most_values", spec.most_values), ("matched", spec.matched)):
-        if limiting and value:
-            expected = (
-                f"none beside a force that limits ({limiting[0]}): its parts are chosen by scales"
-            )
+        if scaled and value:
+            expected = f"none beside {scaled[0]}: the parts are chosen by scales"
             raise InputError(None, f"circuit.{key}", value, expected)
 
 

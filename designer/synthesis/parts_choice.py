@@ -205,8 +205,9 @@ class _Search:
     def by_scales(self) -> bool:
         """Whether scales are chosen before values: for all but one clearance of two masses that
         joins search as a whole, unless the least error or the fewest values are asked for. What
-        limits is always chosen so."""
-        if any(zone.limits for zone in self.order.model.second_order().dead_zones):
+        limits, and stops with damping, are always chosen so."""
+        zones = self.order.model.second_order().dead_zones
+        if any(zone.limits or zone.damping for zone in zones):
             return True
         return self.order.spec.objective != "match" and not (self.whole_by_joins or self._asked)
 

@@ -128,12 +128,12 @@ class ExponentialSum:
 
 @dataclass(frozen=True)
 class Row:
-    """A resistor that follows from z."""
+    """A resistor, or a damper's capacitor, that follows from z."""
 
     names: tuple[str, ...]
     """Parts that have this value."""
     log: Affine
-    """Its logarithm [ohm]."""
+    """Its logarithm [ohm, F]."""
     values: Array
     """Logarithms of the values that it may have, ascending."""
     size: float = 1.0
@@ -502,6 +502,26 @@ class _Maker:
                 self._lift(names, sides, own + float(np.log(room)), idle)
         if clearance.other is not None:
             self._reaction(place)
+        if clearance.damping:
+            self._damper(place)
+
+    def _damper(self, place: DeadZonePlace) -> None:
+        """The capacitors beside the force resistors: R C is the stop's damping over its
+        stiffness."""
+        clearance = place.clearance
+        seconds = self.time + float(np.log(clearance.damping / clearance.first.stiffness))
+        name = place.part("R51")
+        values = np.log(np.sort(self.order.capacitors))
+        ends = [("C50", self.part(place.part("R50")))]
+        ends += [("C51", row.log) for row in self.rows if row.names == (name,)]
+        for first, force in ends:
+            capacitor, log = place.part(first), seconds - force
+            for word, most in (("the least", False), ("the largest", True)):
+                value = float(np.exp(values[-1 if most else 0]))
+                what = f"{capacitor}, {word}"
+                limit = StatedLimit("capacitor_range", what, value, "F", least=not most)
+                self._keep(log, limit)
+            self.rows.append(Row((capacitor,), log, values))
 
     def _lift(
         self,
@@ -605,10 +625,12 @@ class _Maker:
         most = -float(np.log(hertz))
         store = [c for c in circuit.capacitors if node in c.nets]
         if store:
-            own = self.part(store[0].name) + float(np.log(2.0 * np.pi))
-            logs = [-known[r.name] - own + most for r in at]
+            own = next(self.part(c.name) for c in store if c.name in circuit.states)
+            corner = own + float(np.log(2.0 * np.pi))
+            logs = [-known[r.name] - corner + most for r in at]
+            logs += [known[c.name] - own + frequency + most for c in store]
             if "bandwidth" in conditions:
-                yield ExponentialSum((frequency + most, *logs), product)
+                yield ExponentialSum(tuple(logs), product)
             return
         back = [r for r in at if (set(r.nets) - {node}) & outputs]
         if len(back) != 1:

@@ -118,8 +118,8 @@ class Statics:
         return moved / len(ways)
 
     def _section_rows(self) -> list[int]:
-        """The row of each section's own equation, behind nets and capacitors."""
-        first = len(self.circuit.nets) + len(self.circuit.capacitors)
+        """The row of each section's own equation, behind nets and state capacitors."""
+        first = len(self.circuit.nets) + len(self.circuit.states)
         return [first + i for i in range(len(self.circuit.sections))]
 
 

@@ -28,8 +28,8 @@ from tests.shared.exact_circuits import STAGE, Scale, exact_circuit, unit_volts
 
 
 def random_system(seed: int) -> SecondOrderSystem:
-    """1 to 3 masses, 0 to 2 clearances of any kind, some of them in steps, 0 to 2 laws that rise
-    and fall, forces of both signs or a moving base."""
+    """1 to 3 masses, 0 to 2 clearances of any kind, some of them in steps or with damping, 0 to 2
+    laws that rise and fall, forces of both signs or a moving base."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 4))
     mass = rng.uniform(0.5, 2.0, n)
@@ -60,6 +60,7 @@ def random_system(seed: int) -> SecondOrderSystem:
             )
         )
     clearances = [_in_steps(stop) if rng.integers(0, 4) == 0 else stop for stop in clearances]
+    clearances = [_damped(stop, rng) if rng.integers(0, 3) == 0 else stop for stop in clearances]
     laws = tuple(_random_law(f"L{k}", n, rng) for k in range(max(int(rng.integers(-2, 3)), 0)))
     moving = bool(rng.integers(0, 2))
     force = np.zeros(n) if moving else rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 0.0, 1.0], n)
@@ -102,6 +103,17 @@ def _in_steps(stop: Clearance) -> Clearance:
     upper = stop.upper and replace(stop.upper, further=((0.2, 1.5),), preload=0.2, rise=0.1)
     lower = stop.lower and replace(stop.lower, further=((0.15, 2.5),))
     return replace(stop, upper=upper, lower=lower)
+
+
+def _damped(stop: Clearance, rng: np.random.Generator) -> Clearance:
+    """With a damper in its stops, which begin with one stiffness."""
+    if len({end.springs[0][1] for _, end in stop.sides}) > 1:
+        upper, lower = (
+            end and replace(end, stiffness=5.0, preload=0.0, rise=0.0)
+            for end in (stop.upper, stop.lower)
+        )
+        stop = replace(stop, upper=upper, lower=lower)
+    return replace(stop, damping=float(rng.uniform(0.1, 1.0)))
 
 
 def engaged(system: SecondOrderSystem, levels: Sequence[int]) -> tuple[int, ...]:
@@ -321,13 +333,18 @@ def test_names_follow_the_rule() -> None:
 
 def test_each_error_is_named() -> None:
     """2 % on one part shows in the coefficient that it makes."""
-    circuit = exact_circuit(two(constant=np.array([0.2, 0.0])), SCALE)
+    clearances = two().clearances
+    damped = (clearances[0], replace(clearances[1], damping=0.4))
+    system = two(constant=np.array([0.2, 0.0]), clearances=damped)
+    circuit = exact_circuit(system, SCALE)
     for part, name in (
         ("R304", None),
         ("R301", "gap B upper"),
         ("R204", "gap A lower"),
         ("R205", "lower stop slope A"),
         ("R61", "stop slope B x2' x1"),
+        ("C60", "stop damping B"),
+        ("C61", "stop damping B x2' x1'"),
         ("R160", "constant x1"),
     ):
         if name is None:
@@ -335,7 +352,7 @@ def test_each_error_is_named() -> None:
             continue
         board = nominal_board(circuit, ideal=True)
         off = replace(board, values={**circuit.values, part: 1.02 * circuit.values[part]})
-        errors = coefficient_errors(circuit, two(constant=np.array([0.2, 0.0])), off).errors
+        errors = coefficient_errors(circuit, system, off).errors
         assert max(abs(e) for e in errors.values()) > 2e-3
         assert abs(errors[name]) > 2e-3
 

@@ -20,8 +20,13 @@ from tests.circuit.test_reduction import EXACT, OPAMP, circuit_of, small
 GBW = 2.0 * np.pi * OPAMP.gbw.nominal
 
 
-def amplifiers(ratio: float) -> Circuit:
-    """An integrator (1 MΩ, 1 nF) of an inverter of its own output: x' = -ratio x/RC."""
+BESIDE = 0.4e-9
+"""Farad from y to the summing node, where there is one: x' = -ratio x/((1 + 0.4 ratio) RC)."""
+
+
+def amplifiers(ratio: float, beside: float = 0.0) -> Circuit:
+    """An integrator (1 MΩ, 1 nF) of an inverter of its own output: x' = -ratio x/RC. beside : a
+    capacitor [F] beside its input resistor."""
     parts: list[Part] = [
         Section("U1A", "s", "0", "x", "integrator"),
         Capacitor("C1", "x", "s", 1e-9, "integrator"),
@@ -33,18 +38,20 @@ def amplifiers(ratio: float) -> Circuit:
         Resistor("R4", "z", "j", 10e3, "inverter"),
         Resistor("R5", "j", "y", 10e3, "inverter"),
         Resistor("R6", "in", "s", 1e9, "drive"),
+        *([Capacitor("C50", "y", "s", beside, "damper")] if beside else []),
     ]
     return replace(small(parts, ("C1",)), figures=OPAMP)
 
 
+@pytest.mark.parametrize("beside", [0.0, BESIDE])
 @pytest.mark.parametrize("ratio", [0.5, 5.0])
-def test_the_rate_is_the_slow_pole_of_one_pole_op_amps(ratio: float) -> None:
+def test_the_rate_is_the_slow_pole_of_one_pole_op_amps(ratio: float, beside: float) -> None:
     """Against the full order: each op-amp w' = 2 pi GBW (v+ - v-), an output resistance behind w.
 
     The error is of second order: with a tenth of the bandwidth it is a hundred times as large."""
     errors = []
     for slower in (1.0, 10.0):
-        circuit = amplifiers(ratio)
+        circuit = amplifiers(ratio, beside)
         names = [s.name for s in circuit.sections]
         board = replace(
             nominal_board(circuit, ideal=True),
@@ -52,19 +59,21 @@ def test_the_rate_is_the_slow_pole_of_one_pole_op_amps(ratio: float) -> None:
         )
         system = Reduction(circuit, board, bandwidth=True).system()
         rate = float(system.mode(system.start).A[0, 0])
-        poles = np.linalg.eigvals(full_order(ratio, GBW / slower))
+        poles = np.linalg.eigvals(full_order(ratio, GBW / slower, beside))
         exact = float(poles[np.abs(poles).argmin()].real)
-        static = -ratio / 1e-3
+        static = -ratio / (1.0 + ratio * beside / 1e-9) / 1e-3
         assert abs(rate - exact) < 0.1 * abs(static - exact)
         errors.append(abs(rate / exact - 1.0))
     assert errors[1] == pytest.approx(100.0 * errors[0], rel=0.3)
 
 
-def full_order(ratio: float, gbw: float) -> np.ndarray:
-    """(4, 4) of (vC, wA, wB, wC): node voltages by Kirchhoff, then each op-amp's own equation."""
+def full_order(ratio: float, gbw: float, beside: float = 0.0) -> np.ndarray:
+    """(4, 4) of (vC, wA, wB, wC): node voltages by Kirchhoff, then each op-amp's own equation. With
+    the capacitor beside the input resistor, whose voltage is a state here, (5, 5)."""
     nets = {name: i for i, name in enumerate("xsyziJ")}
     rout = OPAMP.output_resistance.nominal
-    G, right = np.zeros((7, 7)), np.zeros((7, 4))
+    size = 7 + bool(beside)
+    G, right = np.zeros((size, size)), np.zeros((size, size - 3))
 
     def wire(a: str, b: str | None, ohms: float) -> None:
         for here, there in ((a, b), (b, a)):
@@ -86,8 +95,13 @@ def full_order(ratio: float, gbw: float) -> np.ndarray:
     G[nets["x"], 6] += 1.0
     G[nets["s"], 6] -= 1.0
     G[6, nets["x"]], G[6, nets["s"]], right[6, 0] = 1.0, -1.0, 1.0
+    if beside:
+        G[nets["y"], 7] += 1.0
+        G[nets["s"], 7] -= 1.0
+        G[7, nets["y"]], G[7, nets["s"]], right[7, 4] = 1.0, -1.0, 1.0
     y = np.linalg.solve(G, right)
-    return np.array([y[6] / 1e-9, *(-gbw * y[nets[node]] for node in "siJ")])
+    rates = [y[6] / 1e-9, *(-gbw * y[nets[node]] for node in "siJ")]
+    return np.array([*rates, y[7] / beside] if beside else rates)
 
 
 def test_boards_together_are_each_alone_and_share_their_modes_ends() -> None:

@@ -71,16 +71,16 @@ REACH = {
     "new": 10_450,
     "simulate": 25_200,
     "bifurcation": 31_700,
-    "reproduce": 53_500,
-    "rules": 55_800,
-    "explore": 54_500,
-    "bench": 58_000,
-    "trade": 60_300,
+    "reproduce": 53_700,
+    "rules": 56_000,
+    "explore": 54_700,
+    "bench": 58_200,
+    "trade": 60_500,
     "export": 61_700,
     "synthesise": 63_000,
     "run": 65_000,
     "tolerance": 65_000,
-    "search": 67_500,
+    "search": 67_700,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 

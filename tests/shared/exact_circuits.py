@@ -96,6 +96,9 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
         for number, mass in masses:
             rate = abs(reference) / system.mass[mass] * volts[2 * mass + 1] * ramp
             values[f"R{number}"] = gain * own / rate
+            if clearance.damping:
+                share = clearance.damping / system.mass[mass] * volts[2 * mass + 1]
+                values[f"C{number}"] = C * share / own
     return values
 
 
@@ -131,7 +134,10 @@ def _linear_part(system: SecondOrderSystem) -> SecondOrderSystem:
 
 
 def exact_circuit(system: SecondOrderSystem, scale: Scale, stage: DeadZoneStage = STAGE) -> Circuit:
-    """The circuit of these values, its op-amps out of reach of their limits."""
+    """The circuit of these values, its op-amps out of reach of their limits. The halves of stops
+    with damping are apart, whatever the stage says."""
+    damped = {i for i, zone in enumerate(system.dead_zones) if zone.damping}
+    stage = replace(stage, apart=stage.apart | damped)
     force, linear = system.drive_force(system.own_frequency).tolist(), _linear_part(system)
     circuit = build.build(
         terms(linear.damping.tolist(), linear.stiffness.tolist(), force),

@@ -49,13 +49,14 @@ def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str,
         forces[place(force["on"])] += value_of(force.get("amplitude", 0.0))
         constants[place(force["on"])] += value_of(force.get("constant", 0.0))
     base = data.get("base", {})
+    masses = [value_of(mass["mass"]) for mass in data["mass"]]
     mechanism = Mechanism(
-        masses=[value_of(mass["mass"]) for mass in data["mass"]],
+        masses=masses,
         springs=links("spring", "stiffness"),
         dampers=links("damper", "damping"),
         forces=forces,
         omega=omega,
-        gaps=[_gap(table, *map(place, table["between"])) for table in data["clearance"]],
+        gaps=[_gap(table, masses, *map(place, table["between"])) for table in data["clearance"]],
         constants=constants,
         base=value_of(base.get("amplitude", 0.0)),
         fixed_stops=base.get("stops") == "fixed",
@@ -63,17 +64,24 @@ def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str,
     return mechanism, data["response"]
 
 
-def _gap(table: Mapping[str, Any], mass: int, other: int) -> Gap:
+def _gap(table: Mapping[str, Any], masses: list[float], mass: int, other: int) -> Gap:
     def springs(side: str) -> tuple[tuple[float, float], ...]:
         stiffness = table.get(f"{side}_stiffness", table.get("stiffness"))
         return ((value_of(table[side]), value_of(stiffness)),) if side in table else ()
 
+    damping = value_of(table.get("damping", 0.0))
+    if "restitution" in table:
+        # x'' + 2 d x' + w² x = 0 from the stop and back leaves exp(-d pi/sqrt(w² - d²)).
+        assert other == GROUND
+        decay = -math.log(table["restitution"]) / math.pi
+        w = math.sqrt(value_of(table["stiffness"]) / masses[mass])
+        damping = 2.0 * masses[mass] * w * decay / math.sqrt(1.0 + decay**2)
     return Gap(
         mass,
         other,
         springs("upper"),
         springs("lower"),
-        value_of(table.get("damping", 0.0)),
+        damping,
         value_of(table.get("preload", 0.0)),
     )
 

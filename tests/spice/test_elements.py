@@ -69,6 +69,12 @@ CASES = {
         "1-1-1",
         (clearance("A", "m1", "m2", upper=0.3, lower=0.3, stiffness=5.0), force()),
     ),
+    "with dampers in the stops": (
+        2,
+        1.2,
+        "1-1-1",
+        (clearance("A", "m1", "m2", upper=0.3, lower=0.3, stiffness=5.0, damping=0.5), force()),
+    ),
     "stiffening in steps": (
         1,
         1.2,

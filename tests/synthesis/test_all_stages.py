@@ -117,7 +117,8 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
 @pytest.mark.parametrize(
     ("change", "field", "text"),
     [
-        (("stiffness = 4.0", "stiffness = 4.0\ndamping = 0.1"), "clearance B.damping", "damper"),
+        (("upper_stiffness = 5.0", "damping = 0.1\nupper_stiffness = 5.0"), "clearance A.damping",
+         "for each"),
         (("stiffness = 4.0", "stiffness = 4.0\npreload = 0.1"), "clearance B.preload", "jumps"),
         (("[[response]]", "[base]\namplitude = 0.1\n[[response]]"), "base.amplitude", "ratio"),
         (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
