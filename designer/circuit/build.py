@@ -106,14 +106,14 @@ def build(
         if state % 2 and any(constants[state // 2 : state // 2 + 1]):
             parts += _constant(state // 2, -constants[state // 2], resistors)
     # A stage may work on a displacement's negative, whether or not a term needs that.
-    inverted = {*inverted_states(terms), *(p.inverted_state for p in places)}
-    for state in sorted(state for state in inverted if state is not None):
+    inverted = {*inverted_states(terms), *(s for p in places for s in p.inverted_states)}
+    for state in sorted(inverted):
         parts += _inverter(state, resistors)
     if any(t.source is None and t.inverted for t in terms):
         parts += _generator_inverse(resistors)
     stops: list[Stop] = []
     for place in places:
-        parts += place.between(resistors)
+        parts += place.around(resistors)
         stage_parts, stop = stage.parts(place, resistors, rails)
         parts += stage_parts
         stops.append(stop)
@@ -178,16 +178,14 @@ def _integrator(
     for place in places if state % 2 else ():
         bends = place.clearance.bend_of
         force = f"force of {bends} on M{mass + 1}" if bends else f"stop force on M{mass + 1}"
-        for end, own, source in (
-            (place.clearance.mass, "50", place.output),
-            (place.clearance.other, "51", place.reaction),
-        ):
-            if end != mass:
+        for each in place.forces:
+            if each.mass != mass:
                 continue
-            parts += resistors(place.part(f"R{own}"), source, node, force)
+            parts += resistors(each.resistor, each.source, node, force)
             if place.clearance.damping:
-                name = place.part(f"C{own}")
-                parts.append(Capacitor(name, source, node, values[name], f"damper of the {force}"))
+                name = each.capacitor
+                damper = f"damper of the {force}"
+                parts.append(Capacitor(name, each.source, node, values[name], damper))
     return parts
 
 

@@ -169,8 +169,8 @@ def _slopes(
 ) -> dict[str, _Coefficient]:
     """The force of each stop on each mass, by each displacement, velocity, or both."""
     clearance = zone.clearance
-    row = model.displacement(clearance)
-    masses = [i for i in (clearance.mass, clearance.other) if i is not None]
+    row, push = model.displacement(clearance), model.push(clearance)
+    pairs = [(i, j) for i, _ in clearance.pushed for j, _ in clearance.terms]
     stops = dict(clearance.sides)
     out = {}
     end = f" {clearance.name}" if several else ""
@@ -181,11 +181,11 @@ def _slopes(
         forces = [(kind, stiffness, clearance.quantity == "velocity")]
         if clearance.damping:
             forces.append(("stop damping", clearance.damping, True))
-        for (what, factor, velocity), i, j in product(forces, masses, masses):
+        for (what, factor, velocity), (i, j) in product(forces, pairs):
             name = f"{word}{what}{end}"
             if not i == j == clearance.mass:
                 name += f" x{i + 1}' x{j + 1}" + ("'" if velocity else "")
-            want = -factor * row[i] * row[j] / model.mass[i]
+            want = -factor * push[i] * row[j] / model.mass[i]
             column = 2 * j + velocity
             out[name] = _entry(2 * i + 1, column, slope[2 * i + 1, column], want)
     return out
@@ -279,7 +279,7 @@ def _constants(
     if lead is None:
         units = np.full(model.size, np.abs(model.drive_force(model.own_frequency)).max())
     else:
-        units = np.diag(model.spanning_stiffness) * abs(lead.first_gap[1])
+        units = np.abs(np.diag(model.spanning_stiffness)) * abs(lead.first_gap[1])
     return {
         f"constant x{i + 1}": float((forces[i] - model.constant[i]) / units[i])
         for i in np.flatnonzero(model.wired.constant).tolist()

@@ -93,6 +93,11 @@ class DeadZoneStage:
             expected = (
                 f"{_RECTIFIER}; inside a clearance an amplifier that clips is never quite flat"
             )
+        elif not clearance.plain:
+            found = (
+                f'"saturation", with clearance {name} of a combination, or pushed through couplings'
+            )
+            expected = f"{_RECTIFIER}; an amplifier that clips serves one mass, or two"
         elif any(stop.gap <= 0.0 for stop in stops):
             found = f'"saturation", with the stop of clearance {name} in contact at rest'
             expected = f"{_RECTIFIER}; an amplifier that clips is linear where nothing moves"
@@ -341,7 +346,7 @@ def reference_sign(place: DeadZonePlace, side: int, stop: Side) -> int:
 
 
 def _stop(place: DeadZonePlace, contacts: Mapping[int, Contact], parts: Sequence[Part]) -> Stop:
-    clearance = place.clearance
+    clearance, source = place.clearance, place.forces[0].source
     return Stop(
         clearance.name,
         f"C{clearance.watched + 1}",
@@ -352,6 +357,7 @@ def _stop(place: DeadZonePlace, contacts: Mapping[int, Contact], parts: Sequence
         place.difference,
         clearance.bend_of,
         clearance.limits,
+        "" if source == place.output else source,
     )
 
 

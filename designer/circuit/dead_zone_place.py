@@ -19,6 +19,8 @@ SUMMED = {1: "R210", -1: "R211"}
 """Into the amplifier that sums the halves of a rectifier, by side: 1 upper, -1 lower."""
 FEEDBACK = "R212"
 """Of that amplifier."""
+MOST_MASSES = 10
+"""That one clearance can be of, or push: their parts have numbers of their own."""
 PLAIN = 5
 """Clearances whose numbers follow the paper's; further ones would meet those of inverters."""
 BEYOND = 2000
@@ -30,6 +32,36 @@ def part_of(index: int, first: str) -> str:
     number = int(first[1:])
     step = 10 if number < 100 else 100
     return f"{first[0]}{number + step * index + (BEYOND if index >= PLAIN else 0)}"
+
+
+@dataclass(frozen=True)
+class SumInput:
+    """One input of the amplifier that sums displacements in front of a stage."""
+
+    resistor: str
+    """Name of its resistor."""
+    state: int
+    """Index of the state."""
+    factor: float
+    """With which it stands in the sum."""
+    inverted: bool
+    """Whether its negative is fed."""
+
+
+@dataclass(frozen=True)
+class StopForce:
+    """What a stage's output does to one mass."""
+
+    resistor: str
+    """Name of the resistor into the velocity's summing node."""
+    capacitor: str
+    """Name of the capacitor beside it, where the stops have damping."""
+    mass: int
+    """Index of the mass."""
+    factor: float
+    """Of the force, 1 of the first mass."""
+    source: str
+    """Net that drives both: the stage's output, or its negative."""
 
 
 @dataclass(frozen=True)
@@ -108,48 +140,75 @@ class DeadZonePlace:
         ]
 
     @property
-    def reaction(self) -> str:
-        """Net of the output's negative, which drives the other mass."""
-        return self.net("fvn")
+    def sums(self) -> bool:
+        """Whether an amplifier in front of the stage sums the displacements of several masses."""
+        return len(self.clearance.terms) > 1
+
+    @property
+    def inputs(self) -> tuple[SumInput, ...]:
+        """Of that amplifier, the first mass's first; none without it."""
+        if not self.sums:
+            return ()
+        clearance, sign = self.clearance, 1.0 if self.inverts else -1.0
+        numbers = ("R220", "R221", *(f"R{230 + k}" for k in range(MOST_MASSES)))
+        return tuple(
+            SumInput(self.part(name), clearance.state_of(mass), factor, sign * factor < 0.0)
+            for name, (mass, factor) in zip(numbers, clearance.terms, strict=False)
+        )
+
+    @property
+    def forces(self) -> tuple[StopForce, ...]:
+        """On each mass that the stops push, the first mass's first."""
+        return tuple(
+            StopForce(
+                self.part(f"R{50 + k}"),
+                self.part(f"C{50 + k}"),
+                mass,
+                factor,
+                self.output if factor > 0.0 else self.net("fvn"),
+            )
+            for k, (mass, factor) in enumerate(self.clearance.pushed)
+        )
 
     @property
     def displacement(self) -> str:
         """Net of the displacement in the clearance, or its negative where the stage inverts."""
         sign = "n" if self.inverts else ""
         own = f"v{self.clearance.watched + 1}"
-        return own + sign if self.clearance.other is None else self.net(f"z{sign}")
+        return self.net(f"z{sign}") if self.sums else own + sign
 
     @property
     def difference(self) -> tuple[str, int] | None:
         """``Stop.difference``."""
-        if self.clearance.other is None:
-            return None
-        return self.displacement, -1 if self.inverts else 1
+        return (self.displacement, -1 if self.inverts else 1) if self.sums else None
 
     @property
-    def inverted_state(self) -> int | None:
-        """Index of the state whose negative the stage needs; None where it needs none."""
-        own, other = self.clearance.watched, self.clearance.watched_other
-        if other is None:
-            return own if self.inverts else None
-        return other if self.inverts else own
+    def inverted_states(self) -> tuple[int, ...]:
+        """Indices of the states whose negatives the stage needs."""
+        if self.sums:
+            return tuple(each.state for each in self.inputs if each.inverted)
+        return (self.clearance.watched,) if self.inverts else ()
 
-    def between(self, resistors: Resistors) -> list[Part]:
-        """The amplifiers of a clearance between two masses: one subtracts the displacements, one
-        turns the stage's output for the other mass. None for a clearance to ground."""
-        if self.clearance.watched_other is None:
-            return []
-        own, other = f"v{self.clearance.watched + 1}", f"v{self.clearance.watched_other + 1}"
-        first, second = (own, f"{other}n") if self.inverts else (f"{own}n", other)
-        role = f"{self.clearance.quantity} in clearance {self.clearance.name}"
-        back, node, turned = "reaction on the other mass", self.net("dz"), self.net("df")
-        out = self.displacement
-        return [
-            Section(self.section("U4A"), node, GROUND, out, role),
-            *resistors(self.part("R220"), first, node, role),
-            *resistors(self.part("R221"), second, node, role),
-            *resistors(self.part("R222"), node, out, role),
-            Section(self.section("U4B"), turned, GROUND, self.reaction, back),
-            *resistors(self.part("R224"), self.output, turned, back),
-            *resistors(self.part("R225"), turned, self.reaction, back),
-        ]
+    def around(self, resistors: Resistors) -> list[Part]:
+        """The amplifiers beside the stage: one sums the displacements of several masses, one turns
+        the output for those that the stops push the other way."""
+        parts: list[Part] = []
+        if self.sums:
+            role = f"{self.clearance.quantity} in clearance {self.clearance.name}"
+            node, out = self.net("dz"), self.displacement
+            parts.append(Section(self.section("U4A"), node, GROUND, out, role))
+            for each in self.inputs:
+                source = f"v{each.state + 1}" + ("n" if each.inverted else "")
+                parts += resistors(each.resistor, source, node, role)
+            parts += resistors(self.part("R222"), node, out, role)
+        turned = [force.source for force in self.forces if force.factor < 0.0]
+        if turned:
+            plain = self.clearance.plain
+            back = "reaction on the other mass" if plain else "reaction on the other masses"
+            node, out = self.net("df"), turned[0]
+            parts += [
+                Section(self.section("U4B"), node, GROUND, out, back),
+                *resistors(self.part("R224"), self.output, node, back),
+                *resistors(self.part("R225"), node, out, back),
+            ]
+        return parts

@@ -148,15 +148,19 @@ class Design:
         return self._clearance_volts(volts[1::2])[orbit.impact_clearances]
 
     def _clearance_volts(self, volts: Array) -> Array:
-        """(clearances,) volts per unit in each clearance, of its first mass and the difference
-        amplifier before its stage. volts (masses,) : per unit of each mass."""
-        stops = self.model.second_order().clearances
-        return self.dead_zone_gains[: len(stops)] * volts[[stop.mass for stop in stops]]
+        """(clearances,) volts per unit in each clearance, of its first mass and the amplifier
+        before its stage. volts (masses,) : per unit of each mass."""
+        system = self.model.second_order()
+        count = len(system.clearances)
+        masses = [zone.mass for zone in system.dead_zones[:count]]
+        pairs = zip(system.clearances, masses, strict=True)
+        factors = [dict(stop.terms)[mass] for stop, mass in pairs]
+        return np.asarray(self.dead_zone_gains[:count] * volts[masses] / np.array(factors))
 
     @cached_property
     def dead_zone_gains(self) -> Array:
         """(dead zones,) volts of the displacement in each per volt of its first mass's: the gain
-        of a difference amplifier, 1 without one."""
+        of the amplifier that sums displacements, 1 without one."""
         reduction = Reduction(self.circuit, nominal_board(self.circuit, ideal=True))
         solved = reduction.solution(self.circuit.open)
         gains = []
@@ -172,7 +176,7 @@ class Design:
 
         number : index of the clearance.
         """
-        scales, clearance = self.errors.scales, self.model.second_order().clearances[number]
+        scales, clearance = self.errors.scales, self.model.second_order().dead_zones[number]
         volts = float(scales.volts[2 * clearance.mass])
         realised = {}
         for side, stop in clearance.sides:

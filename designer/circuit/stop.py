@@ -43,6 +43,14 @@ class Stop:
     """``Clearance.bend_of``."""
     limits: bool = False
     """``Clearance.limits``: the output changes between both contacts, and in none of them."""
+    inverse: str = ""
+    """Net of the output's negative, where that is what pushes the first mass; "" where it is the
+    output."""
+
+    @property
+    def driving(self) -> str:
+        """Net that pushes the first mass."""
+        return self.inverse or self.output
 
     @cached_property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:

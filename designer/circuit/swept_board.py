@@ -83,8 +83,10 @@ class BoardSubject:
         clearance = model.clearances[index]
         place = clearance.name if several else number
         name = f"the {word} stop of {place}" if several else f"the {word} stop ({place})"
-        masses = [mass for mass in (clearance.mass, clearance.other) if mass is not None]
+        masses = [mass for mass, _ in clearance.terms]
         velocity = " − ".join(subscripted(f"v{2 * mass + 2}") for mass in masses)
+        if clearance.combination:
+            velocity = f"the speed in {clearance.name}"
         return ShownStop(index, side, name, velocity)
 
     def check(self, option: str, name: str, value: float) -> None:

@@ -59,7 +59,7 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
     for stop in system.clearances:
         along = system.displacement(stop)
         force = np.zeros(size)
-        force[1::2] = system.over_mass(along)
+        force[1::2] = system.over_mass(system.push(stop))
         moves = system.ground(omega) if system.fixed_stops and stop.other is None else 0.0
         moves *= float(along.sum())
         rate = np.zeros(size)
@@ -74,7 +74,7 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
                 drags.append((0.0 if number else stop.damping) * np.outer(force, rate))
     for law in system.laws:
         along, force, watched = np.array(law.row), np.zeros(size), np.zeros(size + 1)
-        force[1::2] = system.over_mass(along)
+        force[1::2] = system.over_mass(system.push(law))
         watched[(0 if law.quantity == "displacement" else 1) : size : 2] = along
         for side, bends in law.bends.items():
             for place, change in bends:

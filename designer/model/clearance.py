@@ -101,6 +101,10 @@ class Clearance:
     combination: tuple[float, ...] = ()
     """(masses,) factors of the displacements in a sum, where it is neither one mass nor the
     difference of two; ``mass`` is then the one with the largest factor."""
+    push: tuple[float, ...] = ()
+    """(masses,) factors with which a force of the stops acts on the masses, where they are not
+    those of the displacements: of a system that had a mass matrix with couplings
+    (``SecondOrderSystem.with_couplings``)."""
 
     @classmethod
     def even(
@@ -133,16 +137,32 @@ class Clearance:
         return self.sides[0][1]
 
     @property
-    def watched(self) -> int:
-        """Index of the state that the gaps are gaps of, or of its first mass: x1, x1', x2, …"""
-        return 2 * self.mass + (self.quantity == "velocity")
+    def terms(self) -> tuple[tuple[int, float], ...]:
+        """(mass, factor) of the displacements in the sum that the gaps are gaps of, ``mass``
+        first."""
+        if self.combination:
+            return _with_first(self.mass, self.combination)
+        other = () if self.other is None else ((self.other, -1.0),)
+        return ((self.mass, 1.0), *other)
 
     @property
-    def watched_other(self) -> int | None:
-        """The same of the other mass; None for ground."""
-        if self.other is None:
-            return None
-        return 2 * self.other + (self.quantity == "velocity")
+    def pushed(self) -> tuple[tuple[int, float], ...]:
+        """(mass, factor) of the masses that a force of the stops acts on, ``mass`` first."""
+        return _with_first(self.mass, self.push) if self.push else self.terms
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is of one mass, or the difference of two, and pushes these alike."""
+        return not (self.combination or self.push)
+
+    @property
+    def watched(self) -> int:
+        """Index of the state that the gaps are gaps of, or of its first mass: x1, x1', x2, …"""
+        return self.state_of(self.mass)
+
+    def state_of(self, mass: int) -> int:
+        """Index of a mass's state of the kind that the gaps are gaps of."""
+        return 2 * mass + (self.quantity == "velocity")
 
     @property
     def falls(self) -> bool:
@@ -159,3 +179,9 @@ class Clearance:
         """The same with every length and preload ``factor`` times as large."""
         upper, lower = (stop and stop.scaled(factor) for stop in (self.upper, self.lower))
         return replace(self, upper=upper, lower=lower)
+
+
+def _with_first(mass: int, factors: tuple[float, ...]) -> tuple[tuple[int, float], ...]:
+    """(mass, factor) of those that are not 0, this mass first."""
+    there = [(i, factor) for i, factor in enumerate(factors) if factor]
+    return tuple(sorted(there, key=lambda term: term[0] != mass))

@@ -8,8 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
+import numpy as np
+
 from designer.base.errors import InputError
-from designer.model.clearance import Clearance, Side
+from designer.model.clearance import Clearance, Side, combined
 from designer.model.force_law import ForceLaw
 
 ROUNDING = 1e-9
@@ -24,42 +26,76 @@ def dead_zones(clearances: Sequence[Clearance], laws: Sequence[ForceLaw]) -> tup
 
     Raises
     ------
-    InputError : a law that depends on more than one mass or the difference of two.
+    InputError : a combination of displacements without a factor above 0.
     """
     first, further = [], list[Clearance]()
     for stop in clearances:
-        if stop.combination:
-            expected = "for a circuit one mass, or the difference of two"
-            raise InputError(None, f"clearance {stop.name}.of", "a combination", expected)
         springs = {side: end.springs for side, end in stop.sides}
         ends = {
             side: replace(Side(*springs[side][0]), preload=end.jump) for side, end in stop.sides
         }
         own = replace(stop, upper=ends.get(1), lower=ends.get(-1))
-        first.append(own)
+        first.append(_per_first_mass(own))
         like = replace(own, bend_of=stop.name, damping=0.0)
         further += _of_bends(like, {side: each[1:] for side, each in springs.items()}, 0.0)
     for law in laws:
         like, sign = _place_of(law)
         bends = {sign * side: each for side, each in law.bends.items()}
         further += _of_bends(like, bends, law.slope)
+    further = [_per_first_mass(each) for each in further]
     return (*first, *_with_names_of_their_own(first, further))
 
 
 def _place_of(law: ForceLaw) -> tuple[Clearance, int]:
     """A dead zone of what a law depends on, without ends, and the sign with which it does."""
-    places = [(i, factor) for i, factor in enumerate(law.row) if factor]
-    factors = sorted(factor for _, factor in places)
-    sign, other = 1, None
-    if factors == [-1.0, 1.0]:
-        mass, other = law.row.index(1.0), law.row.index(-1.0)
-    elif factors in ([1.0], [-1.0]):
-        mass, sign = places[0][0], int(factors[0])
-    else:
-        expected = "for a circuit one mass, or the difference of two"
-        raise InputError(None, f"law {law.name}", "a force on a combination", expected)
-    like = Clearance(law.name, mass, other, None, None, bend_of=law.name, quantity=law.quantity)
+    sign = 1 if max(law.row) > 0.0 else -1
+    row, push = sign * np.array(law.row), sign * np.array(law.push)
+    mass, other, combination = combined(row)
+    like = Clearance(
+        law.name, mass, other, None, None, bend_of=law.name, quantity=law.quantity,
+        combination=combination, push=tuple(push.tolist()),
+    )  # fmt: skip
     return like, sign
+
+
+def _per_first_mass(zone: Clearance) -> Clearance:
+    """The same with its displacement, and its force, as one mass has them: its factor in the sum
+    is 1, and that with which it is pushed 1 or -1."""
+    if zone.plain:
+        return zone
+    terms, pushed = dict(zone.terms), dict(zone.pushed)
+    able = [mass for mass, factor in terms.items() if factor > 0.0 and pushed.get(mass)]
+    if not able:
+        what = f"law {zone.bend_of}.of" if zone.bend_of else f"clearance {zone.name}.of"
+        expected = (
+            "for a circuit a factor above 0, of a mass that the force moves: the other signs, with "
+            "upper and lower exchanged, are the same clearance"
+        )
+        raise InputError(None, what, "a combination without one", expected)
+    mass = max(able, key=lambda each: (pushed[each] > 0.0, terms[each]))
+    factor, own = terms[mass], abs(pushed[mass])
+
+    def scaled(stop: Side | None) -> Side | None:
+        if stop is None:
+            return None
+        return Side(stop.gap / factor, factor * own * stop.stiffness, (), own * stop.preload)
+
+    size = max(len(zone.combination), len(zone.push))
+    row, push = (
+        tuple(each.get(i, 0.0) / by for i in range(size))
+        for each, by in ((terms, factor), (pushed, own))
+    )
+    first, other, combination = combined(np.array(row))
+    return replace(
+        zone,
+        mass=mass if combination else first,
+        other=other,
+        combination=combination,
+        push=() if push == row else push,
+        upper=scaled(zone.upper),
+        lower=scaled(zone.lower),
+        damping=factor * own * zone.damping,
+    )
 
 
 def _of_bends(

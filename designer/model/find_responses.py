@@ -252,12 +252,11 @@ class _Span:
         system = self.flow.system
         row = np.zeros(system.size + 1)  # over the states and the drive, without the gap
         if stop.bend_of:
-            row[stop.watched] = 1.0
-            if stop.watched_other is not None:
-                row[stop.watched_other] = -1.0
+            for mass, factor in stop.terms:
+                row[stop.state_of(mass)] = factor
         else:
             side, past = next(iter(system.contact_rows(index).items()))
-            row = side * past[:-1]
+            row = side * past[:-1] / abs(past[stop.watched])
         used = np.flatnonzero(row)
         if len(used) == 1 and used[0] < system.size and row[used[0]] == 1.0:
             return float(self.extremes[used[0], 0]), float(self.extremes[used[0], 1])

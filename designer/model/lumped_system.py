@@ -143,6 +143,8 @@ def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
         yield ("law.of" if law.between is None else "law.between"), joined_by(law)
     yield from (("cubic_spring.between", each.between) for each in system.cubic_springs)
     yield from (("friction.between", each.between) for each in system.frictions)
+    if system.matrices is not None:
+        yield from (("matrices", pair) for pair in system.matrices.coupled)
 
 
 def _check_gap(gap: Gap) -> None:
@@ -471,7 +473,7 @@ class LumpedSystem(Elements):
             matrix = stiffness if law.quantity == "displacement" else damping
             matrix += law.slope * np.outer(law.row, law.row)
             constant -= law.offset * np.array(law.row)
-        return SecondOrderSystem(
+        system = SecondOrderSystem(
             mass=np.array([mass.mass for mass in self.masses]),
             damping=damping,
             stiffness=stiffness,
@@ -486,16 +488,10 @@ class LumpedSystem(Elements):
             quadrature=quadrature,
             harmonics=tuple(HarmonicForce(k, *waves[k]) for k in sorted(waves)),
             laws=laws,
-            coupled_mass=self._coupled_mass,
         )
-
-    @property
-    def _coupled_mass(self) -> Array | None:
-        """The mass matrix where it is not diagonal."""
-        if self.matrices is None:
-            return None
-        matrix = self.matrices.mass_matrix
-        return None if not (matrix - np.diag(matrix.diagonal())).any() else matrix
+        if np.count_nonzero(self.mass_matrix) == n:
+            return system
+        return system.with_couplings(self.mass_matrix)
 
     def _force_laws(self) -> tuple[ForceLaw, ...]:
         """Of the elements whose force is not linear."""

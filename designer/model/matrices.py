@@ -125,6 +125,14 @@ class Matrices(FileTable):
         """(n, n) damping matrix."""
         return np.array(self.damping)
 
+    @property
+    def coupled(self) -> Iterator[tuple[str, str]]:
+        """The pairs of masses that an entry of one of the matrices couples."""
+        for matrix in (self.mass, self.stiffness, self.damping):
+            for name, row in zip(self.names, matrix, strict=False):
+                there = zip(self.names, row, strict=False)
+                yield from ((name, other) for other, entry in there if entry and other != name)
+
     def joints(self, matrix: Array, ground: str) -> Iterator[tuple[tuple[str, str], float]]:
         """What joins two masses, or a mass and ``ground``, and by how much: the springs, or
         dampers, that make a symmetric matrix. Its asymmetric part joins nothing."""

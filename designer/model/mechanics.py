@@ -76,8 +76,8 @@ class SecondOrderSystem:
     """Forces at multiples of the drive's frequency, one for each."""
     laws: tuple[ForceLaw, ...] = ()
     """Further forces. What they are at rest is in the matrices and in ``constant``."""
-    coupled_mass: Array | None = None
-    """(n, n) mass matrix where it is not diagonal; ``mass`` then is its diagonal."""
+    stated_frequency: float | None = None
+    """``own_frequency`` where the matrices do not say it (``with_couplings``)."""
 
     def __post_init__(self) -> None:
         if not len(self.constant):
@@ -90,21 +90,41 @@ class SecondOrderSystem:
         """Number of masses."""
         return len(self.mass)
 
-    @property
-    def mass_matrix(self) -> Array:
-        """(n, n) mass matrix."""
-        return np.diag(self.mass) if self.coupled_mass is None else self.coupled_mass
+    def with_couplings(self, mass_matrix: Array) -> SecondOrderSystem:
+        """The same motion as with this mass matrix (n, n), whose diagonal is ``mass``: every force
+        acts on each mass as much as it does through the couplings. The matrices are no longer
+        symmetric."""
+        through = self.mass[:, None] * np.linalg.inv(mass_matrix)
+
+        def push(element: Clearance | ForceLaw) -> tuple[float, ...]:
+            return tuple((through @ self.push(element)).tolist())
+
+        return replace(
+            self,
+            damping=through @ self.damping,
+            stiffness=through @ self.stiffness,
+            force=through @ self.force,
+            quadrature=through @ self.quadrature,
+            constant=through @ self.constant,
+            harmonics=tuple(
+                replace(wave, sine=through @ wave.sine, cosine=through @ wave.cosine)
+                for wave in self.harmonics
+            ),
+            clearances=tuple(replace(stop, push=push(stop)) for stop in self.clearances),
+            laws=tuple(replace(law, push=push(law)) for law in self.laws),
+            stated_frequency=self.own_frequency,
+        )
 
     def over_mass(self, forces: Array) -> Array:
         """(n,) or (n, k) accelerations that forces on the masses make."""
-        if self.coupled_mass is not None:
-            return np.asarray(np.linalg.solve(self.coupled_mass, forces))
         return np.asarray((forces.T / self.mass).T)
 
     @property
     def own_frequency(self) -> float:
         """Of the first mass on its own springs, the others held, in rad per unit of time; of a law
         its mean slope counts."""
+        if self.stated_frequency is not None:
+            return self.stated_frequency
         return float(np.sqrt(self.spanning_stiffness[0, 0] / self.mass[0]))
 
     @property
@@ -117,7 +137,7 @@ class SecondOrderSystem:
         more = np.zeros((self.size, self.size))
         for law in self.laws:
             if law.quantity == quantity:
-                more += (law.mean_slope - law.slope) * np.outer(law.row, law.row)
+                more += (law.mean_slope - law.slope) * np.outer(self.push(law), law.row)
         return more
 
     @property
@@ -147,11 +167,10 @@ class SecondOrderSystem:
         own = (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
         waves = {wave.order: np.stack([wave.sine, wave.cosine]) for wave in own}
         if self.ground_moves:
-            inertia = self.mass_matrix.sum(axis=1)
             for n, *parts in self.base_shape:
                 acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
                 before = waves.get(n, np.zeros((2, self.size)))
-                waves[n] = before + np.outer(np.array(parts) * acceleration, inertia)
+                waves[n] = before + np.outer(np.array(parts) * acceleration, self.mass)
         return tuple(HarmonicForce(n, *waves[n]) for n in sorted(waves))
 
     @property
@@ -188,13 +207,18 @@ class SecondOrderSystem:
 
     def displacement(self, clearance: Clearance) -> Array:
         """(n,) row over the masses' displacements that gives the one in a clearance."""
-        if clearance.combination:
-            return np.array(clearance.combination)
         row = np.zeros(self.size)
-        row[clearance.mass] = 1.0
-        if clearance.other is not None:
-            row[clearance.other] = -1.0
+        for mass, factor in clearance.terms:
+            row[mass] = factor
         return row
+
+    def push(self, element: Clearance | ForceLaw) -> Array:
+        """(n,) factors with which a force that opposes a displacement acts on the masses."""
+        if element.push:
+            return np.array(element.push)
+        if isinstance(element, ForceLaw):
+            return np.array(element.row)
+        return self.displacement(element)
 
     def relative_stiffness(self, clearance: Clearance) -> float:
         """Stiffness of a clearance's upper stop, or its only one, over that of the springs on its
@@ -216,7 +240,7 @@ class SecondOrderSystem:
 
         Raises
         ------
-        InputError : a law that depends on more than one mass or the difference of two.
+        InputError : as of ``dead_zones``.
         """
         return dead_zones(self.clearances, self.laws)
 
@@ -226,18 +250,12 @@ class SecondOrderSystem:
         stiffness = self.spanning_stiffness
         if closed:
             for stop in self.clearances:
-                row = self.displacement(stop)
                 stiffest = max(
                     max(accumulate(k for _, k in side.springs)) for _, side in stop.sides
                 )
-                stiffness += stiffest * np.outer(row, row)
-        if self.coupled_mass is None:
-            root = np.sqrt(self.mass)
-            squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
-        else:
-            inverse = np.linalg.inv(np.linalg.cholesky(self.coupled_mass))
-            squares = np.linalg.eigvalsh(inverse @ stiffness @ inverse.T)
-        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+                stiffness += stiffest * np.outer(self.push(stop), self.displacement(stop))
+        squares = np.linalg.eigvals(self.over_mass(stiffness)).real
+        return np.asarray(np.sqrt(np.maximum(np.sort(squares), 0.0)))
 
     @cached_property
     def wired(self) -> SecondOrderSystem:
@@ -248,11 +266,11 @@ class SecondOrderSystem:
         for zone in self.dead_zones:
             if zone.limits:
                 assert zone.lower is not None
-                row = self.displacement(zone)
+                push = self.push(zone)
                 own = damping if zone.quantity == "velocity" else stiffness
-                own += zone.first.stiffness * np.outer(row, row)
+                own += zone.first.stiffness * np.outer(push, self.displacement(zone))
                 # The stage gives nothing below its lower end, so at rest it pushes back already.
-                constant -= zone.first.stiffness * zone.lower.gap * row
+                constant -= zone.first.stiffness * zone.lower.gap * push
         return replace(
             self,
             stiffness=_without_rounding(stiffness, self.stiffness),
@@ -377,7 +395,7 @@ class _Contact:
         return cls(
             _interleaved(along, 0),
             _interleaved(along, 1),
-            _interleaved(system.over_mass(along), 1),
+            _interleaved(system.over_mass(system.push(clearance)), 1),
             {side: stop.springs for side, stop in clearance.sides},
             {side: stop.jump for side, stop in clearance.sides},
             clearance.damping,
@@ -390,7 +408,7 @@ class _Contact:
         """One law of a system, beyond its piece at rest."""
         along = np.array(law.row)
         watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
-        push_back = _interleaved(system.over_mass(along), 1)
+        push_back = _interleaved(system.over_mass(system.push(law)), 1)
         return cls(watched, np.zeros_like(watched), push_back, law.bends, {})
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:

@@ -27,12 +27,17 @@ from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.fabrication.bench_sheet import NOTE, BenchSheet
 from designer.fabrication.board_cost import CostEstimate, cost_words
-from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
 from designer.model.system_equations import approximation_notes, equations_of, number_of
-from designer.report import design_tables, response_tables, tolerance_tables, words
+from designer.report import (
+    design_tables,
+    equations as forms,
+    response_tables,
+    tolerance_tables,
+    words,
+)
 from designer.report.data import ReportData
 from designer.report.four_answers import answers
 from designer.report.spread_words import words_of

@@ -230,9 +230,10 @@ def _thresholds(design: Design) -> list[tuple[str, str]]:
     for number, (clearance, motion) in enumerate(
         zip(system.clearances, relative_motions(system), strict=False)
     ):
-        symbol = f"v{2 * clearance.mass + 1}"
-        if clearance.other is not None:
-            symbol = f"{motion.symbol} by the scale of {subscripted(f'x{clearance.mass + 1}')}"
+        mass = system.dead_zones[number].mass
+        symbol = f"v{2 * mass + 1}"
+        if len(clearance.terms) > 1:
+            symbol = f"{motion.symbol} by the scale of {subscripted(f'x{mass + 1}')}"
         named = "" if len(system.clearances) == 1 else f" in {clearance.name}"
         rows.append((f"contact{named} begins at ({symbol})", _places(design, number)))
     return rows

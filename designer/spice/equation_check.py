@@ -8,8 +8,9 @@ integrators in one loop without a gain that it could follow, and often no operat
 beside each capacitor lies a source of the voltage that it has at rest, behind an inductor
 (`HOLDING`): the operating point falls apart into single stages, and no frequency sees it.
 
-- ``.ac`` from generator to v1 over a decade around resonance, all clearances open and in each
-  contact, against the model's transfer function at the design's scales;
+- ``.ac`` from generator to the displacement of the first mass that it moves, over a decade around
+  resonance, all clearances open and in each contact, against the model's transfer function at the
+  design's scales;
 - ``.dc`` of the generator, slowly as it were: the displacement in a clearance and its stage's
   output fv follow the statics. Straight lines through the dead zone and each contact give slope,
   thresholds and what slope is left, against Eq. (20).
@@ -54,6 +55,8 @@ DEEPEST = 5
 GAIN = 1e8
 """Open-loop gain of the op-amps, with which ngspice finds more operating points than with an
 endless one; it errs by the noise gain over it, a tenth of `FLOOR` at a noise gain of 10 000."""
+STILL = 1e-9
+"""Of the largest displacement: one below it is none."""
 HOLDING = 1e15
 """Inductance [H] beside each integrator's capacitor: a wire at rest, nothing at any frequency."""
 
@@ -167,37 +170,52 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
     return EquationCheck((*findings, *_curve(design, model, sweeps)), low, high)
 
 
-def transfer(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) -> Complex:
-    """(k,) displacement of M1 per unit of drive at ``omega`` (k,), each dead zone in contact with
-    this side or open (0)."""
-    return np.array([_impedance(model, w, sides)[1][0] for w in omega])
+def transfer(
+    model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int = 0
+) -> Complex:
+    """(k,) displacement of a mass per unit of drive at ``omega`` (k,), each dead zone in contact
+    with this side or open (0)."""
+    return np.array([_impedance(model, w, sides)[1][mass] for w in omega])
 
 
-def explained(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) -> Array:
+def _moved(model: SecondOrderSystem, omega: float, sides: tuple[int, ...]) -> int:
+    """Index of the first mass that the drive moves: while a clearance is open, nothing else may
+    join the others to it."""
+    displacements = np.abs(_impedance(model, omega, sides)[1])
+    return int(np.flatnonzero(displacements > STILL * displacements.max())[0])
+
+
+def explained(
+    model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int = 0
+) -> Array:
     """(k,) largest |dH/H| for a relative change of 1 in every coefficient of the equations.
 
-    Each term of the impedance Z counts with |L_i Z_ij R_j/H|, where H = R_1, R = Z⁻¹ force and L
-    is the first row of Z⁻¹; the springs on the mass of each clearance twice, since the dead zone's
-    leftover slope is measured in them, and damping twice, since a displacement's integrator has an
-    error of its own: with v = x'/κ the equation is x''/κ + d v + … = force.
+    Each term of the impedance Z counts with |L_i Z_ij R_j/H|, where H is that of the mass, R =
+    Z⁻¹ force and L is its row of Z⁻¹; the springs on the mass of each clearance twice, since the
+    dead zone's leftover slope is measured in them, and damping twice, since a displacement's
+    integrator has an error of its own: with v = x'/κ the equation is x''/κ + d v + … = force.
     """
     out = np.zeros(len(omega))
-    rows = [(model.displacement(z), z.quantity, model.own_slope(z)) for z in model.dead_zones]
-    rows = rows or [(np.eye(model.size)[0], "displacement", float(model.stiffness[0, 0]))]
+    rows = [
+        (model.displacement(z), model.push(z), z.quantity, model.own_slope(z))
+        for z in model.dead_zones
+    ]
+    first = np.eye(model.size)[0]
+    rows = rows or [(first, first, "displacement", float(model.stiffness[0, 0]))]
     for k, w in enumerate(omega):
         terms, right = _impedance(model, w, sides)
-        left = np.linalg.inv(sum(terms))[0]
+        left = np.linalg.inv(sum(terms))[mass]
         size = sum(float((np.abs(left)[:, None] * np.abs(t) * np.abs(right)).sum()) for t in terms)
-        for row, quantity, slope in rows:
+        for row, push, quantity, slope in rows:
             rate = w if quantity == "velocity" else 1.0
-            size += abs((left @ row) * rate * slope * (row @ right))
+            size += abs((left @ push) * rate * slope * (row @ right))
         size += float((np.abs(left)[:, None] * np.abs(terms[1]) * np.abs(right)).sum())
-        out[k] = size / abs(right[0])
+        out[k] = size / abs(right[mass])
     return out
 
 
 def _drive_error(
-    design: Design, model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]
+    design: Design, model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int
 ) -> Array:
     """(k,) |dH/H| that the drive explains: the driven masses share the force in a ratio of their
     own, which is no coefficient of the equations and not in their error."""
@@ -206,7 +224,7 @@ def _drive_error(
     out = np.zeros(len(omega))
     for k, w in enumerate(omega):
         terms, right = _impedance(model, w, sides)
-        out[k] = float(np.abs(np.linalg.inv(sum(terms))[0]) @ error) / abs(right[0])
+        out[k] = float(np.abs(np.linalg.inv(sum(terms))[mass]) @ error) / abs(right[mass])
     return out
 
 
@@ -221,18 +239,19 @@ def _impedance(
     ]
     for zone, side in zip(model.dead_zones, sides, strict=True):
         if side:
-            row = model.displacement(zone)
-            both = np.outer(row, row)
+            both = np.outer(model.push(zone), model.displacement(zone))
             terms.append((dict(zone.sides)[side].stiffness * both).astype(complex))
             terms.append(1j * omega * zone.damping * both)
     return terms, np.linalg.solve(sum(terms), drive_of(model).astype(complex))
 
 
 def _resonance(model: SecondOrderSystem) -> float:
-    """ω at which the open system's M1 moves most, near the model's own frequency."""
+    """ω at which the first mass that the open system moves does so most, near the model's own
+    frequency."""
     omega = model.own_frequency * np.geomspace(1e-2, 1e2, 4001)
     still = (0,) * len(model.dead_zones)
-    return float(omega[np.argmax(np.abs(transfer(model, omega, still)))])
+    mass = _moved(model, model.own_frequency, still)
+    return float(omega[np.argmax(np.abs(transfer(model, omega, still, mass)))])
 
 
 def _deck(
@@ -322,7 +341,8 @@ def _ac(design: Design, resting: StaticRest, low: float, high: float) -> SpiceJo
     generator = _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {generator!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
     text = _deck(design, source, card, generator, resting.sides)
-    return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
+    nets = design.circuit.displacements
+    return SpiceJob(text, nets, high * (1.0 - 1e-6), _whole, "ac")
 
 
 def _dc(design: Design, resting: StaticRest) -> SpiceJob[Waveforms]:
@@ -356,11 +376,12 @@ def _transfer(
         return EquationFinding(name, float("nan"), bound, answer.reason)
     scales, sides = design.errors.scales, resting.sides
     omega = 2.0 * np.pi * answer.axis * scales.seconds
-    unit = -scales.volts[0] / design.amplitude()
-    wanted = unit * transfer(model, omega, sides)
-    deviation = np.abs(answer.signals[design.circuit.state_nets[0]] / wanted - 1.0)
-    explained_error = design.errors.max_error * explained(model, omega, sides)
-    bounds = np.expm1(explained_error + _drive_error(design, model, omega, sides)) + FLOOR
+    mass = _moved(model, float(omega[len(omega) // 2]), sides)
+    unit = -scales.volts[2 * mass] / design.amplitude()
+    wanted = unit * transfer(model, omega, sides, mass)
+    deviation = np.abs(answer.signals[design.circuit.displacements[mass]] / wanted - 1.0)
+    explained_error = design.errors.max_error * explained(model, omega, sides, mass)
+    bounds = np.expm1(explained_error + _drive_error(design, model, omega, sides, mass)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 
@@ -469,6 +490,5 @@ def _wanted_slope(design: Design, model: SecondOrderSystem, index: int, side: in
     capacitor = next(c for c in circuit.capacitors if c.name == circuit.states[velocity])
     rate = dict(stop.sides)[side].stiffness / model.mass[stop.mass] / scales.seconds
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
-    output = circuit.dead_zones[index].output
-    force = conductance(circuit, output, capacitor.minus)
+    force = conductance(circuit, circuit.dead_zones[index].driving, capacitor.minus)
     return float(rate * per_volt * capacitor.value / force) / float(design.dead_zone_gains[index])

@@ -92,9 +92,9 @@ class _Statics:
         closed, push = model.stiffness.copy(), model.constant.copy()
         for zone, side in zip(model.dead_zones, sides, strict=True):
             if side:
-                row, stop = model.displacement(zone), dict(zone.sides)[side]
-                closed += stop.stiffness * np.outer(row, row)
-                push = push + side * stop.stiffness * stop.gap * row
+                back, stop = model.push(zone), dict(zone.sides)[side]
+                closed += stop.stiffness * np.outer(back, model.displacement(zone))
+                push = push + side * stop.stiffness * stop.gap * back
         by_force = np.asarray(np.linalg.solve(closed, drive_of(model)))
         return by_force, np.asarray(np.linalg.solve(closed, push))
 

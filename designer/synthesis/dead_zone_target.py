@@ -163,7 +163,7 @@ def target_of(
     relative = relative / relative[own]  # volts of each state over those of the stop's displacement
     top = limits.swing / float((peaks.states * relative).max())  # volts per unit of length
     reach = peaks.reaches[index] if index < len(peaks.reaches) else Reach()
-    peak = float(peaks.states[own]) if stop.other is None else reach.peak
+    peak = float(peaks.states[own]) if len(stop.terms) == 1 else reach.peak
     gap = abs(stop.first.gap)
     drop, reference, current = 0.0, 5.0, (0.0, float("inf"))
     if stage.diode is not None and stage.reference is not None:

@@ -113,9 +113,9 @@ def differences(
     The output is (R222/R220) v_i - (R222/R221) v_j, so R221/R220 is that of the masses' volts.
     """
     clearance = place.clearance
-    if clearance.watched_other is None:
+    if clearance.other is None:
         return (Difference({}, 1.0, {}),)
-    ratio = float(volts[clearance.watched_other] / volts[clearance.watched])
+    ratio = float(volts[clearance.state_of(clearance.other)] / volts[clearance.watched])
     inputs = resistors[(resistors >= 1e4 / min(ratio, 1.0)) & (resistors <= 1e5 / max(ratio, 1.0))]
     inputs = inputs if len(inputs) else resistors
     others = nearest_to(resistors, ratio * inputs)

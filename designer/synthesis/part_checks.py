@@ -19,6 +19,7 @@ from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, stage_kind
+from designer.circuit.dead_zone_place import MOST_MASSES
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
@@ -87,12 +88,6 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
-    if system.coupled_mass is not None:
-        expected = (
-            "a diagonal mass matrix for a circuit, such as lumped masses: a stop then pushes only "
-            "what it touches"
-        )
-        raise InputError(None, "matrices.mass", "a mass matrix with couplings", expected)
     if system.orders:
         orders = ", ".join(map(str, system.orders))
         found = f"forces at {orders} times the drive's frequency"
@@ -113,7 +108,7 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "preload_over beside it for a circuit, the depth over which it rises: a force that "
                 "jumps at the contact has no stage; a negative gap is a stop in contact at rest",
             )
-        if system.fixed_stops and system.ground_moves and clearance.other is None:
+        if system.fixed_stops and system.ground_moves and system.displacement(clearance).sum():
             raise InputError(
                 None,
                 "base.stops",
@@ -131,6 +126,10 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
         )
     zones = system.dead_zones
     for zone in zones:
+        most = max(len(zone.terms), len(zone.pushed))
+        if most > MOST_MASSES:
+            what, found = f"clearance {zone.name}", f"{most} masses that it is of, or pushes"
+            raise InputError(None, what, found, f"at most {MOST_MASSES} for a circuit")
         if zone.damping and len({stop.stiffness for _, stop in zone.sides}) > 1:
             raise InputError(
                 None,
@@ -146,6 +145,7 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
         raise refusal
     scaled = [f"a force that limits ({zone.bend_of})" for zone in zones if zone.limits]
     scaled += [f"stops with damping ({zone.name})" for zone in zones if zone.damping]
+    scaled += [f"a combination ({zone.name})" for zone in zones if not zone.plain]
     for key, value in (("most_values", spec.most_values), ("matched", spec.matched)):
         if scaled and value:
             expected = f"none beside {scaled[0]}: the parts are chosen by scales"

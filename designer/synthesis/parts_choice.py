@@ -205,9 +205,9 @@ class _Search:
     def by_scales(self) -> bool:
         """Whether scales are chosen before values: for all but one clearance of two masses that
         joins search as a whole, unless the least error or the fewest values are asked for. What
-        limits, and stops with damping, are always chosen so."""
+        limits, stops with damping, and combinations of displacements are always chosen so."""
         zones = self.order.model.second_order().dead_zones
-        if any(zone.limits or zone.damping for zone in zones):
+        if any(zone.limits or zone.damping or not zone.plain for zone in zones):
             return True
         return self.order.spec.objective != "match" and not (self.whole_by_joins or self._asked)
 
@@ -222,7 +222,7 @@ class _Search:
         system = self.order.model.second_order()
         zones = system.dead_zones
         plain = not zones or (
-            len(zones) == 1 and alike(zones[0]) and zones[0].other is None and not zones[0].watched
+            len(zones) == 1 and alike(zones[0]) and zones[0].pushed == ((0, 1.0),)
         )
         return self.by_joins and plain and not system.wired.constant.any()
 

@@ -278,7 +278,7 @@ class _Maker:
             else:
                 for sides in halves(place.clearance):
                     free([half_parts(place.index, side).source for side in sides], inputs)
-            if place.clearance.other is not None:
+            if place.sums:
                 free([place.part("R220")], inputs)
                 free([place.part("R222")], self.heavy)
 
@@ -394,8 +394,8 @@ class _Maker:
         self._keep(log, StatedLimit("load", "the stop's resistor", bounds.stop, "Ω", least=True))
 
     def _gain(self, place: DeadZonePlace) -> Affine:
-        """Of the difference amplifier in front of a stage; 1 without one."""
-        if place.clearance.other is None:
+        """Of the amplifier that sums displacements in front of a stage; 1 without one."""
+        if not place.sums:
             return Affine(np.zeros(len(self.lists)))
         return self._difference(place, self.order.peaks.reach(place.index))
 
@@ -462,8 +462,7 @@ class _Maker:
             self._keep(threshold, StatedLimit("swing", what, most, "V"))
             log = self.part(half.source) - threshold + self._reference
             self._row([half.threshold], log, held=True)
-        if clearance.other is not None:
-            self._reaction(place)
+        self._reaction(place)
 
     def _rectifier(self, place: DeadZonePlace) -> None:
         """The halves of one clearance, with the amplifiers around them."""
@@ -500,8 +499,7 @@ class _Maker:
                 self._row([n.threshold for n in names], log, held=True)
             if len(idle) > 1:
                 self._lift(names, sides, own + float(np.log(room)), idle)
-        if clearance.other is not None:
-            self._reaction(place)
+        self._reaction(place)
         if clearance.damping:
             self._damper(place)
 
@@ -510,12 +508,12 @@ class _Maker:
         stiffness."""
         clearance = place.clearance
         seconds = self.time + float(np.log(clearance.damping / clearance.first.stiffness))
-        name = place.part("R51")
         values = np.log(np.sort(self.order.capacitors))
-        ends = [("C50", self.part(place.part("R50")))]
-        ends += [("C51", row.log) for row in self.rows if row.names == (name,)]
-        for first, force in ends:
-            capacitor, log = place.part(first), seconds - force
+        known = {name: row.log for row in self.rows for name in row.names}
+        first, *others = place.forces
+        known[first.resistor] = self.part(first.resistor)
+        for force in (first, *others):
+            capacitor, log = force.capacitor, seconds - known[force.resistor]
             for word, most in (("the least", False), ("the largest", True)):
                 value = float(np.exp(values[-1 if most else 0]))
                 what = f"{capacitor}, {word}"
@@ -537,13 +535,13 @@ class _Maker:
             self.lifts[half.lift] = self.part(half.source) + limit - both - most
 
     def _difference(self, place: DeadZonePlace, reach: Reach) -> Affine:
-        """The amplifier of a clearance between two masses; its gain."""
-        clearance = place.clearance
-        assert clearance.watched_other is not None
-        x, y = clearance.watched, clearance.watched_other
+        """The amplifier of a clearance between masses; its gain."""
+        clearance, x = place.clearance, place.clearance.watched
         source, feedback = (self.part(place.part(name)) for name in ("R220", "R222"))
         gain = feedback - source
-        self._row([place.part("R221")], source + self.volts(y) - self.volts(x))
+        for each in place.inputs[1:]:
+            share = float(np.log(abs(each.factor)))
+            self._row([each.resistor], source + self.volts(each.state) - self.volts(x) - share)
         what = f"gain of the difference in clearance {clearance.name}"
         self._keep(gain, StatedLimit("stage", what, MOST_DIFFERENCE))
         if reach.peak > 0.0:
@@ -553,13 +551,15 @@ class _Maker:
         return gain
 
     def _reaction(self, place: DeadZonePlace) -> None:
-        """The stop's force on the other of two masses."""
-        one, two = place.clearance.mass, place.clearance.other
-        assert two is not None
-        inertia = float(np.log(self.system.mass[two] / self.system.mass[one]))
-        log = self.part(place.part("R50")) - self.rate(one) + self.rate(two) + inertia
-        log = log - self.volts(2 * two) + self.volts(2 * one)
-        self._row([place.part("R51")], log)
+        """The stop's force on the other masses that it pushes."""
+        first, *others = place.forces
+        one = first.mass
+        for force in others:
+            two = force.mass
+            inertia = float(np.log(self.system.mass[two] / self.system.mass[one]))
+            log = self.part(first.resistor) - self.rate(one) + self.rate(two) + inertia
+            log = log - self.volts(2 * two) + self.volts(2 * one) - float(np.log(abs(force.factor)))
+            self._row([force.resistor], log)
 
     def _current(self, force: float, mass: int) -> Affine:
         """Into the velocity of a mass that makes this force [A]."""
@@ -571,7 +571,7 @@ class _Maker:
         force = float(self.system.wired.constant[mass])
         unit = np.abs(self.system.drive_force(self.system.own_frequency)).max()
         if self.lead is not None:
-            unit = self.system.spanning_stiffness[mass, mass] * self.lead
+            unit = abs(self.system.spanning_stiffness[mass, mass]) * self.lead
         log = -self._current(force, mass) + self._reference
         size = abs(force) / float(unit) if unit > 0.0 else 1.0
         self._row([constant_resistor(mass)], log, size, held=True, constant=True)

@@ -143,12 +143,14 @@ def forces(
     ------
     ArithmeticError : the circuit has no rest.
     """
-    rows = [(c.mass, system.displacement(c)) for c in system.clearances]
-    rows = rows or [(0, np.eye(system.size)[0])]
+    zones = system.dead_zones[: len(system.clearances)]
+    rows = [(c.mass, system.displacement(c), system.push(c)) for c in zones]
+    first = np.eye(system.size)[0]
+    rows = rows or [(0, first, first)]
     shifts = Statics(circuit).shifts
     out = []
-    for (mass, row), shift in zip(rows, shifts, strict=True):
-        compliance = abs(float(row @ np.linalg.solve(system.stiffness, row)))
+    for (mass, row, push), shift in zip(rows, shifts, strict=True):
+        compliance = abs(float(row @ np.linalg.solve(system.stiffness, push)))
         out.append(shift.over(compliance * drive * float(volts[2 * mass])))
     return tuple(out)
 

@@ -21,15 +21,16 @@ from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
-from designer.model.clearance import Clearance, Side
+from designer.model.clearance import Clearance, Side, combined
 from designer.model.force_law import ForceLaw
 from designer.model.mechanics import SecondOrderSystem
 from tests.shared.exact_circuits import STAGE, Scale, exact_circuit, unit_volts
 
 
 def random_system(seed: int) -> SecondOrderSystem:
-    """1 to 3 masses, 0 to 2 clearances of any kind, some of them in steps or with damping, 0 to 2
-    laws that rise and fall, forces of both signs or a moving base."""
+    """1 to 3 masses, some with inertial couplings, 0 to 2 clearances of any kind, some of them of
+    combinations, in steps or with damping, 0 to 2 laws that rise and fall, forces of both signs or
+    a moving base."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 4))
     mass = rng.uniform(0.5, 2.0, n)
@@ -60,6 +61,9 @@ def random_system(seed: int) -> SecondOrderSystem:
             )
         )
     clearances = [_in_steps(stop) if rng.integers(0, 4) == 0 else stop for stop in clearances]
+    clearances = [
+        _of_many(stop, n, rng) if rng.integers(0, 4) == 0 else stop for stop in clearances
+    ]
     clearances = [_damped(stop, rng) if rng.integers(0, 3) == 0 else stop for stop in clearances]
     laws = tuple(_random_law(f"L{k}", n, rng) for k in range(max(int(rng.integers(-2, 3)), 0)))
     moving = bool(rng.integers(0, 2))
@@ -71,7 +75,7 @@ def random_system(seed: int) -> SecondOrderSystem:
         row = np.array(law.row)
         matrices[law.quantity] += law.slope * np.outer(row, row)
         constant -= law.offset * row
-    return SecondOrderSystem(
+    system = SecondOrderSystem(
         mass=mass,
         damping=matrices["velocity"],
         stiffness=matrices["displacement"],
@@ -81,6 +85,16 @@ def random_system(seed: int) -> SecondOrderSystem:
         base=0.4 if moving else 0.0,
         laws=laws,
     )
+    if rng.integers(0, 3):
+        return system
+    shares = np.triu(rng.uniform(-0.3, 0.3, (n, n)), 1)
+    coupled = np.diag(mass) + (shares + shares.T) * np.sqrt(np.outer(mass, mass))
+    system = system.with_couplings(coupled)
+    try:
+        _ = system.dead_zones
+    except InputError:  # no mass that a combination watches and pushes alike
+        return random_system(seed + 10**7)
+    return system
 
 
 def _random_law(name: str, n: int, rng: np.random.Generator) -> ForceLaw:
@@ -90,6 +104,8 @@ def _random_law(name: str, n: int, rng: np.random.Generator) -> ForceLaw:
     if n > 1 and rng.integers(0, 2):
         row = np.zeros(n)
         row[:2] = rng.permutation([1.0, -1.0])
+    if rng.integers(0, 4) == 0:
+        row = row + rng.uniform(-0.5, 0.5, n)
     x = np.sort(rng.choice([-1.0, 1.0], 4) * rng.uniform(0.05, 0.6, 4))[: int(rng.integers(2, 5))]
     x = np.concatenate([[x[0] - 0.5], x, [x[-1] + 0.5]])
     velocity = bool(rng.integers(0, 2))
@@ -103,6 +119,14 @@ def _in_steps(stop: Clearance) -> Clearance:
     upper = stop.upper and replace(stop.upper, further=((0.2, 1.5),), preload=0.2, rise=0.1)
     lower = stop.lower and replace(stop.lower, further=((0.15, 2.5),))
     return replace(stop, upper=upper, lower=lower)
+
+
+def _of_many(stop: Clearance, n: int, rng: np.random.Generator) -> Clearance:
+    """Of a sum of all displacements, one factor above 0 at least."""
+    row = rng.uniform(0.2, 2.0, n) * rng.choice([-1.0, 1.0], n)
+    row[int(rng.integers(0, n))] = 1.3
+    mass, other, combination = combined(row)
+    return replace(stop, mass=mass, other=other, combination=combination)
 
 
 def _damped(stop: Clearance, rng: np.random.Generator) -> Clearance:
@@ -119,18 +143,20 @@ def _damped(stop: Clearance, rng: np.random.Generator) -> Clearance:
 def engaged(system: SecondOrderSystem, levels: Sequence[int]) -> tuple[int, ...]:
     """The side of each dead zone that carries, where so many springs of each clearance, and bends
     of each law, are met; negative on the lower side."""
-    chains: dict[str, tuple[int, float]] = {}
+    chains: dict[str, tuple[int, float, dict[int, float]]] = {}
     for stop, level in zip(system.clearances, levels, strict=False):
         springs = dict(stop.sides)[int(np.sign(level))].springs if level else ()
-        chains[stop.name] = (int(np.sign(level)), springs[abs(level) - 1][0] if level else 0.0)
+        place = springs[abs(level) - 1][0] if level else 0.0
+        chains[stop.name] = (int(np.sign(level)), place, dict(stop.terms))
     for law, level in zip(system.laws, levels[len(system.clearances) :], strict=True):
         side = int(np.sign(level))
         place = law.bends[side][abs(level) - 1][0] if level else 0.0
-        turned = sum(law.row) or 1.0  # of -x alone the upper bends lie below rest
-        chains[law.name] = (side * int(turned), place)
+        turned = 1 if max(law.row) > 0.0 else -1  # of -x alone the upper bends lie below rest
+        chains[law.name] = (side * turned, place, dict(enumerate(law.row)))
     out = []
     for zone in system.dead_zones:
-        side, place = chains[zone.bend_of or zone.name]
+        side, place, row = chains[zone.bend_of or zone.name]
+        place /= abs(row[zone.mass])
         met = side in zone.positions and dict(zone.sides)[side].gap <= place + 1e-12
         out.append(side if met else 0)
     return tuple(out)
@@ -149,6 +175,12 @@ def all_levels(system: SecondOrderSystem) -> list[tuple[int, ...]]:
         ]
     ]
     return list(product(*ranges))
+
+
+def volts_in(system: SecondOrderSystem, k: int, scale: Scale) -> float:
+    """Volts of a unit of displacement in a clearance."""
+    zone, stop = system.dead_zones[k], system.clearances[k]
+    return unit_volts(zone, scale) / dict(stop.terms)[zone.mass]
 
 
 def random_scale(system: SecondOrderSystem, seed: int) -> Scale:
@@ -198,7 +230,7 @@ def test_every_mode_has_the_model_s_matrices(seed: int, apart: bool) -> None:
         rows, theirs = reduced.contact_rows(k), model.contact_rows(k)
         assert rows.keys() == theirs.keys() == set(clearance.positions)
         for side, row in rows.items():
-            unit = unit_volts(clearance, scale)
+            unit = volts_in(system, k, scale)
             assert row[:-2] * volts / unit == pytest.approx(theirs[side][:-2], abs=1e-5)
             assert row[-1] / unit == pytest.approx(theirs[side][-1], abs=1e-5)
 
@@ -249,11 +281,12 @@ def test_orbits_agree(seed: int, apart: bool) -> None:
     drive = Drive(omega / scale.seconds, -scale.generator * size)
     ours = Flow(Reduction(circuit, board).system(), drive, fast=False).run(x * scale.volts, 3)
     peak = np.abs(theirs.strobes).max()
-    for k, clearance in enumerate(system.clearances):
+    for k in range(len(system.clearances)):
         wanted = system.piecewise_linear(omega)
         reduced = Reduction(circuit, board).system()
-        unit = scale.volts[2 * clearance.mass : 2 * clearance.mass + 2]
-        unit = unit * unit_volts(clearance, scale) / unit[0]
+        mass = system.dead_zones[k].mass
+        unit = scale.volts[2 * mass : 2 * mass + 2]
+        unit = unit * volts_in(system, k, scale) / unit[0]
         moved, moving = reduced.displacement[k][:-2], reduced.velocity[k][:-1]
         theirs_moved, theirs_moving = wanted.displacement[k][:-2], wanted.velocity[k][:-1]
         assert moved * scale.volts / unit[0] == pytest.approx(theirs_moved, abs=1e-4)

@@ -13,14 +13,13 @@ from scipy.optimize import minimize
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.model.circuit_table import CircuitSpec
+from designer.model.clearance import Side
 from designer.model.cubic_law import cubic_error, cubic_points, points_for
 from designer.model.force_law import ForceLaw
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import shown_stops
-from designer.synthesis.part_checks import check_system
 from tests.shared.system_text import clearance, system_text, table
 
 PLACES = st.lists(st.integers(-40, 40), min_size=2, max_size=9, unique=True).map(sorted)
@@ -298,13 +297,15 @@ def test_names_of_dead_zones_meet_no_clearance_s() -> None:
     assert [zone.name for zone in zones] == ["L_1", "L_2"]
 
 
-def test_a_sum_of_two_masses_is_no_clearance() -> None:
+def test_a_sum_of_two_masses_is_a_dead_zone() -> None:
+    """Per unit of the first mass's displacement, and of the force on it."""
     text = system_text({"a": 1.5, "b": 1.0}, {GROUNDED: 2.0, ("b", "ground"): 1.0}, {GROUNDED: 0.1})
     text += table("damper", between=("b", "ground"), damping=0.1) + FORCE
-    text += table("law", name="L", points=[[-1, 0], [1, 0], [2, 3]]) + "of = { a = 1.0, b = 1.0 }\n"
-    with pytest.raises(InputError) as refused:
-        check_system(parse_model_file(text).model, CircuitSpec())
-    assert "difference of two" in refused.value.expected
+    text += table("law", name="L", points=[[-1, 0], [1, 0], [2, 3]]) + "of = { a = 0.5, b = 2.0 }\n"
+    (zone,) = parse_model_file(text).model.second_order().dead_zones
+    assert (zone.mass, zone.combination, zone.push) == (1, (0.25, 1.0), ())
+    assert zone.upper == Side(0.5, 12.0)
+    assert zone.lower is None
 
 
 def test_both_stops_are_shown_where_a_law_or_a_drive_makes_them_differ() -> None:

@@ -15,13 +15,13 @@ from designer.base import figure_style
 from designer.jobs.template import TEXT
 from designer.model.ascii_sketch import sketch
 from designer.model.clearance import Sides
-from designer.model.equations import (
+from designer.model.model import Dimensionless, Mechanical
+from designer.plots.model_drawing import model_drawing
+from designer.report.equations import (
     dimensionless_equations,
     equations_with_numbers,
     mechanical_equations,
 )
-from designer.model.model import Dimensionless, Mechanical
-from designer.plots.model_drawing import model_drawing
 from tests.shared.figure_text import clipped, overlapping
 
 MODEL = Dimensionless(m=0.2, k=0.6, k0=0.9, c=0.5, zeta=0.05, f20=0.25, b=0.3)

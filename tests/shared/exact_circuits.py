@@ -38,9 +38,9 @@ class Scale:
 
 
 def unit_volts(clearance: Clearance, scale: Scale) -> float:
-    """Volts of a unit of displacement in a clearance, or of velocity: of its first mass, or behind
-    the difference amplifier."""
-    gain = 1.0 if clearance.other is None else DIFFERENCE
+    """Volts of a unit of displacement in a dead zone, or of velocity: of its first mass, or behind
+    the amplifier that sums."""
+    gain = 1.0 if len(clearance.terms) == 1 else DIFFERENCE
     return gain * float(scale.volts[clearance.watched])
 
 
@@ -85,20 +85,17 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
         elif len(clearance.sides) == 2:
             span = own * sum(stop.gap for _, stop in clearance.sides)
             values |= dict.fromkeys((f"R{base + 8}", f"R{base + 9}"), 10e3 * IDLE / span)
-        masses = [(small, clearance.mass)]
-        if clearance.other is not None:
-            masses.append((small + 1, clearance.other))
-            rate = clearance.quantity == "velocity"
-            ratio = volts[2 * clearance.mass + rate] / volts[2 * clearance.other + rate]
-            values |= {f"R{base + 20}": 20e3, f"R{base + 21}": 20e3 / ratio}
-            values |= {f"R{base + 22}": DIFFERENCE * 20e3}
-            values |= {f"R{base + 24}": 10e3, f"R{base + 25}": 10e3}
-        for number, mass in masses:
-            rate = abs(reference) / system.mass[mass] * volts[2 * mass + 1] * ramp
-            values[f"R{number}"] = gain * own / rate
+        own_volts = volts[clearance.state_of(clearance.mass)]
+        for number, (mass, factor) in zip((20, 21, 30, 31), clearance.terms, strict=False):
+            ratio = volts[clearance.state_of(mass)] / own_volts / abs(factor)
+            values[f"R{base + number}"] = 20e3 * ratio
+        values |= {f"R{base + 22}": DIFFERENCE * 20e3}
+        values |= {f"R{base + 24}": 10e3, f"R{base + 25}": 10e3}
+        for number, (mass, factor) in enumerate(clearance.pushed, small):
+            share = abs(factor) / system.mass[mass] * volts[2 * mass + 1]
+            values[f"R{number}"] = gain * own / (abs(reference) * share * ramp)
             if clearance.damping:
-                share = clearance.damping / system.mass[mass] * volts[2 * mass + 1]
-                values[f"C{number}"] = C * share / own
+                values[f"C{number}"] = C * clearance.damping * share / own
     return values
 
 
@@ -124,10 +121,9 @@ def _linear_part(system: SecondOrderSystem) -> SecondOrderSystem:
         if zone.limits:
             assert zone.lower is not None
             steep = -zone.lower.stiffness
-            ends = [(zone.mass, 1.0)] + ([] if zone.other is None else [(zone.other, -1.0)])
-            for i, a in ends:
+            for i, a in zone.pushed:
                 constant[i] += a * steep * zone.lower.gap
-                for j, b in ends:
+                for j, b in zone.terms:
                     matrix = damping if zone.quantity == "velocity" else stiffness
                     matrix[i, j] -= a * b * steep
     return replace(system, stiffness=stiffness, damping=damping, constant=constant)

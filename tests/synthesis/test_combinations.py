@@ -1,0 +1,107 @@
+"""Clearances and laws of combinations of displacements, and mass matrices with couplings: from the
+model file to parts that do what the model does."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from designer.base.errors import InputError
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.model.model_file import parse_model_file
+from designer.spice import equation_check
+from designer.spice.pool import SpicePool
+from tests.shared.system_text import system_text, table
+from tests.synthesis.test_law_circuits import shows_what_the_model_does
+
+MATRICES = """\
+format = 2
+[matrices]
+names = ["left", "right"]
+mass = [[1.0, 0.2], [0.2, 0.6]]
+stiffness = [[3.0, -1.0], [-1.0, 2.5]]
+damping = [[0.3, -0.1], [-0.1, 0.25]]
+"""
+DRIVE = table("force", on="left", amplitude=0.8) + table("response", omega=1.3)
+CORNER = (
+    table("clearance", name="corner", upper=0.3, stiffness=6.0)
+    + "of = { left = 0.8, right = -0.4 }\n"
+)
+SIDE = table("clearance", name="side", between=["right", "ground"], lower=0.25, stiffness=5.0)
+MESHING = {"pinion": 1.0, "turned_pinion": 0.6, "gear": 2.0, "turned_gear": 1.2}
+GROUNDED = {"pinion": 4.0, "turned_pinion": 0.5, "gear": 6.0, "turned_gear": 0.5}
+DAMPED = {"pinion": 0.3, "turned_pinion": 0.15, "gear": 0.4, "turned_gear": 0.2}
+GEARS = system_text(
+    MESHING,
+    {(name, "ground"): stiffness for name, stiffness in GROUNDED.items()},
+    {(name, "ground"): damping for name, damping in DAMPED.items()},
+    table("clearance", name="mesh", upper=0.3, lower=0.3, stiffness=8.0, damping=0.3),
+    "of = { pinion = 1.0, turned_pinion = 1.0, gear = -1.0, turned_gear = -1.0 }\n",
+    table("force", on="turned_pinion", amplitude=0.6),
+    table("response", omega=1.2),
+)
+TEXTS = {
+    "coupled": MATRICES + SIDE + DRIVE,
+    "combined": MATRICES + CORNER + SIDE + DRIVE,
+    "a law": MATRICES
+    + SIDE
+    + table("law", name="rock", points=[[-1, -0.4], [-0.2, 0], [0.2, 0], [1, 0.4]])
+    + "of = { left = 0.5, right = 0.5 }\n"
+    + DRIVE,
+}
+
+
+@cache
+def made(text: str) -> Synthesis:
+    return synthesise(parse_model_file(text), jobs=2)
+
+
+@pytest.mark.parametrize(
+    "name", [*TEXTS, pytest.param("gears", marks=pytest.mark.slow)]
+)  # fmt: skip
+def test_chosen_parts_do_what_the_model_does(name: str) -> None:
+    """By the reduction of the parts, and by ngspice's own transfer functions, which are of a mass
+    that the drive moves: the first one stands still while the gears do not touch."""
+    result = made(TEXTS.get(name, GEARS))
+    shows_what_the_model_does(result)
+    with SpicePool(2) as pool:
+        check = equation_check.check(result.design, result.model_responses, pool)
+    assert check.passed, check.problem
+    assert all(np.isfinite(finding.deviation) for finding in check.findings)
+
+
+def test_impacts_and_misses_are_in_the_clearance_s_own_units() -> None:
+    """The factors of a sum scale what a board shows of it."""
+    result = made(TEXTS["combined"])
+    design, (response,) = result.design, result.model_responses
+    orbit = on_circuit(nominal_reduction(design).system(), design, response)
+    shown = design.in_model_units(orbit, design.volts(response.b))
+    wanted = response.orbit
+    assert wanted.counts.total > 0
+    assert shown.graze == pytest.approx(wanted.graze, abs=0.02)
+    order = np.argsort(wanted.impact_times)
+    speeds = shown.impact_velocities[np.argsort(shown.impact_times)]
+    assert speeds == pytest.approx(wanted.impact_velocities[order], abs=0.02)
+    for number, stop in enumerate(design.model.second_order().clearances):
+        zone = design.model.second_order().dead_zones[number]
+        factor = dict(stop.terms)[zone.mass]
+        volts = float(design.errors.scales.volts[2 * zone.mass])
+        for side, threshold in design.thresholds(number).items():
+            assert threshold == pytest.approx(dict(stop.sides)[side].gap / factor * volts, rel=0.02)
+
+
+def test_a_sum_without_a_factor_above_0_is_turned_by_the_user() -> None:
+    text = MATRICES + CORNER.replace("0.8", "-0.8") + SIDE + DRIVE
+    with pytest.raises(InputError) as caught:
+        synthesise(parse_model_file(text))
+    assert caught.value.field == "clearance corner.of"
+    assert "upper and lower exchanged" in caught.value.expected
+
+
+def test_a_mass_that_matrices_couple_is_reached() -> None:
+    """The force is on the other one, and no element of the file joins them."""
+    file = parse_model_file(MATRICES + SIDE + DRIVE)
+    assert len(file.model.second_order().clearances) == 1
