@@ -1,5 +1,6 @@
 """The model files of format 2 with clearances in ``examples/``: the response that each wants, by
-another road. Those without are in tests/dynamics/test_force_laws.py."""
+another road. Those without are in tests/dynamics/test_force_laws.py, combinations in
+tests/dynamics/test_matrices.py and tests/synthesis/test_combinations.py."""
 
 from __future__ import annotations
 
@@ -20,7 +21,11 @@ from tests.shared.mechanism_file import mechanism_of, omega_of
 from tests.shared.mechanisms import absolute
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FILES = sorted(p for p in EXAMPLES.glob("*.toml") if "[[clearance]]" in p.read_text("utf-8"))
+FILES = sorted(
+    path
+    for path in EXAMPLES.glob("*.toml")
+    if "[[clearance]]\n" in (text := path.read_text("utf-8")) and "\nof = " not in text
+)
 TOUCHED = {"backlash": 2.4, "hammer-base": 60.0}
 """Examples and the frequency at which their first touch is looked for: between two masses; under a
 weight on a moving base."""

@@ -4,6 +4,7 @@ model file to parts that do what the model does."""
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.model_file import parse_model_file
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool
-from tests.shared.system_text import system_text, table
+from tests.shared.system_text import table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
 MATRICES = """\
@@ -31,18 +32,7 @@ CORNER = (
     + "of = { left = 0.8, right = -0.4 }\n"
 )
 SIDE = table("clearance", name="side", between=["right", "ground"], lower=0.25, stiffness=5.0)
-MESHING = {"pinion": 1.0, "turned_pinion": 0.6, "gear": 2.0, "turned_gear": 1.2}
-GROUNDED = {"pinion": 4.0, "turned_pinion": 0.5, "gear": 6.0, "turned_gear": 0.5}
-DAMPED = {"pinion": 0.3, "turned_pinion": 0.15, "gear": 0.4, "turned_gear": 0.2}
-GEARS = system_text(
-    MESHING,
-    {(name, "ground"): stiffness for name, stiffness in GROUNDED.items()},
-    {(name, "ground"): damping for name, damping in DAMPED.items()},
-    table("clearance", name="mesh", upper=0.3, lower=0.3, stiffness=8.0, damping=0.3),
-    "of = { pinion = 1.0, turned_pinion = 1.0, gear = -1.0, turned_gear = -1.0 }\n",
-    table("force", on="turned_pinion", amplitude=0.6),
-    table("response", omega=1.2),
-)
+GEARS = (Path(__file__).parents[2] / "examples" / "gears.toml").read_text("utf-8")
 TEXTS = {
     "coupled": MATRICES + SIDE + DRIVE,
     "combined": MATRICES + CORNER + SIDE + DRIVE,
