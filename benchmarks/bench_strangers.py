@@ -6,7 +6,8 @@ on the exact engine, and what was refused is sought by another search (``strange
 system is a line of ``systems.jsonl``, on disk as soon as it is done; an interrupted run goes on.
 
     python -m benchmarks strangers --seed 1 --count 100 --seconds 120 --out reports/strangers
-    python -m benchmarks strangers --laws --count 60 --out reports/strangers-laws
+    python -m benchmarks strangers --family laws --count 60 --out reports/strangers-laws
+    python -m benchmarks strangers --family linked --count 60 --out reports/strangers-linked
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from benchmarks.bench_flow import commit, machine, table
-from benchmarks.stranger_systems import Stranger, draw
+from benchmarks.stranger_systems import FAMILIES, Family, Stranger, draw
 from designer.base.plain_json import dumps
 from designer.circuit.coefficients import LARGE_ERROR
 
@@ -222,22 +223,22 @@ def population(
     work: Path,
     say: Callable[[str], object] = print,
     *,
-    laws: bool = False,
+    family: Family = "plain",
 ) -> list[Row]:
     """A row for each number, of the file where it is there; each is written as it is done. The last
     line of a number counts: the other search may come later."""
-    rows = {row["number"]: row for row in _read(out / LINES, seed, seconds, laws=laws)}
+    rows = {row["number"]: row for row in _read(out / LINES, seed, seconds, family)}
     with (out / LINES).open("a", encoding="utf-8") as file:
         for number in numbers:
             row = rows.get(number)
             if row is not None and not (search and _to_seek(row)):
                 continue
-            stranger = draw(seed, number, laws=laws)
+            stranger = draw(seed, number, family)
             (work / f"{stranger.name}.toml").write_text(stranger.text, encoding="utf-8")
             row = dict(row or measure(stranger, work, seconds, boards))
             if search and _to_seek(row):
                 row["sought"] = sought(work / f"{stranger.name}.toml", search)
-            own = {"seed": seed, "limit": seconds, **({"laws": True} if laws else {})}
+            own = {"seed": seed, "limit": seconds, "family": family}
             rows[number] = {**own, **row}
             file.write(json.dumps(rows[number]) + "\n")
             file.flush()
@@ -245,7 +246,7 @@ def population(
     return [rows[number] for number in numbers if number in rows]
 
 
-def _read(path: Path, seed: int, seconds: float, *, laws: bool) -> Iterator[Row]:
+def _read(path: Path, seed: int, seconds: float, family: Family) -> Iterator[Row]:
     """Rows that are there; a line that was cut off is none."""
     if not path.exists():
         return
@@ -255,11 +256,16 @@ def _read(path: Path, seed: int, seconds: float, *, laws: bool) -> Iterator[Row]
         path.write_text(whole, encoding="utf-8")
     for line in whole.splitlines():
         row = json.loads(line)
-        if (row["seed"], row["limit"], row.get("laws", False)) != (seed, seconds, laws):
+        if (row["seed"], row["limit"], _family(row)) != (seed, seconds, family):
             found = f"systems of seed {row['seed']} with a limit of {row['limit']:g} s"
-            found += " and laws" if row.get("laws") else ""
+            found += f" and of the family {_family(row)}"
             raise SystemExit(f"{path}: {found}; take another --out for another population")
         yield row
+
+
+def _family(row: Row) -> Family:
+    family: Family = row.get("family", "plain")
+    return family
 
 
 def _line(row: Row) -> str:
@@ -386,7 +392,7 @@ def why(rows: Sequence[Row]) -> Iterator[str]:
 def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     """README.md."""
     f = figures(rows)
-    laws = any(row.get("laws") for row in rows)
+    family = _family(rows[0])
     header = ["what", "systems", "below 1 %", "parts ≤ 20 s", "all ≤ 20 s", "all ≤ 60 s"]
     header += [
         "above 1 %",
@@ -405,9 +411,9 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         "",
         filled(
             f"Made by `python -m benchmarks strangers --seed {seed} --count {len(rows)} "
-            f"--seconds {seconds:g}{' --laws' if laws else ''}`; systems that stand in `{LINES}` "
-            "are taken as they are, so take the folder away to measure anew. Every system can be "
-            "had again from the seed and its number."
+            f"--seconds {seconds:g}{'' if family == 'plain' else f' --family {family}'}`; "
+            f"systems that stand in `{LINES}` are taken as they are, so take the folder away to "
+            "measure anew. Every system can be had again from the seed and its number."
         ),
         "",
         f"- Commit: {commit()}",
@@ -439,7 +445,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
             "circuit reduced and checked) has parts."
         ),
         "",
-        *([_OF_LAWS, ""] if laws else []),
+        *([_OF_FAMILY[family], ""] if family in _OF_FAMILY else []),
         "![Largest coefficient error over CPU seconds](strangers.png)",
         "",
         *table(header, list(_shape_rows(rows))),
@@ -462,11 +468,19 @@ def filled(text: str) -> str:
     return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)
 
 
-_OF_LAWS = filled(
-    "Each of these systems has a force that is no linear spring, damper or stop: a hardening cubic "
-    "spring, two wells, dry friction, also with a static force above the sliding one, a law of two "
-    "to four corners with slopes of both signs, a Hertz contact, or a preload that rises."
-)
+_OF_FAMILY = {
+    "laws": filled(
+        "Each of these systems has a force that is no linear spring, damper or stop: a hardening "
+        "cubic spring, two wells, dry friction, also with a static force above the sliding one, a "
+        "law of two to four corners with slopes of both signs, a Hertz contact, or a preload that "
+        "rises."
+    ),
+    "linked": filled(
+        "Most stops of these systems have a damper, as such or by a restitution; of those with "
+        "several masses half have a mass matrix with couplings, and half of their clearances are "
+        "of combinations of displacements."
+    ),
+}
 COLOURS = {1: "#0072b2", 2: "#009e73", 3: "#d55e00", 4: "#cc79a7"}
 MARKERS = {0: "D", 1: "o", 2: "s", 3: "^"}
 NO_ERROR = 1e-7
@@ -540,9 +554,7 @@ def options(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="number of the first system")
     parser.add_argument("--count", type=int, default=COUNT, help="how many systems")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="CPU limit of synthesise")
-    parser.add_argument(
-        "--laws", action="store_true", help="each with a force that is no linear spring or stop"
-    )
+    parser.add_argument("--family", choices=FAMILIES, default="plain", help="what is drawn")
     parser.add_argument("--boards", type=int, default=BOARDS, help="boards of each circuit")
     parser.add_argument(
         "--search", type=float, default=SEARCHED, help="CPU seconds of the other search; 0: none"
@@ -560,7 +572,7 @@ def main(words: Sequence[str] = ()) -> str:
     if chosen.files is not None:
         chosen.files.mkdir(parents=True, exist_ok=True)
         for number in numbers:
-            stranger = draw(chosen.seed, number, laws=chosen.laws)
+            stranger = draw(chosen.seed, number, chosen.family)
             (chosen.files / f"{stranger.name}.toml").write_text(stranger.text, encoding="utf-8")
         return f"{len(numbers)} model files in {chosen.files}"
     chosen.out.mkdir(parents=True, exist_ok=True)
@@ -576,7 +588,7 @@ def main(words: Sequence[str] = ()) -> str:
                 chosen.boards,
                 chosen.search,
                 work,
-                laws=chosen.laws,
+                family=chosen.family,
             )
         except KeyboardInterrupt:
             said = f"{chosen.out / LINES} has what was done; the same command goes on"

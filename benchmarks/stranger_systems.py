@@ -3,8 +3,9 @@
 What is drawn is without units: masses and springs within a factor of 4, damping ratios of joints
 0.04 to 0.3, gaps of 0.1 to 0.6 of what the drive moves the masses by, stops of 4 to 30 of the
 springs. Then it is written in plain numbers, or in the SI units of a size that machines have.
-With laws, each system has a force that is no linear spring, damper or stop, in the place of one
-clearance or in it.
+Of the family "laws" each system has a force that is no linear spring, damper or stop, in the place
+of one clearance or in it. Of the family "linked" the stops have dampers, and of two masses and more
+there are clearances of combinations of displacements, and mass matrices with couplings.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -44,6 +45,11 @@ LAWS = (
 """Kinds of laws, and how often of ten."""
 IN_A_CLEARANCE = ("stop in steps", "rising preload")
 """Those that are stops."""
+DAMPED, COMBINED, COUPLED = 0.7, 0.5, 0.5
+"""Of the family "linked": shares of the clearances with a damper or a restitution, and of several
+masses of those that are of a combination; of the systems of several masses with a mass matrix."""
+Family = Literal["plain", "laws", "linked"]
+FAMILIES: tuple[Family, ...] = get_args(Family)
 Joint = tuple[str, str]
 T = TypeVar("T")
 
@@ -89,16 +95,16 @@ class Stranger:
         return f"{self.number:04d}"
 
 
-def draw(seed: int, number: int, *, laws: bool = False) -> Stranger:
-    """The system of this number; every number is drawn for itself. laws : whether it has one."""
+def draw(seed: int, number: int, family: Family = "plain") -> Stranger:
+    """The system of this number; every number is drawn for itself."""
     law = None
-    if laws:
+    if family == "laws":
         law = _one_of(LAWS, np.random.default_rng([seed, number // 10, 3]), number % 10)
     shape = _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
     size = _one_of(SIZES, np.random.default_rng([seed, number // 10, 2]), number % 10)
     rng = np.random.default_rng([seed, number])
     while True:  # a drawn system may be refused as a model, or never meet a stop
-        drawn = _Drawn(rng, *shape, size, law)
+        drawn = _Drawn(rng, *shape, size, law, linked=family == "linked")
         text = drawn.with_response(f"Stranger {seed}-{number}")
         if text is not None:
             return Stranger(number, *drawn.shape, drawn.kinds, size.name, text)
@@ -120,6 +126,8 @@ class _Drawn:
         clearances: int,
         size: Size,
         law: str | None = None,
+        *,
+        linked: bool = False,
     ) -> None:
         self._rng, self._size, self._law = rng, size, law
         clearances -= law is not None and law not in IN_A_CLEARANCE
@@ -138,6 +146,9 @@ class _Drawn:
         self._flexibility = np.linalg.inv(self._matrix(self._springs))
         self._reach = np.abs(self._flexibility) @ np.maximum(self._force, 0.0)
         self._gaps = [self._gap(k) for k in range(clearances)]
+        self._couplings = np.zeros((masses, masses))
+        if linked:
+            self._link()
         self._laws: list[tuple[str, dict[str, tuple[object, str]]]] = []
         if law in IN_A_CLEARANCE:
             self._bend_a_stop(law == "rising preload")
@@ -238,6 +249,31 @@ class _Drawn:
         out |= {"upper": gap(), "lower": gap(), "upper_stiffness": stop()}
         return out | {"lower_stiffness": stop()}
 
+    def _link(self) -> None:
+        """Dampers in the stops, combinations in the place of ends, and a mass matrix."""
+        rng, n = self._rng, len(self._names)
+        for gap in self._gaps:
+            if n > 1 and rng.uniform() < COMBINED:
+                factors = rng.uniform(0.3, 1.0, n) * rng.choice([-1.0, 1.0], n)
+                factors[int(rng.integers(n))] = 1.0
+                pairs = zip(self._names, factors.tolist(), strict=True)
+                del gap["between"]
+                gap["of"] = {name: float(f"{factor:.3g}") for name, factor in pairs}
+                self._kinds.add("combination")
+            alike = "upper_stiffness" not in gap
+            if alike and rng.uniform() < DAMPED:
+                if "of" in gap or rng.uniform() < 0.5:
+                    stiffness, mass = float(str(gap["stiffness"])), float(self._mass.mean())
+                    share = rng.uniform(0.05, 0.4)
+                    gap["damping"] = 2.0 * share * math.sqrt(stiffness * mass)
+                else:
+                    gap["restitution"] = float(f"{rng.uniform(0.3, 0.95):.2g}")
+                self._kinds.add("damped stops")
+        if n > 1 and rng.uniform() < COUPLED:
+            shares = np.triu(rng.uniform(-0.3, 0.3, (n, n)), 1)
+            self._couplings = (shares + shares.T) * np.sqrt(np.outer(self._mass, self._mass))
+            self._kinds.add("mass matrix")
+
     def _bend_a_stop(self, preload: bool) -> None:
         """The first clearance with a Hertz contact in the place of its stiffness, or with a preload
         that rises."""
@@ -309,15 +345,7 @@ class _Drawn:
     def _elements(self, title: str) -> str:
         """The file without its response."""
         lines = ["format = 2\n", f'title = "{title}"\n']
-        for name, mass in zip(self._names, self._mass, strict=True):
-            lines.append(_table("[[mass]]", [("name", name), ("mass", self._value(mass, "kg"))]))
-        for kind, key, unit, joints in (
-            ("spring", "stiffness", "N/m", self._springs),
-            ("damper", "damping", "N s/m", self._dampers),
-        ):
-            for pair, value in joints.items():
-                joint = ("between", list(pair)), (key, self._value(value, unit))
-                lines.append(_table(f"[[{kind}]]", joint))
+        lines += self._matrices() if self._couplings.any() else self._links()
         for gap in self._gaps:
             keys = [(k, self._of_gap(k, value)) for k, value in gap.items()]
             lines.append(_table("[[clearance]]", keys))
@@ -334,9 +362,35 @@ class _Drawn:
         lines.append(_table("[circuit]", [("dead_zone", "rectifier")]))
         return "".join(lines)
 
+    def _links(self) -> Iterator[str]:
+        """The tables of masses, springs and dampers."""
+        for name, mass in zip(self._names, self._mass, strict=True):
+            yield _table("[[mass]]", [("name", name), ("mass", self._value(mass, "kg"))])
+        for kind, key, unit, joints in (
+            ("spring", "stiffness", "N/m", self._springs),
+            ("damper", "damping", "N s/m", self._dampers),
+        ):
+            for pair, value in joints.items():
+                joint = ("between", list(pair)), (key, self._value(value, unit))
+                yield _table(f"[[{kind}]]", joint)
+
+    def _matrices(self) -> Iterator[str]:
+        """The same as one table of matrices, in plain numbers: those of a file in SI are SI."""
+        keys: list[tuple[str, object]] = [("names", self._names)]
+        for key, matrix, unit in (
+            ("mass", np.diag(self._mass) + self._couplings, "kg"),
+            ("stiffness", self._matrix(self._springs), "N/m"),
+            ("damping", self._matrix(self._dampers), "N s/m"),
+        ):
+            sized = (matrix * self._units[unit]).tolist()
+            keys.append((key, [[float(f"{entry:.6g}") for entry in row] for row in sized]))
+        yield _table("[matrices]", keys)
+
     def _of_gap(self, key: str, value: object) -> object:
+        if key == "restitution":
+            return value
         if isinstance(value, float):
-            units = {"preload": "N", "constant": "N/m^1.5"}
+            units = {"preload": "N", "constant": "N/m^1.5", "damping": "N s/m"}
             unit = "N/m" if key.endswith("stiffness") else units.get(key, "m")
             return self._value_of(value, unit)
         return list(value) if isinstance(value, tuple) else value
@@ -359,8 +413,14 @@ class _Drawn:
 
 
 def _table(head: str, keys: Sequence[tuple[str, object]]) -> str:
-    lines = [f"{key} = {json.dumps(value)}" for key, value in keys]
+    lines = [f"{key} = {_toml(value)}" for key, value in keys]
     return "\n".join(["", head, *lines, ""])
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {each}" for key, each in value.items()) + " }"
+    return json.dumps(value)
 
 
 def _from_rest(modelfile: ModelFile) -> Orbit:

@@ -54,7 +54,7 @@ def test_thirty_in_a_row_have_every_shape(monkeypatch: pytest.MonkeyPatch) -> No
 def test_ten_in_a_row_have_every_law() -> None:
     kinds: Counter[str] = Counter()
     for number in range(10):
-        stranger = draw(5, number, laws=True)
+        stranger = draw(5, number, "laws")
         modelfile = parse_model_file(stranger.text)
         system = modelfile.model.second_order()
         assert (system.size, len(system.clearances)) == (stranger.masses, stranger.clearances)
@@ -63,6 +63,23 @@ def test_ten_in_a_row_have_every_law() -> None:
         if number < 4:
             assert all(r.found for r in find(modelfile.model, modelfile.responses))
     assert kinds == dict(LAWS)
+
+
+def test_thirty_in_a_row_are_linked_in_every_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The files are read as they are; no response is looked for here."""
+    monkeypatch.setattr(
+        stranger_systems._Drawn,
+        "with_response",
+        lambda self, title: self._elements(title) + "\n[[response]]\nomega = 1.0\n",
+    )
+    kinds: Counter[str] = Counter()
+    for number in range(30):
+        stranger = draw(5, number, "linked")
+        clearances = parse_model_file(stranger.text).model.second_order().clearances
+        assert any(stop.damping for stop in clearances) == ("damped stops" in stranger.kinds)
+        assert any(stop.push for stop in clearances) == ("mass matrix" in stranger.kinds)
+        kinds.update(stranger.kinds)
+    assert min(kinds[kind] for kind in ("damped stops", "combination", "mass matrix")) >= 5
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

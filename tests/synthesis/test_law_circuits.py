@@ -81,7 +81,7 @@ def test_the_curve_of_a_law_is_that_of_the_board() -> None:
 def test_drawn_systems_that_a_search_gave_up_on_have_circuits(number: int) -> None:
     """Bends that no response reaches, bends between masses, a swing that was lowered in steps too
     small: each of these was refused once."""
-    shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, laws=True).text), jobs=2))
+    shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, "laws").text), jobs=2))
 
 
 def test_a_swing_is_lowered_from_where_the_design_is() -> None:
