@@ -21,8 +21,18 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.bench_flow import commit, machine, table
-from benchmarks.bench_strangers import REPORT, SEED, Run, ended, filled, last_line, printed_json
-from benchmarks.stranger_systems import Stranger, draw
+from benchmarks.bench_strangers import (
+    REPORT,
+    SEED,
+    Run,
+    ended,
+    family_of,
+    family_words,
+    filled,
+    last_line,
+    printed_json,
+)
+from benchmarks.stranger_systems import FAMILIES, Family, Stranger, draw
 
 FILE, RUNS_FILE, SEARCHES_FILE = "runs.md", "runs.jsonl", "searches.jsonl"
 RUNS, SEARCHES = 30, 10
@@ -103,6 +113,7 @@ def _yield(response: Row) -> dict[str, Any]:
 def population(
     path: Path,
     seed: int,
+    family: Family,
     numbers: Sequence[int],
     measure: Callable[[Stranger, Path, Path], Row],
     work: Path,
@@ -113,17 +124,17 @@ def population(
         whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
         rows = {row["number"]: row for row in map(json.loads, whole.splitlines())}
         path.write_text("".join(f"{json.dumps(row)}\n" for row in rows.values()), encoding="utf-8")
-    if any(row["seed"] != seed for row in rows.values()):
-        raise SystemExit(f"{path}: systems of another seed; take another --out")
+    if any((row["seed"], family_of(row)) != (seed, family) for row in rows.values()):
+        raise SystemExit(f"{path}: systems of another seed or family; take another --out")
     with path.open("a", encoding="utf-8") as file:
         for number in numbers:
             if number in rows:
                 continue
-            stranger = draw(seed, number)
+            stranger = draw(seed, number, family)
             model, design = work / f"{stranger.name}.toml", work / stranger.name
             model.write_text(stranger.text, encoding="utf-8")
             shutil.rmtree(design, ignore_errors=True)
-            rows[number] = {"seed": seed, **measure(stranger, model, design)}
+            rows[number] = {"seed": seed, "family": family, **measure(stranger, model, design)}
             file.write(json.dumps(rows[number]) + "\n")
             file.flush()
             print(number, _words(rows[number]), flush=True)
@@ -223,9 +234,9 @@ def report(rows: Sequence[Row], searches: Sequence[Row], seed: int) -> str:
         "",
         filled(
             f"Made by `python -m benchmarks stranger_runs --seed {seed} --runs {len(rows)} "
-            f"--searches {len(searches)}`: systems {APART} apart (`run`, 200 boards) and "
-            f"{FAR_APART} apart (`search`). Lines of `{RUNS_FILE}` and `{SEARCHES_FILE}` are taken "
-            "as they are; take them away to measure anew."
+            f"--searches {len(searches)}{family_words(rows)}`: systems {APART} apart (`run`, 200 "
+            f"boards) and {FAR_APART} apart (`search`). Lines of `{RUNS_FILE}` and "
+            f"`{SEARCHES_FILE}` are taken as they are; take them away to measure anew."
         ),
         "",
         f"- Commit: {commit()}",
@@ -271,6 +282,7 @@ def report(rows: Sequence[Row], searches: Sequence[Row], seed: int) -> str:
 def options(words: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks stranger_runs", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--family", choices=FAMILIES, default="plain", help="what is drawn")
     parser.add_argument("--runs", type=int, default=RUNS, help="systems of run")
     parser.add_argument("--searches", type=int, default=SEARCHES, help="systems of search")
     parser.add_argument("--out", type=Path, default=REPORT, help="folder of the report")
@@ -285,11 +297,13 @@ def main(words: Sequence[str] = ()) -> str:
     with contextlib.ExitStack() as stack:
         work = chosen.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         work.mkdir(parents=True, exist_ok=True)
-        seed, out = chosen.seed, chosen.out
+        (seed, family), out = (chosen.seed, chosen.family), chosen.out
         numbers = range(0, APART * chosen.runs, APART)
-        rows = population(out / RUNS_FILE, seed, numbers, run_row, work)
+        rows = population(out / RUNS_FILE, seed, family, numbers, run_row, work)
         numbers = range(0, FAR_APART * chosen.searches, FAR_APART)
         (work / "search").mkdir(exist_ok=True)
-        searches = population(out / SEARCHES_FILE, seed, numbers, search_row, work / "search")
+        searches = population(
+            out / SEARCHES_FILE, seed, family, numbers, search_row, work / "search"
+        )
     (out / FILE).write_text(report(rows, searches, seed), encoding="utf-8")
     return ", ".join(f"{name} {count}" for name, count in figures(rows, searches).items())

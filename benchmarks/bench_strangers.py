@@ -256,16 +256,23 @@ def _read(path: Path, seed: int, seconds: float, family: Family) -> Iterator[Row
         path.write_text(whole, encoding="utf-8")
     for line in whole.splitlines():
         row = json.loads(line)
-        if (row["seed"], row["limit"], _family(row)) != (seed, seconds, family):
+        if (row["seed"], row["limit"], family_of(row)) != (seed, seconds, family):
             found = f"systems of seed {row['seed']} with a limit of {row['limit']:g} s"
-            found += f" and of the family {_family(row)}"
+            found += f" and of the family {family_of(row)}"
             raise SystemExit(f"{path}: {found}; take another --out for another population")
         yield row
 
 
-def _family(row: Row) -> Family:
+def family_of(row: Row) -> Family:
+    """Family of a system that was measured."""
     family: Family = row.get("family", "plain")
     return family
+
+
+def family_words(rows: Sequence[Row]) -> str:
+    """The option that asks for the family of these; "" for the plain one."""
+    family = family_of(rows[0]) if rows else "plain"
+    return "" if family == "plain" else f" --family {family}"
 
 
 def _line(row: Row) -> str:
@@ -392,7 +399,7 @@ def why(rows: Sequence[Row]) -> Iterator[str]:
 def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
     """README.md."""
     f = figures(rows)
-    family = _family(rows[0])
+    family = family_of(rows[0])
     header = ["what", "systems", "below 1 %", "parts ≤ 20 s", "all ≤ 20 s", "all ≤ 60 s"]
     header += [
         "above 1 %",
@@ -411,7 +418,7 @@ def report(rows: Sequence[Row], seed: int, seconds: float) -> str:
         "",
         filled(
             f"Made by `python -m benchmarks strangers --seed {seed} --count {len(rows)} "
-            f"--seconds {seconds:g}{'' if family == 'plain' else f' --family {family}'}`; "
+            f"--seconds {seconds:g}{family_words(rows)}`; "
             f"systems that stand in `{LINES}` are taken as they are, so take the folder away to "
             "measure anew. Every system can be had again from the seed and its number."
         ),
