@@ -136,7 +136,8 @@ class _Statics:
         return max(tops) > 1.0
 
     def open(self) -> StaticRest | None:
-        """All dead zones open: up to near the force that closes the first one, either way."""
+        """All dead zones open: up to near the force that closes the first one, either way, as far
+        as no output clips."""
         sides = (0,) * len(self.model.dead_zones)
         ends = []
         for k, zone in enumerate(self.model.dead_zones):
@@ -158,7 +159,18 @@ class _Statics:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         if half <= 0.0:
             return None
-        return StaticRest(sides, None, middle - INSIDE * half, middle + INSIDE * half)
+        near, far = middle - INSIDE * half, middle + INSIDE * half
+        least = float(np.clip(0.0, near, far))
+        near, far = (self._unclipped(sides, least, end) for end in (near, far))
+        return StaticRest(sides, None, near, far)
+
+    def _unclipped(self, sides: tuple[int, ...], least: float, force: float) -> float:
+        """A force on the way from the least one to this at which no output clips."""
+        for _ in range(ROUNDS):
+            if not self.clipped(sides, force):
+                break
+            force = least + 0.5 * (force - least)
+        return force
 
     def contact(self, zone: int, side: int) -> StaticRest | None:
         """In contact with one stop, and with whichever others that takes."""

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.stranger_systems import draw
 from designer.base.errors import InputError
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.nominal import nominal_reduction, on_circuit
@@ -61,6 +62,15 @@ def test_chosen_parts_do_what_the_model_does(name: str) -> None:
         check = equation_check.check(result.design, result.model_responses, pool)
     assert check.passed, check.problem
     assert all(np.isfinite(finding.deviation) for finding in check.findings)
+
+
+@pytest.mark.slow
+def test_a_line_ends_before_an_amplifier_that_sums_clips() -> None:
+    """With one stop the sum of displacements goes far on the other side, while others are open."""
+    result = synthesise(parse_model_file(draw(1, 12, "linked").text), jobs=2)
+    with SpicePool(2) as pool:
+        check = equation_check.check(result.design, result.model_responses, pool)
+    assert check.passed, check.problem
 
 
 def test_impacts_and_misses_are_in_the_clearance_s_own_units() -> None:
