@@ -16,7 +16,7 @@ from designer.check.deck_runs import FirstRun
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit
 from designer.spice import opamp_model
-from designer.spice.deck import diode_cards, diode_names
+from designer.spice.deck import diode_cards, diode_names, following
 from designer.spice.opamp_model import literal
 
 GENERATOR = "generator"
@@ -100,14 +100,11 @@ def directives(circuit: Circuit, run: FirstRun) -> tuple[str, ...]:
     s = run.settings
     by_name = {c.name: c for c in circuit.capacitors}
     # The other plate is a summing node, which starts at 0 V.
-    starts = (
-        []
-        if run.initial is None
-        else [
-            f".ic v({kicad_net(by_name[name].plus)})={literal(volts)}"
-            for name, volts in zip(circuit.states, run.initial, strict=True)
-        ]
-    )
+    volts: dict[str, float] = {}
+    if run.initial is not None:
+        volts = dict(zip(circuit.states, run.initial.tolist(), strict=True))
+        volts |= following(circuit, nominal_board(circuit), run.initial)
+    starts = [f".ic v({kicad_net(by_name[name].plus)})={literal(v)}" for name, v in volts.items()]
     return (
         f".options method={s.method} reltol={literal(s.reltol)}",
         f".options abstol={literal(s.abstol)} vntol={literal(s.vntol)} noopiter",

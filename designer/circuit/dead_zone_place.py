@@ -59,7 +59,7 @@ class StopForce:
     mass: int
     """Index of the mass."""
     factor: float
-    """Of the force, 1 of the first mass."""
+    """Of the force: 1 of the first mass, or -1."""
     source: str
     """Net that drives both: the stage's output, or its negative."""
 

@@ -139,8 +139,8 @@ class Design:
     @property
     def moving(self) -> int:
         """Index of the displacement in the first clearance, or of the first one."""
-        stops = self.model.second_order().clearances
-        return 2 * stops[0].mass if stops else 0
+        system = self.model.second_order()
+        return 2 * system.dead_zones[0].mass if system.clearances else 0
 
     def impact_volts(self, orbit: Orbit, volts: Array) -> Array:
         """(k,) volts per unit of the model's velocity at each impact of a board's orbit, by its

@@ -60,34 +60,54 @@ def law_curves(design: Design, extremes: list[Array], *, si: bool) -> tuple[LawC
 
 
 def _made_bends(design: Design) -> dict[str, list[MadeBend]]:
-    """By law, or by clearance, in model units."""
+    """By law, in model units, over what it depends on as ``_turn`` has it."""
     system, scales = design.model.second_order(), design.errors.scales
+    laws = {law.name: law for law in system.laws}
     reduction = Reduction(design.circuit, nominal_board(design.circuit, ideal=True))
     found: dict[str, list[MadeBend]] = defaultdict(list)
     for k, zone in enumerate(system.dead_zones):
-        if not zone.bend_of:
+        law = laws.get(zone.bend_of)
+        if law is None:
             continue
+        # A dead zone counts displacement and force as its first mass has them.
+        factor = _turn(law) * law.row[zone.mass]
+        own = abs(float(system.push(law)[zone.mass]))
         reading = DeadZoneReading.of(reduction, k, zone)
         state, row = zone.watched, 2 * zone.mass + 1
         unit = scales.seconds * scales.volts[state] / scales.volts[row] * system.mass[zone.mass]
         for side, volts in reading.thresholds.items():
             slope = reading.slopes[side if side in reading.slopes else 0]
-            place = volts / float(scales.volts[state])
-            found[zone.bend_of].append((side, place, -float(slope[row, state] * unit)))
+            place = factor * volts / float(scales.volts[state])
+            felt = dict(zone.pushed)[zone.mass] * float(slope[row, state] * unit)
+            found[zone.bend_of].append((side, place, -felt / (factor * own)))
     return found
+
+
+def _turn(law: ForceLaw) -> float:
+    """The sign with which a law is drawn: one of a mass seen from the ground's side is drawn over
+    the mass's own displacement."""
+    return 1.0 if max(law.row) > 0.0 else -1.0
+
+
+def _symbol(law: ForceLaw) -> str:
+    """What a law is drawn over: "x₁", "x₁′ − x₂′", "0.5 x₁ + 0.25 x₂"."""
+    prime = "′" if law.quantity == "velocity" else ""
+    factors = {i: _turn(law) * factor for i, factor in enumerate(law.row) if factor}
+    words: list[str] = []
+    for i in sorted(factors, key=lambda each: -factors[each]):
+        size = "" if abs(factors[i]) == 1.0 else f"{abs(factors[i]):.4g} "
+        sign = "" if not words and factors[i] > 0.0 else "− " if factors[i] < 0.0 else "+ "
+        words.append(f"{sign}{size}{subscripted(f'x{i + 1}')}{prime}")
+    return " ".join(words)
 
 
 def _curve(
     law: ForceLaw, own: Sequence[MadeBend], extremes: Sequence[Array], *, si: bool
 ) -> LawCurve:
     places = [i for i, factor in enumerate(law.row) if factor]
-    # A law of one mass seen from the ground's side is drawn over the mass's own displacement.
-    sign = law.row[places[0]] if len(places) == 1 else 1.0
-    prime, rate = ("′", 1) if law.quantity == "velocity" else ("", 0)
-    ordered = sorted(places, key=lambda i: -law.row[i]) if len(places) > 1 else places
-    symbol = " − ".join(subscripted(f"x{i + 1}") + prime for i in ordered)
+    sign, symbol, rate = _turn(law), _symbol(law), int(law.quantity == "velocity")
     reached = None
-    if len(places) == 1 and extremes:
+    if len(places) == 1 and abs(law.row[places[0]]) == 1.0 and extremes:
         rows = np.array([each[2 * places[0] + rate] for each in extremes if len(each)])
         reached = (float(rows[:, 0].min()), float(rows[:, 1].max())) if len(rows) else None
     far = FAR * max([law.reach, *map(abs, reached or ())])

@@ -132,7 +132,8 @@ def _thresholds(design: Design) -> list[tuple[str, float]]:
     """Where contact begins [V], as a distance from rest. Several clearances have a row for each
     stop, on the scale of the mass that moves in it; one has a row, or two where its middle is off
     rest."""
-    scales, clearances = design.errors.scales, design.model.second_order().clearances
+    scales, system = design.errors.scales, design.model.second_order()
+    clearances = system.dead_zones[: len(system.clearances)]
     if len(clearances) > 1:
         return [
             (f"threshold of contact, {c.name}, {SIDES[side]} stop, of v{2 * c.mass + 1}", volts)

@@ -111,13 +111,17 @@ def _fits(record: BenchedRecord) -> bool:
 def check_fits(
     prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
 ) -> None:
-    """InputError where boards with laws are to be fitted: the fit knows contacts alone."""
+    """InputError where boards with laws, or with dampers in their stops, are to be fitted: the fit
+    knows contacts alone, and rates that are continuous there."""
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
     for option, wanted in asked.items():
         if wanted and laws:
             expected = "a board whose forces are those of clearances; records alone are named"
             raise InputError(None, option, f"a board with bends of {laws}", expected)
+        if wanted and prediction.circuit.dependent_capacitors:
+            expected = "a board whose stops have no dampers; records alone are named"
+            raise InputError(None, option, "a board with dampers in its stops", expected)
 
 
 def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:

@@ -39,6 +39,8 @@ class HarmonicForce:
     """(masses,) amplitudes."""
 
 
+ROUNDING = 1e-12
+"""Of the size of its terms: a sum below it is none."""
 Shape = tuple[tuple[int, float, float], ...]
 """(n, amplitude of sin nωt, amplitude of cos nωt) of each wave of a sum."""
 SINE: Shape = ((1, 1.0, 0.0),)
@@ -94,20 +96,24 @@ class SecondOrderSystem:
         """The same motion as with this mass matrix (n, n), whose diagonal is ``mass``: every force
         acts on each mass as much as it does through the couplings. The matrices are no longer
         symmetric."""
-        through = self.mass[:, None] * np.linalg.inv(mass_matrix)
+        inverse = self.mass[:, None] * np.linalg.inv(mass_matrix)
+
+        def through(forces: Array) -> Array:
+            out, terms = inverse @ forces, np.abs(inverse) @ np.abs(forces)
+            return np.where(np.abs(out) > ROUNDING * terms, out, 0.0)
 
         def push(element: Clearance | ForceLaw) -> tuple[float, ...]:
-            return tuple((through @ self.push(element)).tolist())
+            return tuple(through(self.push(element)).tolist())
 
         return replace(
             self,
-            damping=through @ self.damping,
-            stiffness=through @ self.stiffness,
-            force=through @ self.force,
-            quadrature=through @ self.quadrature,
-            constant=through @ self.constant,
+            damping=through(self.damping),
+            stiffness=through(self.stiffness),
+            force=through(self.force),
+            quadrature=through(self.quadrature),
+            constant=through(self.constant),
             harmonics=tuple(
-                replace(wave, sine=through @ wave.sine, cosine=through @ wave.cosine)
+                replace(wave, sine=through(wave.sine), cosine=through(wave.cosine))
                 for wave in self.harmonics
             ),
             clearances=tuple(replace(stop, push=push(stop)) for stop in self.clearances),
@@ -361,7 +367,7 @@ def displacement_shape(
 
 def _without_rounding(less: Array, whole: Array) -> Array:
     """What is left of ``whole``, with zeros where that is rounding."""
-    rounding = 1e-12 * max(np.abs(less).max(initial=0.0), np.abs(whole).max(initial=0.0))
+    rounding = ROUNDING * max(np.abs(less).max(initial=0.0), np.abs(whole).max(initial=0.0))
     return np.where(np.abs(less) > rounding, less, 0.0)
 
 

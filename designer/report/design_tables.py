@@ -158,6 +158,9 @@ def _wanted(design: Design, name: str) -> str:
         return "0"
     if name.endswith("stop slope"):
         return words.number(system.relative_stiffness(system.dead_zones[0]))
+    if name.endswith("stop damping"):
+        zone = system.dead_zones[0]
+        return words.number(zone.damping / float(system.mass[zone.mass]))
     return words.NONE
 
 

@@ -18,7 +18,7 @@ NONE = "–"
 
 TERM = re.compile(r"x(\d+)('{1,2}) x(\d+)('?)")
 _SLOPE = re.compile(
-    r"(?:(upper|lower) )?(stop|bend) slope(?: (?!x\d+' x)(.+?))?(?: x(\d+)' x(\d+)('?))?"
+    r"(?:(upper|lower) )?(stop|bend) (slope|damping)(?: (?!x\d+' x)(.+?))?(?: x(\d+)' x(\d+)('?))?"
 )
 _GAP = re.compile(r"(gap|bend) (.+) (upper|lower)")
 _REST = re.compile(r"(dead-zone null|dead-zone bias|constant)(?: (.+))?")
@@ -65,13 +65,15 @@ def coefficient(name: str, spring: str = "K1") -> str:
         left, right = name.split()
         return f"{_pretty(right)} in the equation of {_pretty(left)}"
     if slope := _SLOPE.fullmatch(name):
-        side, kind, zone, row, column, rate = slope.groups()
+        side, kind, what, zone, row, column, rate = slope.groups()
         end = f"{'a' if side is None else f'the {side}'} {kind}{_of(zone)}"
         if row is not None:
             state = _pretty(f"x{column}{rate}")
             return f"{state} in the equation of {_pretty(f'x{row}')}″, by {end}"
         if kind == "bend":
             return f"change of the slope at {end}"
+        if what == "damping":
+            return f"damping of {end}, over its mass"
         return f"stiffness of {end}, over {spring}"
     if gap := _GAP.fullmatch(name):
         kind = "gap to the {2} stop" if gap[1] == "gap" else "place of the {2} bend"

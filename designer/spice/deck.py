@@ -216,7 +216,7 @@ def capacitors(
     then [V]."""
     states = np.zeros(len(circuit.states)) if initial is None else initial
     start = dict(zip(circuit.states, states, strict=True))
-    start |= _following(circuit, board, states, generator)
+    start |= following(circuit, board, states, generator)
     return [
         f"{c.name} {c.plus} {c.minus} {literal(board.values[c.name])} "
         f"IC={literal(start.get(c.name, 0.0))}"
@@ -224,7 +224,9 @@ def capacitors(
     ]
 
 
-def _following(circuit: Circuit, board: Board, states: Array, generator: float) -> dict[str, float]:
+def following(
+    circuit: Circuit, board: Board, states: Array, generator: float = 0.0
+) -> dict[str, float]:
     """Voltages of the capacitors that follow from the states; 0 V where no mode holds at these."""
     if not circuit.dependent_capacitors:
         return {}

@@ -24,7 +24,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.clearance import Clearance
-from designer.model.mechanics import MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import ROUNDING, MechanicalModel, SecondOrderSystem
 
 _SECTION = re.compile("[A-OQ-Z]")
 """Names that sections may have: U1P is the supply of U1."""
@@ -75,8 +75,6 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
             raise InputError(None, "circuit.preferred", value, expected)
 
 
-ROUNDING = 1e-12
-"""Of the size of its terms: a sum below it is none."""
 MOST_DEAD_ZONES = 8
 """On one board."""
 _ONE_GENERATOR = "one generator, with a sine, drives them all"

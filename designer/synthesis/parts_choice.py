@@ -222,7 +222,10 @@ class _Search:
         system = self.order.model.second_order()
         zones = system.dead_zones
         plain = not zones or (
-            len(zones) == 1 and alike(zones[0]) and zones[0].pushed == ((0, 1.0),)
+            len(zones) == 1
+            and alike(zones[0])
+            and zones[0].pushed == ((0, 1.0),)
+            and zones[0].quantity == "displacement"
         )
         return self.by_joins and plain and not system.wired.constant.any()
 

@@ -15,7 +15,8 @@ the orbit x(t) of x' = f(x, t, z), the derivative by a coordinate z_k obeys
 with A and ∂f/∂z_k of the mode that holds. Where a mode begins f is continuous, so y is as well, and
 what a coordinate does to a stop is in ∂f/∂z_k of the contact. Steps are those of the orbit's grid:
 A by its exponential, ∂f/∂z_k by the trapezoidal rule, a step with an entry or exit shared between
-both modes. The orbit's own y closes after n periods.
+both modes. The orbit's own y closes after n periods. Of a board with dampers in its stops f jumps
+there, and none is fitted (``jobs.bench_job.check_fits``).
 """
 
 from __future__ import annotations

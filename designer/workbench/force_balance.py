@@ -20,6 +20,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from designer.base.arrays import Array, Mask
+from designer.circuit.netlist import Circuit
+from designer.circuit.noise_gains import conductance
+from designer.circuit.stop import Stop
 from designer.workbench.drive_estimate import spectrum_tops, tuned
 from designer.workbench.prediction import BoardPrediction, PredictedStop
 
@@ -258,12 +261,13 @@ class ForceBalance:
         else:
             return None
         if key not in self._answers:
-            self._answers[key] = self._answer(wave - wave.mean(), self._free.stops[index])
+            column, lag = self._free.stops[index], self._free.lags[index]
+            self._answers[key] = self._answer(wave - wave.mean(), column, lag)
         return key
 
-    def _answer(self, wave: Array, column: Array) -> Array:
+    def _answer(self, wave: Array, column: Array, lag: float = 0.0) -> Array:
         """(k, n) the states' answer to a force."""
-        return self._without_rest(self._free.answer(wave, float(self._time[1]), column))
+        return self._without_rest(self._free.answer(wave, float(self._time[1]), column, lag))
 
     def _without_rest(self, waves: Array, channel: int | None = None) -> Array:
         """Waves (k, …) without what free motions have; 0 where a channel is cut off."""
@@ -350,9 +354,12 @@ class _LinearPart:
     """(n,) per volt of the generator."""
     stops: tuple[Array, ...]
     """(n,) per volt of each dead zone's output."""
+    lags: tuple[float, ...]
+    """What a damper adds to the force of each: so many seconds of its output's rate."""
 
-    def answer(self, wave: Array, step: float, column: Array) -> Array:
-        """(k, n) states from rest under a force (k,), straight between its samples."""
+    def answer(self, wave: Array, step: float, column: Array, lag: float = 0.0) -> Array:
+        """(k, n) states under a force (k,) and ``lag`` [s] times its rate, straight between its
+        samples, but for a free motion. The rate b w' moves them by b w, and as A b w would."""
         sizes = np.linalg.solve(self.shapes, column.astype(complex))
         out = np.zeros((len(wave), len(self.roots)), dtype=complex)
         for root, size, shape in zip(self.roots, sizes, self.shapes.T, strict=True):
@@ -363,8 +370,8 @@ class _LinearPart:
             new, old = step * second, step * (first - second)
             begun = np.array([-new * wave[0]])
             moved, _ = lfilter([new, old], [1.0, -grown], wave.astype(complex), zi=begun)
-            out += np.outer(moved * size, shape)
-        return np.asarray(out.real)
+            out += np.outer((1.0 + lag * root) * moved * size, shape)
+        return np.asarray(out.real + lag * np.outer(wave, column))
 
 
 def _linear(prediction: BoardPrediction) -> _LinearPart:
@@ -383,7 +390,16 @@ def _linear(prediction: BoardPrediction) -> _LinearPart:
     # Equal roots have no vectors of their own: a rounding of the matrix parts them.
     size = float(np.abs(rest.A).max())
     roots, shapes = np.linalg.eig(rest.A + DIRECT * size * np.diag(np.arange(n) / n))
-    return _LinearPart(roots.astype(complex), shapes.astype(complex), rest.B, tuple(columns))
+    lags = tuple(_lag(circuit, stop) for stop in circuit.dead_zones)
+    return _LinearPart(roots.astype(complex), shapes.astype(complex), rest.B, tuple(columns), lags)
+
+
+def _lag(circuit: Circuit, stop: Stop) -> float:
+    """Damping of a stop over its stiffness [s]; 0 without a damper."""
+    for c in circuit.dependent_capacitors:
+        if c.plus == stop.driving:
+            return c.value / conductance(circuit, c.plus, c.minus)
+    return 0.0
 
 
 def _columns(time: Array, frequency: float) -> Array:

@@ -36,6 +36,8 @@ SAME_FREQUENCY = 1e-3
 """Of a setting's frequency: how far a scope's clock shows it elsewhere, with room to spare."""
 SAME_AMPLITUDE = 0.06
 """Of a setting's amplitude: three standard deviations of a scope's gain."""
+SHARE = 1e-6
+"""Of the largest: a voltage that takes less part in a displacement takes none."""
 LEVEL = 0.05
 """Of its range: how near its level inside the clearance an output rests."""
 
@@ -235,8 +237,9 @@ def _zones(reduction: Reduction) -> tuple[PredictedStop, ...]:
         largest = circuit.states.index(stop.state)
         net, sign = stop.difference or (circuit.state_nets[largest], 1)
         row = sign * still.voltage[net]
+        least = SHARE * float(np.abs(row[:-2]).max())
         made_of = {
-            net: float(row[k]) for k, net in enumerate(circuit.state_nets) if abs(row[k]) > 0.01
+            net: float(row[k]) for k, net in enumerate(circuit.state_nets) if abs(row[k]) > least
         }
         ends = {
             side: float(row[-1] + row[largest] * reduction.threshold(stop, contact))

@@ -12,8 +12,11 @@ import pytest
 from benchmarks.stranger_systems import draw
 from designer.base.errors import InputError
 from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.law_curves import law_curves
 from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.folders import bench_tables
 from designer.model.model_file import parse_model_file
+from designer.report import words
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool
 from tests.shared.system_text import table
@@ -105,3 +108,66 @@ def test_a_mass_that_matrices_couple_is_reached() -> None:
     """The force is on the other one, and no element of the file joins them."""
     file = parse_model_file(MATRICES + SIDE + DRIVE)
     assert len(file.model.second_order().clearances) == 1
+
+
+RELATIVE = """\
+format = 2
+[matrices]
+names = ["first", "between"]
+mass = [[1.0, 0.3], [0.3, 0.3]]
+stiffness = [[2.0, 0.0], [0.0, 1.0]]
+damping = [[0.2, 0.0], [0.0, 0.1]]
+[[clearance]]
+name = "A"
+of = { first = 1.0, between = 1.0 }
+upper = 0.3
+stiffness = 6.0
+[[force]]
+on = "first"
+amplitude = 0.4
+[[force]]
+on = "between"
+amplitude = 0.4
+[[response]]
+omega = 1.2
+"""
+"""A mass of 0.7 and one of 0.3 on it, by the displacement between them: M is no diagonal, yet what
+pushes both coordinates alike moves the second mass alone."""
+
+
+def test_what_cancels_in_the_couplings_is_nothing() -> None:
+    """No force, coefficient or push of the size of a rounding."""
+    system = parse_model_file(RELATIVE).model.second_order()
+    assert system.force[0] == 0.0
+    assert system.force[1] == pytest.approx(0.4 * 0.3 / 0.3, rel=1e-12)
+    (zone,) = system.dead_zones
+    assert [mass for mass, _ in zone.pushed] == [1]
+    result = made(RELATIVE)
+    shows_what_the_model_does(result)
+    assert result.design.amplitude() > 0.1
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_the_picture_of_a_law_is_of_what_it_depends_on(turn: float) -> None:
+    """As the board makes it, within its errors, whatever the factors and couplings."""
+    text = TEXTS["a law"].replace("0.5, right = 0.5", f"{0.5 * turn}, right = {0.25 * turn}")
+    design = made(text).design
+    (curve,) = law_curves(design, [], si=False)
+    assert curve.symbol == "0.5 x₁ + 0.25 x₂"
+    wanted = np.sign(curve.x) * np.maximum(np.abs(curve.x) - 0.2, 0.0) * 0.5
+    assert curve.wanted == pytest.approx(wanted, abs=1e-9)
+    assert curve.made == pytest.approx(wanted, abs=0.02 * np.abs(wanted).max())
+
+
+def test_thresholds_are_told_on_the_scale_of_their_mass() -> None:
+    file = parse_model_file(TEXTS["combined"].replace("0.8, right = -0.4", "0.4, right = -0.8"))
+    design = synthesise(file, jobs=2).design
+    table = bench_tables.scales_csv(file, design, ())
+    rows = [line for line in table.splitlines() if "corner, upper" in line]
+    assert design.model.second_order().dead_zones[0].mass == 0
+    assert "of v1" in rows[0]
+
+
+def test_errors_of_dampers_have_words() -> None:
+    assert words.coefficient("stop damping B x2' x1'") != "stop damping B x2' x1'"
+    assert "damping" in words.coefficient("upper stop damping A")

@@ -5,24 +5,29 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import permutations
 
 import numpy as np
 import pytest
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.board.kicad_sim import directives
+from designer.check.deck_runs import FirstRun
 from designer.check.synthesis_result import Synthesis, synthesise
-from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Excitation
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.dynamics.orbit import OrbitStatus
+from designer.jobs.bench_job import check_fits
 from designer.model.model_file import parse_model_file
 from designer.spice import deck, equation_check
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
+from designer.workbench.force_balance import ForceBalance
+from designer.workbench.prediction import POINTS as WAVE_POINTS, BoardPrediction
 from tests.shared.system_text import clearance, system_text, table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
@@ -202,11 +207,42 @@ def test_what_one_capacitor_cannot_damp_is_refused() -> None:
         synthesise(saturating)
 
 
-def test_a_deck_of_discharged_states_has_discharged_dampers() -> None:
-    circuit, excitation = made("restitution").design.circuit, excitation_of(made("restitution"))
-    text = deck.write(
-        circuit, nominal_board(circuit), excitation, SolverSettings("trap", 1e-6),
-        title="from rest", stop_time=1e-3,
+def test_a_record_balances_with_the_force_of_its_dampers() -> None:
+    """The exact waves of the nominal board, by their own nets."""
+    prediction = BoardPrediction(made("both sides"))
+    (shown,) = prediction.responses
+    nets = prediction.nets
+    waves = np.column_stack([np.tile(shown.waves[net], 8) for net in nets])
+    time = np.arange(len(waves)) / (WAVE_POINTS * shown.setting.frequency_hz)
+    balance = ForceBalance(prediction, time, waves, np.zeros(waves.shape, dtype=bool))
+    own = balance.balance(nets).misfit
+    others = (balance.balance(way).misfit for way in permutations(nets) if way != nets)
+    assert own < 0.05
+    assert all(not misfit < 20.0 * own for misfit in others)
+
+
+@pytest.mark.parametrize("option", ["fit", "boards"])
+def test_no_board_with_dampers_is_fitted(option: str) -> None:
+    asked = {"fit": False, "boards": False} | {option: True}
+    with pytest.raises(InputError, match="dampers in its stops") as refused:
+        check_fits(BoardPrediction(made("restitution")), **asked, decays=[])
+    assert refused.value.field == f"--{option}"
+
+
+def test_the_sheet_s_simulation_starts_with_charged_dampers() -> None:
+    """In contact at the drive's phase 0."""
+    text = system_text(
+        {"ball": 1.0}, {("ball", "ground"): 1.0}, {("ball", "ground"): 0.1},
+        clearance("A", "ball", "ground", upper=0.4, lower=0.4, stiffness=6.0, damping=0.8),
+        table("force", on="ball", amplitude=1.0), table("response", omega=1.6),
     )  # fmt: skip
-    line = next(line for line in text.splitlines() if line.startswith("C50 "))
-    assert abs(float(line.partition("IC=")[2])) < 0.05
+    result = synthesise(parse_model_file(text))
+    design, (response,) = result.design, result.model_responses
+    reduction = nominal_reduction(design)
+    orbit = on_circuit(reduction.system(), design, response)
+    key = reduction.system().mode_at(orbit.start, 0.0)
+    fv = reduction.output(key, "fv", orbit.start[None], np.zeros(1))[0]
+    assert abs(fv) > 0.5
+    run = FirstRun(excitation_of(result), SolverSettings("trap", 1e-6), 1e-3, orbit.start)
+    line = next(line for line in directives(design.circuit, run) if line.startswith(".ic v(/fv)"))
+    assert float(line.partition("=")[2]) == pytest.approx(fv, abs=1e-3)
