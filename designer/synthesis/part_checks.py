@@ -130,7 +130,8 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     for zone in zones:
         most = max(len(zone.terms), len(zone.pushed))
         if most > MOST_MASSES:
-            what, found = f"clearance {zone.name}", f"{most} masses that it is of, or pushes"
+            what = f"law {zone.bend_of}" if zone.bend_of else f"clearance {zone.name}"
+            found = f"{most} masses that it is of, or pushes"
             raise InputError(None, what, found, f"at most {MOST_MASSES} for a circuit")
         if zone.damping and len({stop.stiffness for _, stop in zone.sides}) > 1:
             raise InputError(
