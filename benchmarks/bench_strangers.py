@@ -8,6 +8,7 @@ system is a line of ``systems.jsonl``, on disk as soon as it is done; an interru
     python -m benchmarks strangers --seed 1 --count 100 --seconds 120 --out reports/strangers
     python -m benchmarks strangers --family laws --count 60 --out reports/strangers-laws
     python -m benchmarks strangers --family linked --count 60 --out reports/strangers-linked
+    python -m benchmarks strangers --family driven --count 30 --out reports/strangers-driven
 """
 
 from __future__ import annotations
@@ -486,6 +487,12 @@ _OF_FAMILY = {
         "Most stops of these systems have a damper, as such or by a restitution; of those with "
         "several masses half have a mass matrix with couplings, and half of their clearances are "
         "of combinations of displacements."
+    ),
+    "driven": filled(
+        "No drive of these systems is one sine: a square, triangular or sawtooth wave of two to "
+        "five harmonics, harmonics of sizes and phases of their own, two forces of two phases or "
+        "of two shapes, a base that moves in such a shape, or a force beside a moving base. Two "
+        "phases, two shapes, and a force beside a base take a generator of two channels."
     ),
 }
 COLOURS = {1: "#0072b2", 2: "#009e73", 3: "#d55e00", 4: "#cc79a7"}

@@ -26,7 +26,7 @@ from designer.circuit.coefficients import LARGE_ERROR
 from designer.linear_network.linear_terms import Shortfall
 from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile, read_model_file
-from designer.synthesis.attempt import Order, relative_amplitude
+from designer.synthesis.attempt import Order, largest_amplitudes
 from designer.synthesis.limits import limits
 from designer.synthesis.parts_choice import verified
 from designer.synthesis.scale_choice import RoundedChoice, ScaleChoice
@@ -78,7 +78,7 @@ def _orders(modelfile: ModelFile) -> Iterator[tuple[Order, tuple[ModelResponse, 
     modelfile = with_stage(modelfile)
     model, spec = modelfile.model, modelfile.circuit
     responses = find(model, modelfile.responses)
-    largest = max([1.0, *(relative_amplitude(model, r) for r in responses)])
+    largest = largest_amplitudes(model, responses)
     order = Order.of(model, spec, catalog, peaks(model, responses), largest=largest)
     unit, fastest = model.second_order().own_frequency, order.peaks.fastest
     for share in SHARES:

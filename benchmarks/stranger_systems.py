@@ -5,7 +5,9 @@ What is drawn is without units: masses and springs within a factor of 4, damping
 springs. Then it is written in plain numbers, or in the SI units of a size that machines have.
 Of the family "laws" each system has a force that is no linear spring, damper or stop, in the place
 of one clearance or in it. Of the family "linked" the stops have dampers, and of two masses and more
-there are clearances of combinations of displacements, and mass matrices with couplings.
+there are clearances of combinations of displacements, and mass matrices with couplings. Of the
+family "driven" no drive is one sine: waveforms, harmonics, phases that differ, and forces beside a
+moving base.
 """
 
 from __future__ import annotations
@@ -48,7 +50,14 @@ IN_A_CLEARANCE = ("stop in steps", "rising preload")
 DAMPED, COMBINED, COUPLED = 0.7, 0.5, 0.5
 """Of the family "linked": shares of the clearances with a damper or a restitution, and of several
 masses of those that are of a combination; of the systems of several masses with a mass matrix."""
-Family = Literal["plain", "laws", "linked"]
+DRIVES = (
+    ("waveform", 2), ("harmonics", 2), ("two phases", 2), ("two shapes", 1),
+    ("shaped base", 1), ("force beside base", 2),
+)  # fmt: skip
+"""Kinds of drives, and how often of ten; of one mass those of two masses are of one."""
+OF_TWO = {"two phases": "waveform", "two shapes": "harmonics"}
+"""What a system of one mass has in the place of a drive of two masses."""
+Family = Literal["plain", "laws", "linked", "driven"]
 FAMILIES: tuple[Family, ...] = get_args(Family)
 Joint = tuple[str, str]
 T = TypeVar("T")
@@ -100,11 +109,14 @@ def draw(seed: int, number: int, family: Family = "plain") -> Stranger:
     law = None
     if family == "laws":
         law = _one_of(LAWS, np.random.default_rng([seed, number // 10, 3]), number % 10)
+    drive = None
+    if family == "driven":
+        drive = _one_of(DRIVES, np.random.default_rng([seed, number // 10, 4]), number % 10)
     shape = _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
     size = _one_of(SIZES, np.random.default_rng([seed, number // 10, 2]), number % 10)
     rng = np.random.default_rng([seed, number])
     while True:  # a drawn system may be refused as a model, or never meet a stop
-        drawn = _Drawn(rng, *shape, size, law, linked=family == "linked")
+        drawn = _Drawn(rng, *shape, size, law, linked=family == "linked", drive=drive)
         text = drawn.with_response(f"Stranger {seed}-{number}")
         if text is not None:
             return Stranger(number, *drawn.shape, drawn.kinds, size.name, text)
@@ -128,6 +140,7 @@ class _Drawn:
         law: str | None = None,
         *,
         linked: bool = False,
+        drive: str | None = None,
     ) -> None:
         self._rng, self._size, self._law = rng, size, law
         clearances -= law is not None and law not in IN_A_CLEARANCE
@@ -143,6 +156,9 @@ class _Drawn:
             if "ground" in pair or rng.uniform() < 0.7
         }
         self._draw_drive()
+        self._shapes: dict[str, dict[str, object]] = {}
+        if drive is not None:
+            self._shape_drive(OF_TWO.get(drive, drive) if masses == 1 else drive)
         self._flexibility = np.linalg.inv(self._matrix(self._springs))
         self._reach = np.abs(self._flexibility) @ np.maximum(self._force, 0.0)
         self._gaps = [self._gap(k) for k in range(clearances)]
@@ -209,6 +225,56 @@ class _Drawn:
             mass = int(rng.integers(n))
             self._constant[mass] = rng.uniform(0.05, 0.5) * self._force.max() * rng.choice([-1, 1])
             self._kinds.add("constant force")
+
+    def _shape_drive(self, kind: str) -> None:
+        """Another drive in the place of the sine: keys of the forces and of the base."""
+        rng, n = self._rng, len(self._names)
+        self._kinds -= {"base"}
+        self._kinds.add(kind)
+        shaken = kind in ("shaped base", "force beside base")
+        self._base = float(rng.uniform(0.5, 1.5)) if shaken else 0.0
+        self._amplitude[:] = 0.0
+        many = {"two phases": 2, "two shapes": 2, "shaped base": 0}.get(kind, 1)
+        one = self._shape(rng.choice(["waveform", "harmonics"]))
+        for mass in rng.permutation(n)[:many]:
+            self._amplitude[mass] = rng.uniform(0.5, 1.5) * rng.choice([-1.0, 1.0])
+            phase = float(f"{rng.uniform(-math.pi, math.pi):.3g}")
+            name = self._names[mass]
+            if kind in ("waveform", "harmonics"):
+                self._shapes[name] = self._shape(kind)
+            elif kind == "two shapes":
+                self._shapes[name] = self._shape(rng.choice(["waveform", "harmonics"]))
+            elif kind == "force beside base" and rng.uniform() < 0.5:
+                self._shapes[name] = one
+            else:
+                self._shapes[name] = {"phase": phase}
+        if kind == "shaped base":
+            self._shapes["ground"] = self._shape(rng.choice(["waveform", "harmonics"]))
+        self._force = np.abs(self._amplitude) + self._base * self._mass
+
+    def _shape(self, kind: str) -> dict[str, object]:
+        """Keys of a waveform, or of harmonics; their amplitudes as shares of the first."""
+        rng = self._rng
+        if kind == "waveform":
+            wave = str(rng.choice(["square", "triangle", "sawtooth"]))
+            return {"waveform": wave, "terms": int(rng.integers(2, 6))}
+        orders = sorted(rng.permutation(np.arange(2, 6))[: int(rng.integers(1, 3))].tolist())
+        draws = rng.uniform(-1.0, 1.0, (len(orders), 2)).tolist()
+        harmonics = [
+            (n, 0.5 * size, math.pi * turn) for n, (size, turn) in zip(orders, draws, strict=True)
+        ]
+        return {"harmonics": harmonics}
+
+    def _shaped(self, name: str, amplitude: float, unit: str) -> list[tuple[str, object]]:
+        """The keys of a force or of the base beside its amplitude."""
+        keys = dict(self._shapes.get(name, {}))
+        harmonics = keys.get("harmonics")
+        if isinstance(harmonics, list):
+            keys["harmonics"] = [
+                [n, self._value(share * amplitude, unit), float(f"{phase:.3g}")]
+                for n, share, phase in harmonics
+            ]
+        return list(keys.items())
 
     def _joined(self) -> tuple[int, str]:
         """A mass, and what it is joined to: the ground, or another mass now and then."""
@@ -356,9 +422,12 @@ class _Drawn:
             forces = zip(("amplitude", "constant"), values, strict=True)
             keys = [(k, self._value(float(v), "N")) for k, v in forces if v]
             if keys:
+                keys += self._shaped(name, values[0], "N")
                 lines.append(_table("[[force]]", [("on", name), *keys]))
         if self._base:
-            lines.append(_table("[base]", [("amplitude", self._value(self._base, "m"))]))
+            keys = [("amplitude", self._value(self._base, "m"))]
+            keys += self._shaped("ground", self._base, "m")
+            lines.append(_table("[base]", keys))
         lines.append(_table("[circuit]", [("dead_zone", "rectifier")]))
         return "".join(lines)
 

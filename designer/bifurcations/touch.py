@@ -16,7 +16,7 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.mode_tables import augmented, augmented_row, augmented_state, step_length
-from designer.dynamics.piecewise_linear import Mode, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import Mode
 from designer.kernels.kernel_algebra import motion_terms
 
 FEWEST, MOST = 32, 20_000
@@ -65,9 +65,8 @@ def height_along(
             return None
         state, along = run.strobes[-1], along if run.tangent is None else run.tangent
     angle = 2.0 * np.pi * k / nodes
-    drive, orders = flow.drive, flow.system.orders or ()
-    u = drive.amplitude * float(np.sin(angle)) + drive.offset
-    mode = _mode(flow.system, state, u, touch)
+    drive, orders = flow.drive, flow.orders
+    mode = _mode(flow, state, angle, touch)
     row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive, orders)
     whole = augmented_state(state, angle, orders)
     z = np.zeros((len(whole), 1 + along.shape[1]))
@@ -82,14 +81,14 @@ def _nodes(flow: Flow, touch: StopTouch) -> int:
     """Nodes in a drive period: a step of the general kernel apart, in contact too."""
     rest = flow.system.mode(flow.system.start)
     contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == touch.clearance]
-    fastest = flow.drive.omega * max(flow.system.orders or (), default=1)
-    step = min(step_length(mode.A, fastest) for mode in (rest, *contacts))
+    step = min(step_length(mode.A, flow.fastest) for mode in (rest, *contacts))
     return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
 
 
-def _mode(system: PiecewiseLinearSystem, x: Array, u: float, touch: StopTouch) -> Mode:
+def _mode(flow: Flow, x: Array, angle: float, touch: StopTouch) -> Mode:
     """The mode about the turning point: the one at x but for the contact at the stop itself."""
-    mode = system.mode(system.mode_at(x, u))
+    system = flow.system
+    mode = system.mode(flow.mode_at(x, angle))
     wanted = 0 if touch.tip else touch.side
     if mode.sides[touch.clearance] == wanted:
         return mode

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Protocol
 
 from designer.base.errors import Unreachable
@@ -31,6 +32,7 @@ from designer.circuit.netlist import (
     Circuit,
     Diode,
     Fitting,
+    Generator,
     Resistor,
     Section,
 )
@@ -90,6 +92,10 @@ def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
     parts: list[Fitting] = [*_spare(bare, catalog), *_supply(bare, choice, catalog)]
     parts.append(Connector("J2", (bare.generator.net, GROUND), "generator", _series(choice)))
     parts += _probes(bare, choice)
+    if bare.second is not None:
+        number = 1 + sum(isinstance(part, Connector) for part in parts)
+        pins, role = (bare.second.net, GROUND), "generator, second channel"
+        parts.append(Connector(f"J{number}", pins, role, _series(choice)))
     if spec.input_protection:
         parts += _protection(bare, choice, catalog)
     if spec.dc_trim != "none":
@@ -126,14 +132,18 @@ def probed_nets(circuit: Circuit) -> tuple[str, ...]:
     return (*circuit.outputs, *between)
 
 
-def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
-    """The summing nodes that the generator drives, each with the resistors of its path."""
+def driven_nodes(
+    circuit: Circuit, channel: Generator | None = None
+) -> dict[str, tuple[Resistor, ...]]:
+    """The summing nodes that the generator drives, each with the resistors of its path. channel :
+    of the generator, whose nodes they are; None: of any."""
     driven: dict[str, tuple[Resistor, ...]] = {}
     nodes = {s.inverting for s in circuit.sections}
-    for first in circuit.resistors:
-        if circuit.generator.net not in first.nets:
+    channels = circuit.generators if channel is None else (channel,)
+    for first, one in product(circuit.resistors, channels):
+        if one.net not in first.nets:
             continue
-        net, path = _far(first, circuit.generator.net), [first]
+        net, path = _far(first, one.net), [first]
         while net not in nodes:  # the middle of a composite
             second = next(r for r in circuit.resistors if net in r.nets and r not in path)
             path.append(second)
@@ -147,17 +157,26 @@ def _far(resistor: Resistor, net: str) -> str:
 
 
 def drive_resistance(circuit: Circuit, node: str) -> float:
-    """Resistance [Ω] between the generator and a driven summing node."""
-    path = driven_nodes(circuit)[node]
-    if all(set(r.nets) == {circuit.generator.net, node} for r in path):
-        return 1.0 / sum(1.0 / r.value for r in path)
-    return sum(r.value for r in path)
+    """Resistance [Ω] between the generator and a driven summing node, of its first channel where
+    that drives it."""
+    return next(_resistances(circuit, node))
+
+
+def _resistances(circuit: Circuit, node: str) -> Iterator[float]:
+    """Between each channel and a node that it drives [Ω]."""
+    for channel in circuit.generators:
+        path = driven_nodes(circuit, channel).get(node, ())
+        if path and all(set(r.nets) == {channel.net, node} for r in path):
+            yield 1.0 / sum(1.0 / r.value for r in path)
+        elif path:
+            yield sum(r.value for r in path)
 
 
 def fault_current(circuit: Circuit, node: str, volts: float) -> float:
-    """Current [A] into a driven summing node that is at 0 V, from so many volts at the generator:
-    what the inputs of an unpowered op-amp, or the diodes before them, have to take."""
-    return volts / drive_resistance(circuit, node)
+    """Current [A] into a driven summing node that is at 0 V, from so many volts at each channel of
+    the generator: what the inputs of an unpowered op-amp, or the diodes before them, have to
+    take."""
+    return sum(volts / ohms for ohms in _resistances(circuit, node))
 
 
 def protection_offset(

@@ -68,7 +68,7 @@ def entries(
 ) -> tuple[Entry, ...]:
     """Every component, then what the simulation needs besides. library : file of its models."""
     listed = [_entry(c, circuit, library) for c in components]
-    for name, net, value, simulation in sources(circuit, run):
+    for name, net, value, simulation in sources(circuit, run, library):
         pins = {"1": net, "2": GROUND}
         item = Item(name, value, symbols.source("VSOURCE"), pins)
         listed.append(Entry(item, simulation))

@@ -333,7 +333,7 @@ def _names_of_pins(component: Component, circuit: Circuit) -> tuple[str, ...]:
         GROUND: "0 V",
         POSITIVE: f"+{volts}",
         NEGATIVE: f"-{volts}",
-        circuit.generator.net: "generator",
+        **dict(zip(circuit.generator_nets, ("generator", "generator 2"), strict=False)),
         **{d.source: _input_label(circuit, d) for d in circuit.supply_diodes},
     }
     return tuple(names.get(pin.net, pin.net.removesuffix("_out")) for pin in component.pins)

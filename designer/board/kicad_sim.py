@@ -15,7 +15,7 @@ from designer.board.pins import SUPPLY_UNIT
 from designer.check.deck_runs import FirstRun
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit
-from designer.spice import opamp_model
+from designer.spice import deck, opamp_model
 from designer.spice.deck import diode_cards, diode_names, following
 from designer.spice.opamp_model import literal
 
@@ -23,14 +23,20 @@ GENERATOR = "generator"
 Fields = tuple[tuple[str, str], ...]
 
 
-def sources(circuit: Circuit, run: FirstRun) -> Iterator[tuple[str, str, str, Fields]]:
-    """The sources of the simulation alone: name, net, the value that is shown, fields."""
+def sources(
+    circuit: Circuit, run: FirstRun, library: str
+) -> Iterator[tuple[str, str, str, Fields]]:
+    """The sources of the simulation alone: name, net, the value that is shown, fields. library :
+    file of the models, where a generator of another shape than a sine is one."""
     drive = run.excitation
     sine = (
         f"dc={literal(drive.offset)} ampl={literal(drive.amplitude)} f={literal(drive.frequency)} "
         "td=0 theta=0 phase=180"
     )
-    yield circuit.generator.name, circuit.generator.net, GENERATOR, _source("SIN", sine)
+    for number, channel in enumerate(circuit.generators):
+        name = _channel(number)
+        model = _model("SUBCKT", library, name, f"1={channel.net} 2=bottom")
+        yield channel.name, channel.net, name, model if _shaped(run) else _source("SIN", sine)
     for rail in circuit.rails:
         # A reference without a number is none to KiCad.
         dc = _source("DC", f"dc={literal(rail.volts)}")
@@ -61,8 +67,9 @@ def fields(component: Component, circuit: Circuit, library: str) -> Fields:
     return _model("SUBCKT", library, name, by_names.format("cathode", "anode"))
 
 
-def models(circuit: Circuit, components: Sequence[Component]) -> str:
-    """The library: op-amp packages, diodes, references."""
+def models(circuit: Circuit, components: Sequence[Component], run: FirstRun) -> str:
+    """The library: op-amp packages, diodes, references, and a generator whose voltage is no
+    sine."""
     board = nominal_board(circuit)
     lines = ["* Models of the sheet: op-amps with limits and finite gain.", ""]
     lines += opamp_model.ideal(circuit.gain)
@@ -92,6 +99,10 @@ def models(circuit: Circuit, components: Sequence[Component]) -> str:
         name = _references(circuit)[r.name]
         lines += ["", f".subckt {name} cathode anode"]
         lines += [f"Vkept cathode anode {literal(board.reference[r.name])}", f".ends {name}"]
+    for number, channel in enumerate(circuit.generators if _shaped(run) else ()):
+        name, own = _channel(number), run.excitation.channel(number)
+        lines += ["", f".subckt {name} {channel.net} bottom"]
+        lines += [*deck.generator(channel, own, bottom="bottom"), f".ends {name}"]
     return "\n".join(lines) + "\n"
 
 
@@ -103,7 +114,7 @@ def directives(circuit: Circuit, run: FirstRun) -> tuple[str, ...]:
     volts: dict[str, float] = {}
     if run.initial is not None:
         volts = dict(zip(circuit.states, run.initial.tolist(), strict=True))
-        volts |= following(circuit, nominal_board(circuit), run.initial)
+        volts |= following(circuit, nominal_board(circuit), run.initial, run.excitation.at_start)
     starts = [f".ic v({kicad_net(by_name[name].plus)})={literal(v)}" for name, v in volts.items()]
     return (
         f".options method={s.method} reltol={literal(s.reltol)}",
@@ -111,6 +122,16 @@ def directives(circuit: Circuit, run: FirstRun) -> tuple[str, ...]:
         *starts,
         f".tran {literal(s.max_step)} {literal(run.stop_time)} 0 {literal(s.max_step)} uic",
     )
+
+
+def _channel(number: int) -> str:
+    """What stands at a channel of the generator, and the name of its model."""
+    return GENERATOR + (f"{number + 1}" if number else "")
+
+
+def _shaped(run: FirstRun) -> bool:
+    """Whether the generator's voltage is more than a sine."""
+    return not run.excitation.drive.is_sine
 
 
 def _model(device: str, library: str, name: str, pins: str) -> Fields:

@@ -231,7 +231,7 @@ def with_same_parts(
         binding={},
     )
     conditions = modelfile.circuit.active_conditions
-    amplitudes = [design.amplitude(r.b, r.omega) for r in responses] or [design.amplitude()]
+    amplitudes = design.largest_amplitudes(responses)
     needed = None
     if responses and conditions & {"swing", "load"}:
         loading = responses if loaded is None else [responses[number] for number in loaded]

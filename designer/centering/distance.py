@@ -171,14 +171,15 @@ class ScaledBoards:
         """Everything that decides an answer, as plain data."""
         drive, spec = stand.drive, stand.spec
         setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
+        if not drive.is_sine:
+            setting += np.ravel(drive.shape).tolist()
         wanted = [str(spec.expect), spec.twin, spec.symmetric]
         extent = [boards.start, boards.stop, list(stretches)]
         return [self._whose, nine_digits(setting), wanted, extent]
 
     def excitation(self, place: OperatingPoint) -> Excitation:
         """The generator's setting for a place."""
-        frequency = self.design.errors.scales.frequency(place.omega)
-        return Excitation(frequency, self.design.amplitude(place.b, place.omega))
+        return self.design.excitation(place.b, place.omega)
 
     def nominal(self, stand: OperatingOrbit) -> GateSubject:
         """The nominal board at a place, for ngspice."""

@@ -150,10 +150,7 @@ def check(
     """
     reduction = nominal_reduction(design)
     system = reduction.system()
-    settings = [
-        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b, r.omega))
-        for r in responses
-    ]
+    settings = [design.excitation(r.b, r.omega) for r in responses]
     progress("exact circuit")
     flows = [circuit_flow(system, design, r) for r in responses]
     orbits = [on_circuit(system, design, r) for r in responses]

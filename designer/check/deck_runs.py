@@ -48,7 +48,7 @@ def first_run(synthesis: Synthesis, checked: CheckedResponse | None = None) -> F
     checked : of that response; its gate's settings are used.
     """
     design, first = synthesis.design, _responses(synthesis)[0]
-    excitation = _excitation(synthesis, first)
+    excitation = design.excitation(first.b, first.omega)
     if checked is None:
         orbit = on_circuit(nominal_reduction(design).system(), design, first)
     else:
@@ -74,14 +74,9 @@ def _responses(synthesis: Synthesis) -> tuple[ModelResponse, ...]:
     return synthesis.model_responses or find(synthesis.design.model, [Response(1.0)])
 
 
-def _excitation(synthesis: Synthesis, response: ModelResponse) -> Excitation:
-    frequency = synthesis.design.errors.scales.frequency(response.omega)
-    return Excitation(frequency, synthesis.design.amplitude(response.b, response.omega))
-
-
 def _run(synthesis: Synthesis, response: ModelResponse) -> ResponseRun:
     design = synthesis.design
-    excitation = _excitation(synthesis, response)
+    excitation = design.excitation(response.b, response.omega)
     reduction = nominal_reduction(design)
     orbit = on_circuit(reduction.system(), design, response)
     subject = numerics_gate.GateSubject(reduction, excitation, orbit)
@@ -111,7 +106,8 @@ def circuit_notes(synthesis: Synthesis, run: FirstRun) -> tuple[str, ...]:
     return (
         "For ngspice 36 or later: its XSPICE code model limit is used. Run: ngspice -b circuit.cir",
         *_circuit(synthesis),
-        f"Response: {text}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak",
+        f"Response: {text}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak"
+        + ("" if drive.second is None else f"; VM2: {drive.second.amplitude:.6g} V peak"),
         "Another response: frequency and amplitude of VM1 are in setup.csv, with how to start it.",
         "The start voltages (IC=) belong to this response alone, and .tran to its frequency",
         "Every response with its own start, and other simulators: designer export DIR --deck NAME,",
@@ -156,7 +152,8 @@ def _nodes(circuit: Circuit) -> tuple[str, ...]:
         for zone in zones
     }
     stages = [f"{net} output of the {name}" for net, name in names.items()]
+    generator = " and ".join(circuit.generator_nets)
     return (
-        f"Nodes: {', '.join([*carried, *stages])}, {circuit.generator.net} generator",
+        f"Nodes: {', '.join([*carried, *stages])}, {generator} generator",
         "A further n turns the sign (v1n is -v1). Volts per unit of each state are in scales.csv",
     )

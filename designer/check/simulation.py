@@ -24,7 +24,6 @@ from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, 
 from designer.check.coexistence import Coexistence
 from designer.check.trust import Trust
 from designer.circuit import nominal
-from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import settle, starts as sobol_starts
@@ -410,8 +409,7 @@ def _in_ngspice(
     rows, subjects = [], []
     for spec in specs:
         r, _, orbits = _circuit_orbits(synthesis, spec, scan)
-        frequency = design.errors.scales.frequency(r.omega)
-        drive = Excitation(frequency, design.amplitude(r.b, r.omega))
+        drive = design.excitation(r.b, r.omega)
         settled = [o for o in orbits if len(o.start)]
         subjects += [numerics_gate.GateSubject(reduction, drive, o, rung=rung) for o in settled]
         rows.append((r, drive, len(settled)))

@@ -23,9 +23,8 @@ from designer.circuit.terms import Term, inverted_states, terms as input_terms
 from designer.model.clearance import Clearance
 from designer.model.mechanics import MechanicalModel
 
-GENERATOR = Generator("VM1", "vg")
-INVERSE = f"{GENERATOR.net}n"
-"""Net of the generator's negative, for forces in antiphase."""
+CHANNELS = Generator("VM1", "vg"), Generator("VM2", "vg2")
+"""Of the generator."""
 
 _PAPER_SECTIONS = {
     ("integrator", 0): "U1A",
@@ -55,10 +54,11 @@ def circuit_of(
     saturation : output limit [V] of every pin in this circuit; None: the op-amp's own, by its load.
     """
     system = model.second_order()
-    force, wired = system.drive_force(system.own_frequency), system.wired
+    force, second = (system.drive_force(system.own_frequency, k) for k in range(len(CHANNELS)))
+    wired = system.wired
     matrices = wired.damping.tolist(), wired.stiffness.tolist(), force.tolist()
     return build(
-        input_terms(*matrices),
+        input_terms(*matrices, second=second.tolist()),
         values,
         opamp,
         supply=supply,
@@ -109,8 +109,9 @@ def build(
     inverted = {*inverted_states(terms), *(s for p in places for s in p.inverted_states)}
     for state in sorted(inverted):
         parts += _inverter(state, resistors)
-    if any(t.source is None and t.inverted for t in terms):
-        parts += _generator_inverse(resistors)
+    for channel in range(len(CHANNELS)):
+        if any(t.inverted for t in terms if t.quantity[::2] == ("force", channel)):
+            parts += _generator_inverse(resistors, channel)
     stops: list[Stop] = []
     for place in places:
         parts += place.around(resistors)
@@ -125,7 +126,8 @@ def build(
     reached = output_at(opamp, supply, saturation)
     circuit = Circuit(
         parts=tuple(parts),
-        generator=GENERATOR,
+        generator=CHANNELS[0],
+        second=CHANNELS[1] if any(t.quantity[::2] == ("force", 1) for t in terms) else None,
         states=tuple(f"C{i + 1}" for i in range(2 * masses)),
         state_nets=tuple(f"v{i + 1}" for i in range(2 * masses)),
         stops=tuple(stop for stop in stops if not stop.bend_of),
@@ -152,7 +154,7 @@ def _role(term: Term) -> str:
     if kind == "mass":
         return f"v{term.state + 1}' = v{term.state + 2}: displacement of M{i + 1}"
     if kind == "force":
-        return f"force on M{i + 1}"
+        return f"force on M{i + 1}" + (", second channel" if j else "")
     source = "velocity" if kind == "damping" else "displacement"
     return f"{kind} of M{i + 1} by the {source} of M{j + 1}"
 
@@ -192,7 +194,8 @@ def _integrator(
 def _source(term: Term) -> str:
     """The net that feeds a term's resistor."""
     if term.source is None:
-        return INVERSE if term.inverted else GENERATOR.net
+        net = CHANNELS[term.quantity[2]].net
+        return f"{net}n" if term.inverted else net
     return f"v{term.source + 1}" + ("n" if term.inverted else "")
 
 
@@ -212,12 +215,14 @@ def _inverter(state: int, resistors: Resistors) -> list[Part]:
     ]
 
 
-def _generator_inverse(resistors: Resistors) -> list[Part]:
-    role = "inverter of the generator"
+def _generator_inverse(resistors: Resistors, channel: int) -> list[Part]:
+    """The negative of a channel, for forces in antiphase to others of it."""
+    net, node = CHANNELS[channel].net, ("ig", "ig2")[channel]
+    role = "inverter of the generator" + (", second channel" if channel else "")
     return [
-        Section("U4C", "ig", GROUND, INVERSE, role),
-        *resistors("R190", GENERATOR.net, "ig", role),
-        *resistors("R191", "ig", INVERSE, role),
+        Section(("U4C", "U4D")[channel], node, GROUND, f"{net}n", role),
+        *resistors(f"R{190 + 2 * channel}", net, node, role),
+        *resistors(f"R{191 + 2 * channel}", node, f"{net}n", role),
     ]
 
 

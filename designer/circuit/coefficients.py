@@ -75,6 +75,8 @@ class CoefficientErrors:
     """How circuit and model correspond, with the least ``max_error``."""
     drive_gain: Array
     """Model force per generator volt, for the driven masses (0 where not driven)."""
+    second_gain: Array
+    """Model force per volt of the generator's second channel, for the masses that it drives."""
     slopes: Array
     """(errors, 1 + states) change of each error with the logarithms of the time scale and of each
     state's volts."""
@@ -133,12 +135,17 @@ def coefficient_errors(
     scales = _scales(float(np.exp(logs[0])), amplitude * relative, zones)
     if model.wired.constant.any():
         errors |= _constants(rest.d, zones, lead, model, scales)
-    drive = -rest.B * scales.seconds / scales.volts
+    none = np.zeros_like(rest.B)
+    drive, beside = (
+        -inputs[1::2] * scales.seconds / scales.volts[1::2] * model.mass
+        for inputs in (rest.B, none if rest.beside is None else rest.beside)
+    )
     return CoefficientErrors(
         errors=errors,
         max_error=max(abs(e) for e in errors.values()),
         scales=scales,
-        drive_gain=drive[1::2] * model.mass,
+        drive_gain=drive,
+        second_gain=beside,
         slopes=_scale_slopes(coefficients, errors, len(wanted)),
     )
 
@@ -277,7 +284,7 @@ def _constants(
         d = d - zone.constant
     forces = d[1::2] * scales.seconds / scales.volts[1::2] * model.mass
     if lead is None:
-        units = np.full(model.size, np.abs(model.drive_force(model.own_frequency)).max())
+        units = np.full(model.size, model.largest_force)
     else:
         units = np.abs(np.diag(model.spanning_stiffness)) * abs(lead.first_gap[1])
     return {

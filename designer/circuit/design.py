@@ -14,10 +14,12 @@ from designer.base.arrays import Array
 from designer.base.frames import frame, table_html
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import CoefficientErrors
-from designer.circuit.netlist import Circuit
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.reduction import Reduction
 from designer.circuit.resistors import Composite, composites_of
+from designer.dynamics.drive_shape import SINE, Shape
 from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import SecondDrive
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import MechanicalModel
 
@@ -109,16 +111,41 @@ class Design:
         resistors, capacitors = self.circuit.resistors, self.circuit.capacitors
         return len({r.value for r in resistors}) + len({c.value for c in capacitors})
 
-    def amplitude(self, b: float | None = None, omega: float | None = None) -> float:
+    def amplitude(
+        self, b: float | None = None, omega: float | None = None, channel: int = 0
+    ) -> float:
         """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's) at the
         drive frequency ``omega``, which only the force of a moving ground depends on (default: the
         model's own frequency)."""
         system = self.model.second_order()
-        wanted = system.drive_force(system.own_frequency if omega is None else omega)
-        gain = self.errors.drive_gain
-        driven = gain != 0.0
+        wanted = system.drive_force(system.own_frequency if omega is None else omega, channel)
+        gain = self.errors.second_gain if channel else self.errors.drive_gain
+        driven = wanted != 0.0
         volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
         return volts * (1.0 if b is None else self.model.b / b)
+
+    def largest_amplitudes(self, responses: Sequence[ModelResponse]) -> list[float]:
+        """Of each of the generator's channels, over these responses; without any at the model's
+        clearance and own frequency [V peak]."""
+        own = self.model.second_order().own_frequency
+        places = [(r.b, r.omega) for r in responses] or [(self.model.b, own)]
+        return [
+            max(self.amplitude(b, omega, channel) for b, omega in places)
+            for channel in range(len(self.drive_shapes))
+        ]
+
+    def excitation(self, b: float, omega: float) -> Excitation:
+        """The generator's setting at a clearance and a dimensionless frequency."""
+        frequency, (shape, *others) = self.errors.scales.frequency(omega), self.drive_shapes
+        amplitude = self.amplitude(b, omega)
+        second = SecondDrive(self.amplitude(b, omega, 1), others[0]) if others else None
+        return Excitation(frequency, amplitude, shape=shape, second=second)
+
+    @property
+    def drive_shapes(self) -> tuple[Shape, ...]:
+        """What the voltage of each of the generator's channels is the negative of, over its
+        amplitude."""
+        return self.model.second_order().drive_shapes
 
     def parts_table(self) -> pd.DataFrame:
         """The resistors and capacitors as a frame: ``name``, ``value``, ``unit``, ``role``."""
@@ -223,14 +250,23 @@ class GeneratorSetting:
     """Peak amplitude into a high impedance [V]."""
     offset_v: float = 0.0
     """DC offset [V]."""
+    shape: Shape = SINE
+    """As of ``Excitation``."""
+    second: SecondDrive | None = None
+    """As of ``Excitation``."""
+
+    @property
+    def excitation(self) -> Excitation:
+        """The same without what it is for."""
+        amplitude, offset = self.amplitude_v_peak, self.offset_v
+        return Excitation(self.frequency_hz, amplitude, offset, self.shape, self.second)
 
 
 def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[GeneratorSetting, ...]:
     """The generator's settings, in the order of the responses."""
-    scales = design.errors.scales
-    return tuple(
-        GeneratorSetting(
-            r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b, r.omega)
-        )
-        for r in responses
-    )
+    out = []
+    for r in responses:
+        to = design.excitation(r.b, r.omega)
+        whose = r.omega, r.expected, to.frequency, to.amplitude
+        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second))
+    return tuple(out)

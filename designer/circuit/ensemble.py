@@ -147,7 +147,7 @@ class Ensemble:
         """``settle`` as far as the compiled way goes: None where it leaves a question open.
 
         For predictions: what has no period after 140 drive periods (``QUICK`` stages), or clips,
-        stays open.
+        stays open. A drive that is no sine has no compiled way: it is settled briefly.
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
@@ -157,6 +157,10 @@ class Ensemble:
             heed()
             part = slice(first, first + size)
             settled = self._compiled(index[part], drives[part], states[part], QUICK)
+            for k, drive in enumerate(drives[part]):
+                if settled[k] is None and not drive.is_sine:
+                    board, start = int(index[first + k]), states[first + k]
+                    settled[k] = self._alone(board, drive, start, brief=True)
             progress()
             return [None if r is None else r.orbit for r in settled]
 
@@ -196,7 +200,8 @@ class Ensemble:
         from ``starts`` (E, n) at drive phase 0, and (E,) where the compiled way knows them: there
         the board kept to its working modes, in which nothing clips that ought to be linear."""
         ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
-        if self._modes is None or not self._modes.good[board] or not len(ends):
+        sines = all(drive.is_sine for drive, _ in stages)
+        if self._modes is None or not self._modes.good[board] or not len(ends) or not sines:
             return ends, np.zeros(len(ends), dtype=bool)
         # A copy, for another thread may ask about this board too.
         known, row = self._entered.get(board), np.array([0])
@@ -258,7 +263,8 @@ class Ensemble:
         out: list[SettledBoard | None] = [None] * len(which)
         if self._modes is None:
             return out
-        good = np.flatnonzero(self._modes.good[which])
+        sines = np.array([drive.is_sine for drive in drives], dtype=bool)
+        good = np.flatnonzero(self._modes.good[which] & sines)
         boards, number = np.unique(which[good], return_inverse=True)
         modes = self._modes.take(boards)
         given = np.array([working_modes.drive_of(d, MAX_EVENTS) for d in drives]).reshape(-1, 4)

@@ -18,7 +18,7 @@ def feedback_share(circuit: Circuit, section: Section, key: ModeKey) -> float:
 
     key : the mode, which says what diodes conduct; where none closes the loop the share is 0.
     """
-    fixed = {GROUND: 0.0, circuit.generator.net: 0.0, POSITIVE: 0.0, NEGATIVE: 0.0}
+    fixed = dict.fromkeys((GROUND, *circuit.generator_nets, POSITIVE, NEGATIVE), 0.0)
     fixed |= {s.output: 0.0 for s in circuit.sections}
     fixed[section.output] = 1.0
     free = [net for net in circuit.nets if net not in fixed]

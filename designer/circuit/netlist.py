@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, product
 from typing import Any
@@ -30,7 +30,8 @@ from designer.circuit.board_parts_only import (
     Trimmer,
 )
 from designer.circuit.stop import Contact, Stop
-from designer.dynamics.piecewise_linear import Drive
+from designer.dynamics.drive_shape import SINE, Shape
+from designer.dynamics.piecewise_linear import Drive, SecondDrive
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,7 @@ class Supply:
 
 @dataclass(frozen=True)
 class Generator:
-    """The signal generator: a voltage source from ``net`` to ground."""
+    """A channel of the signal generator: a voltage source from ``net`` to ground."""
 
     name: str
     """Its name in the circuit."""
@@ -254,6 +255,8 @@ class Circuit:
     """Load that ``saturation`` is reached into [ohm]; None: each output's own, whatever it is."""
     bends: tuple[Stop, ...] = ()
     """How the dead zones show that are no clearance (``Clearance.bend_of``)."""
+    second: Generator | None = field(default=None, repr=False)
+    """The generator's second channel."""
     fittings: tuple[Fitting, ...] = ()
     """Parts of the board and the bill that are not simulated (``board.board_parts``)."""
 
@@ -274,6 +277,16 @@ class Circuit:
         return tuple(p for p in (*self.parts, *self.fittings) if view in p.views)
 
     @property
+    def generators(self) -> tuple[Generator, ...]:
+        """The generator's channels."""
+        return (self.generator,) if self.second is None else (self.generator, self.second)
+
+    @property
+    def generator_nets(self) -> tuple[str, ...]:
+        """The nets that its channels drive."""
+        return tuple(each.net for each in self.generators)
+
+    @property
     def gain_bandwidth(self) -> float:
         """Typical gain-bandwidth of the op-amp [Hz]; nan where its figures are not known."""
         return self.figures.gbw.nominal if self.figures is not None else math.nan
@@ -287,7 +300,7 @@ class Circuit:
         """Conductances between the nets that more than resistors meet. values : [ohm] by part, one
         number or an array of boards; the circuit's own where None."""
         ohms = values or self.values
-        held = {GROUND, self.generator.net, *(supply.net for supply in self.supplies)}
+        held = {GROUND, *self.generator_nets, *(supply.net for supply in self.supplies)}
         held = held.union(*(p.nets for p in self.parts if not isinstance(p, Resistor)))
         every = [Conductance(r.a, r.b, 1.0 / ohms[r.name]) for r in self.resistors]
         return without_inner_nets(every, held)
@@ -490,7 +503,7 @@ class Circuit:
     @cached_property
     def nets(self) -> tuple[str, ...]:
         """Every net but ground, sorted."""
-        nets = {self.generator.net}.union(*(p.nets for p in self.parts))
+        nets = {*self.generator_nets}.union(*(p.nets for p in self.parts))
         return tuple(sorted(nets - {GROUND}))
 
     @property
@@ -503,8 +516,8 @@ class Circuit:
 class Excitation:
     """The generator's setting.
 
-    The generator starts at phase π: the force enters the inverting integrators with its sign
-    turned, so that the model's sin(ωt) and the circuit agree.
+    The generator's voltage is the negative of the force's shape: the force enters the inverting
+    integrators with its sign turned, so that the model's sin(ωt) and the circuit agree.
     """
 
     frequency: float
@@ -513,12 +526,63 @@ class Excitation:
     """Peak amplitude [V]."""
     offset: float = 0.0
     """DC offset [V]."""
+    shape: Shape = SINE
+    """What the voltage is the negative of, but for the offset, over the amplitude."""
+    second: SecondDrive | None = None
+    """What the second channel's voltage is the negative of; None where there is one channel."""
+
+    @property
+    def amplitudes(self) -> tuple[float, ...]:
+        """Of each channel [V peak]."""
+        return (self.amplitude,) if self.second is None else (self.amplitude, self.second.amplitude)
+
+    @property
+    def second_phase_deg(self) -> float:
+        """How far the second channel is ahead of the first [degrees]; 0 where their waveforms, from
+        one beginning on, hold it."""
+        if self.second is None or self.is_waveform:
+            return 0.0
+        (_, *first), (_, *second) = self.shape[0], self.second.shape[0]
+        ahead = math.degrees(math.atan2(*second[::-1]) - math.atan2(*first[::-1]))
+        return (ahead + 180.0) % 360.0 - 180.0
+
+    @property
+    def is_waveform(self) -> bool:
+        """Whether a channel gives no sine, so that all have to be given their waveforms."""
+        more = () if self.second is None else self.second.shape
+        return any(n > 1 for n, *_ in (*self.shape, *more))
+
+    def channel(self, number: int) -> Excitation:
+        """What one of the generator's channels gives, as of a generator that has no other; nothing
+        of a second one that is not set."""
+        if number == 0:
+            return replace(self, second=None)
+        own = self.second or SecondDrive(0.0, SINE)
+        return Excitation(self.frequency, own.amplitude, shape=own.shape)
+
+    def louder(self, factor: float) -> Excitation:
+        """The same with the amplitudes of all channels multiplied by this."""
+        second = self.second and replace(self.second, amplitude=factor * self.second.amplitude)
+        return replace(self, amplitude=factor * self.amplitude, second=second)
 
     def seconds(self, omega: float) -> float:
         """One unit of a model's time [s], where its drive has the frequency ``omega``."""
         return omega / (2.0 * math.pi * self.frequency)
 
     @property
+    def at_start(self) -> tuple[float, float]:
+        """Voltages of the generator's channels at t = 0 [V]."""
+        start = np.zeros(1)
+        return float(self.drive.at(start)[0]), float(self.drive.beside_at(start)[0])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its fields; the shape where it is no sine, the second channel where there is one."""
+        plain = {"shape": SINE, "second": None}
+        return {k: v for k, v in asdict(self).items() if k not in plain or v != plain[k]}
+
+    @property
     def drive(self) -> Drive:
         """The voltage at the generator's net, as the exact circuit is driven by it."""
-        return Drive(2.0 * np.pi * self.frequency, -self.amplitude, self.offset)
+        second = self.second and replace(self.second, amplitude=-self.second.amplitude)
+        omega = 2.0 * np.pi * self.frequency
+        return Drive(omega, -self.amplitude, self.offset, self.shape, second)

@@ -57,11 +57,15 @@ class Exit:
 class NodalEquations:
     """G y = right for each mode: y are the nets' voltages and the branches' currents.
 
-    further : names of states beside the capacitors' voltages, which stand first.
+    further : names of states beside the capacitors' voltages, which stand first. channel : of the
+    generator, that the rows are over; the other is at 0 V.
     """
 
-    def __init__(self, circuit: Circuit, board: Board, further: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, circuit: Circuit, board: Board, further: tuple[str, ...] = (), *, channel: int = 0
+    ) -> None:
         self.circuit = circuit
+        self._channel = channel
         self.board = board
         self.states = (*circuit.states, *further)
         self.lead = np.shape(board.inverse_gain)
@@ -250,7 +254,7 @@ class NodalEquations:
         n, nodes = len(self.states), len(self._nets)
         # Each branch has its current as an unknown and a row of its own, in this order.
         first = self._first
-        size = first["generator"] + 1
+        size = first["generators"] + len(c.generators)
         G = np.zeros((*self.lead, size, size))
         right = np.zeros((*self.lead, size, n + 2))
 
@@ -293,8 +297,9 @@ class NodalEquations:
         for i, rail in enumerate(c.supplies, first["supplies"]):
             source(i, rail.net, GROUND)
             right[..., i, n + 1] = board.supply.get(rail.name, rail.volts)
-        source(first["generator"], c.generator.net, GROUND)
-        right[..., first["generator"], n] = 1.0
+        for i, net in enumerate(c.generator_nets, first["generators"]):
+            source(i, net, GROUND)
+        right[..., first["generators"] + self._channel, n] = 1.0
         return G, right
 
 
@@ -313,9 +318,10 @@ def _layout(circuit: Circuit, nodes: int) -> Mapping[str, int]:
         "diodes": circuit.diodes,
         "references": circuit.references,
         "supplies": circuit.supplies,
+        "generators": circuit.generators,
     }
     first, at = {}, nodes
     for name, members in groups.items():
         first[name] = at
         at += len(members)
-    return {**first, "generator": at}
+    return first

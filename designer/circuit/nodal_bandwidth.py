@@ -43,11 +43,12 @@ class LaggingEquations(NodalEquations):
     ValueError : the circuit has no figures of its op-amp.
     """
 
-    def __init__(self, circuit: Circuit, board: Board, solver: Solver) -> None:
+    def __init__(self, circuit: Circuit, board: Board, solver: Solver, *, channel: int = 0) -> None:
         if circuit.figures is None:
             raise ValueError("a bandwidth for a circuit without figures of its op-amp")
         self._swinging = swinging_sections(circuit)
-        super().__init__(circuit, board, tuple(s.output for s in self._swinging))
+        further = tuple(s.output for s in self._swinging)
+        super().__init__(circuit, board, further, channel=channel)
         self._solver = solver
         self._resistance = circuit.figures.output_resistance.nominal
         self._droop = circuit.output_stage.resistance

@@ -38,10 +38,7 @@ def _settled(circuit: Circuit, drive: Drive, start: bytes) -> Orbit:
 
 def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:
     """The flow of a reduced board under the generator's setting for this response."""
-    frequency = design.errors.scales.frequency(response.omega)
-    return Flow(
-        system, Drive(2.0 * np.pi * frequency, -design.amplitude(response.b, response.omega))
-    )
+    return Flow(system, design.excitation(response.b, response.omega).drive)
 
 
 TRACE_POINTS = 1024

@@ -58,12 +58,21 @@ class Reduction:
         self.board = board
         self.bandwidth = bandwidth
         self._solutions: dict[ModeKey, Solution] = {}
+        self._seconds: dict[ModeKey, Solution] = {}
 
     @cached_property
     def _equations(self) -> NodalEquations:
+        return self._over(0)
+
+    @cached_property
+    def _beside(self) -> NodalEquations | None:
+        """The same over the generator's second channel; None where there is none."""
+        return None if self.circuit.second is None else self._over(1)
+
+    def _over(self, channel: int) -> NodalEquations:
         if self.bandwidth:
-            return LaggingEquations(self.circuit, self.board, _solved)
-        return NodalEquations(self.circuit, self.board)
+            return LaggingEquations(self.circuit, self.board, _solved, channel=channel)
+        return NodalEquations(self.circuit, self.board, channel=channel)
 
     def system(self) -> PiecewiseLinearSystem:
         """States are the capacitor voltages in volts, time in seconds, the drive in volts.
@@ -106,6 +115,29 @@ class Reduction:
             known = self._solutions[key] = self._equations.solved(key, _solved)
         return known
 
+    def by_second(self, key: ModeKey) -> Solution:
+        """The same over the states, the generator's second channel in the place of the first, 1.
+
+        Raises
+        ------
+        ValueError : there is no second channel.
+        """
+        if self._beside is None:
+            raise ValueError("no second channel")
+        known = self._seconds.get(key)
+        if known is None:
+            known = self._seconds[key] = self._beside.solved(key, _solved)
+        return known
+
+    def voltages(self, key: ModeKey, x: Array, channels: tuple[float, float]) -> dict[str, float]:
+        """Voltage of every net at a state x (n,) and voltages of the generator's channels."""
+        inputs = np.concatenate([x, [channels[0], 1.0]])
+        out = {net: float(row @ inputs) for net, row in self.solution(key).voltage.items()}
+        if self._beside is not None:
+            beside = self.by_second(key).voltage
+            out = {net: volts + channels[1] * float(beside[net][-2]) for net, volts in out.items()}
+        return out
+
     def output(self, key: ModeKey, net: str, x: Array, u: Array) -> Array:
         """Voltage (k,) of a net along states x (k, n) and generator voltages u (k,)."""
         row = self.solution(key).voltage[net]
@@ -134,9 +166,14 @@ class Reduction:
         solved, n = self.solution(key), len(self._equations.states)
         rows = self._equations.rates(key, solved)
         exits = self._equations.exits(key, solved)
+        beside, slopes = None, np.zeros(len(exits))
+        if self._beside is not None:
+            second = self.by_second(key)
+            beside = self._beside.rates(key, second)[:, n]
+            slopes = np.array([e.row[n] for e in self._beside.exits(key, second)])
         guards = tuple(
-            Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance)
-            for e in exits
+            Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance, own)
+            for e, own in zip(exits, slopes.tolist(), strict=True)
         )
         return Mode(
             A=rows[:, :n],
@@ -145,6 +182,7 @@ class Reduction:
             guards=guards,
             sides=self._equations.sides(key),
             clipped=self._equations.clipped(key),
+            beside=beside,
         )
 
     def _even(self) -> bool:

@@ -60,7 +60,7 @@ def _inside(circuit: Circuit, stop: Stop) -> set[str]:
     negative, a state's summing node, a reference, a supply or the generator."""
     states = {s for c in circuit.capacitors if c.name in circuit.states for s in c.nets}
     border = states | {f"{net}n" for net in circuit.state_nets} | _rails(circuit)
-    border |= {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
+    border |= {GROUND, POSITIVE, NEGATIVE, *circuit.generator_nets}
     inside, grown = {stop.output}, True
     while grown:
         near = {net for p in circuit.parts if inside & set(p.nets) for net in p.nets} - border
@@ -78,7 +78,7 @@ def _owners(circuit: Circuit) -> dict[str, str]:
     """The stage that each inner net belongs to, from the summing nodes outwards; last those of the
     references."""
     sections, rails = section_stages(circuit), _rails(circuit)
-    shared = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net, *circuit.stage_outputs}
+    shared = {GROUND, POSITIVE, NEGATIVE, *circuit.generator_nets, *circuit.stage_outputs}
     shared |= rails | {s.output for s in circuit.sections}
     owner = {s.inverting: sections[s.name] for s in circuit.sections}
     parts = [p for p in circuit.parts if not isinstance(p, Section)]

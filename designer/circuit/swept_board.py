@@ -20,6 +20,7 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction
+from designer.dynamics.drive_shape import SINE
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import UPPER, DrivenSystem
@@ -164,6 +165,7 @@ class BoardSubject:
         the op-amps' gain, bias currents and limits and the diodes' curves too."""
         circuit, load = self.design.circuit, self.design.circuit.saturation_load
         text = repr(circuit) + (repr(load) if load is not None else "")
+        shapes = self.design.drive_shapes
         return {
             "board": "nominal",
             "parts": dict(sorted(circuit.values.items())),
@@ -171,6 +173,7 @@ class BoardSubject:
             "frequency": self.frequency,
             "amplitude": self.amplitude,
             "offset": self.offset,
+            **({} if shapes == (SINE,) else {"shapes": shapes}),
         }
 
     def setting_ratios(self, boards: Iterable[Board]) -> dict[str, Array]:
@@ -199,8 +202,13 @@ class BoardSubject:
         if "omega" in change:
             frequency = self.design.errors.scales.frequency(change["omega"])
         assert frequency is not None
-        return Excitation(
-            float(frequency),
-            float(change.get("amplitude", self.amplitude)),
+        omega = 2.0 * np.pi * float(frequency) * self.design.errors.scales.seconds
+        amplitude = float(change.get("amplitude", self.amplitude))
+        # The second channel keeps the ratio that it has to the first at this frequency.
+        own = self.design.excitation(self.design.model.b, omega)
+        return replace(
+            own.louder(amplitude / own.amplitude),
+            frequency=float(frequency),
+            amplitude=amplitude,
             offset=float(change.get("offset", self.offset)),
         )

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 Quantity = tuple[Literal["mass", "damping", "stiffness", "force"], int, int]
-"""Which entry of M, C, K or the force vector; indices from 0 (force: column 0)."""
+"""Which entry of M, C, K or the forces; indices from 0 (of a force: mass, channel)."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Term:
     inverted: bool
     """Whether the negative of the state, or of the generator, is needed."""
     quantity: Quantity
-    """The coefficient that it realises."""
+    """The coefficient that it realises; of a force the column is the generator's channel."""
 
 
 MOST_PLAIN = 4
@@ -52,9 +52,9 @@ def entry_resistor(masses: int, state: int, source: int) -> str:
     return term_resistor(masses, state // 2, place)
 
 
-def drive_resistor(masses: int, mass: int) -> str:
-    """Name of the resistor from the generator to a mass."""
-    return term_resistor(masses, mass, 2 * masses + 1)
+def drive_resistor(masses: int, mass: int, channel: int = 0) -> str:
+    """Name of the resistor from a channel of the generator to a mass."""
+    return f"R{170 + mass}" if channel else term_resistor(masses, mass, 2 * masses + 1)
 
 
 def _sign(value: Any) -> int:
@@ -66,13 +66,16 @@ def terms(
     stiffness: Sequence[Sequence[Any]],
     force: Sequence[Any],
     sign: Callable[[Any], int] = _sign,
+    second: Sequence[Any] = (),
 ) -> tuple[Term, ...]:
-    """The input resistors that the model needs, in the order of their numbers.
+    """The input resistors that the model needs, mass by mass.
+
+    second : forces of the generator's second channel.
 
     Entries may be numbers or symbols; ``sign`` tells -1, 0 or 1 of an entry. An inverting
     integrator fed with +s realises a coefficient of -s: positive entries of C and K take the
     state itself, negative ones its inverse. The generator's inversion is its phase; a force in
-    antiphase takes the generator's inverse.
+    antiphase to others of its channel takes the channel's inverse.
     """
     n = len(force)
     out: list[Term] = []
@@ -88,8 +91,10 @@ def terms(
                 quantity = ("stiffness", i, j)
                 name = term_resistor(n, i, 1 + n + j)
                 out.append(Term(name, velocity, 2 * j, s < 0, quantity))
-        if s := sign(force[i]):
-            out.append(Term(drive_resistor(n, i), velocity, None, s < 0, ("force", i, 0)))
+        for channel, forces in enumerate((force, second)):
+            if s := sign(forces[i]) if len(forces) else 0:
+                name = drive_resistor(n, i, channel)
+                out.append(Term(name, velocity, None, s < 0, ("force", i, channel)))
     return tuple(out)
 
 

@@ -28,7 +28,7 @@ def feedback(s: RuleSubject) -> Iterator[Finding]:
 def drivers(s: RuleSubject) -> Iterator[Finding]:
     """Sources on each net: op-amp outputs, the rails, ground, the generator."""
     on: dict[str, list[str]] = {POSITIVE: ["the supply"], NEGATIVE: ["the supply"]}
-    on |= {GROUND: ["ground"], s.circuit.generator.net: ["the generator"]}
+    on |= {GROUND: ["ground"], **{net: ["the generator"] for net in s.circuit.generator_nets}}
     for component, pin in _pins(s):
         if pin.electrical == "output" and pin.net:
             on.setdefault(pin.net, []).append(f"{component.reference}{pin.unit}")
@@ -38,7 +38,7 @@ def drivers(s: RuleSubject) -> Iterator[Finding]:
 
 def floating_inputs(s: RuleSubject) -> Iterator[Finding]:
     """Inputs that no resistor, reference or trimmer joins to a driven net."""
-    driven = {GROUND, POSITIVE, NEGATIVE, s.circuit.generator.net}
+    driven = {GROUND, POSITIVE, NEGATIVE, *s.circuit.generator_nets}
     driven |= {pin.net for _, pin in _pins(s) if pin.electrical == "output"}
     conducting = [
         {pin.net for pin in c.pins if pin.net}

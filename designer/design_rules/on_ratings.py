@@ -53,7 +53,7 @@ def fault_current(s: RuleSubject) -> Iterator[Finding]:
     limit = INPUT if most is None else most.nominal
     for section in circuit.sections:
         node = section.inverting
-        current = GENERATOR * conductance(circuit, circuit.generator.net, node)
+        current = GENERATOR * sum(conductance(circuit, n, node) for n in circuit.generator_nets)
         ways = {
             d.anode == node
             for d in circuit.fittings

@@ -1,4 +1,4 @@
-"""Exact motion of piecewise-linear systems with one sinusoidal drive, and the orbits they settle
+"""Exact motion of piecewise-linear systems with a periodic drive, and the orbits they settle
 on.
 
 A system is its modes, guards and drive; nothing here knows of a circuit, a mechanism or a file, so

@@ -35,6 +35,13 @@ from .counts import (
     Pairs as Pairs,
     read_counts as read_counts,
 )
+from .drive_shape import (
+    SINE as SINE,
+    Channel as Channel,
+    Shape as Shape,
+    channels as channels,
+    wave as wave,
+)
 from .drive_states import (
     with_drive_states as with_drive_states,
 )
@@ -72,6 +79,7 @@ from .piecewise_linear import (
     Mode as Mode,
     ModeKey as ModeKey,
     PiecewiseLinearSystem as PiecewiseLinearSystem,
+    SecondDrive as SecondDrive,
     motion_of_states as motion_of_states,
 )
 from .steady_state import (

@@ -397,7 +397,7 @@ def describe(
         q=first[1],
         more=tuple(more),
         start=run.strobes[0],
-        mode=flow.system.mode_at(x, flow.drive.offset, mode),
+        mode=flow.mode_at(x, 0.0, mode),
         extremes=run.extremes,
         impact_times=run.impacts.time[once],
         impact_velocities=run.impacts.velocity[once],

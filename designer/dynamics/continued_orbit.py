@@ -166,7 +166,7 @@ def _extremes(flow: Flow, x: Array, n: int) -> tuple[Extreme, ...]:
     """Every local extreme of the displacement past each stop over the n periods from x."""
     states = flow.run(x, n, points=POINTS).strobes[:-1]
     phase = 2.0 * np.pi * np.arange(n * POINTS) / POINTS
-    drive = flow.drive.amplitude * np.sin(phase) + flow.drive.offset
+    drive = flow.drive.at(phase)
     out = []
     for j in range(len(flow.system.clearances)):
         for side, row in sorted(flow.system.contact_rows(j).items()):

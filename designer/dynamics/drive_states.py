@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from designer.dynamics.mode_tables import drive_row, second_row
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 
 
@@ -19,37 +20,41 @@ def with_drive_states(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseL
     They carry the drive's amplitude: what is left of it, ``Drive(omega, 0.0, drive.offset)``, is
     what the system is run with.
     """
-    n, swing, orders = system.size, drive.amplitude, system.orders or ()
+    n, orders = system.size, system.orders or drive.orders
     more = 2 + 2 * len(orders)
+    drives, others = (np.delete(row(drive, orders), 2) for row in (drive_row, second_row))
+    speeds = np.repeat([1, *orders], 2) * drive.omega
+    # A sine's rate is a cosine, a cosine's a sine turned over.
+    rate = np.empty(more)
+    rate[1::2], rate[0::2] = speeds[0::2] * drives[0::2], -speeds[1::2] * drives[1::2]
 
     def build(key: ModeKey) -> Mode:
         mode = system.mode(key)
         A = np.zeros((n + more, n + more))
         A[:n, :n] = mode.A
-        A[:n, n] = swing * mode.B
+        A[:n, n:] = np.outer(mode.B, drives)
+        if mode.beside is not None:
+            A[:n, n:] += np.outer(mode.beside, others)
         if mode.waves is not None:
-            A[:n, n + 1 :] = swing * mode.waves
+            A[:n, n + 1 :] += drive.amplitude * mode.waves
         for i, order in enumerate((1, *orders)):
             sine = n + 2 * i
             A[sine, sine + 1], A[sine + 1, sine] = order * drive.omega, -order * drive.omega
-        none = np.zeros(more - 1)
         guards = tuple(
-            replace(g, C=np.concatenate([g.C, [g.D * swing], none])) for g in mode.guards
+            replace(g, C=np.concatenate([g.C, g.D * drives + g.beside * others]), beside=0.0)
+            for g in mode.guards
         )
         B, d = (np.concatenate([vector, np.zeros(more)]) for vector in (mode.B, mode.d))
-        return replace(mode, A=A, B=B, d=d, guards=guards, waves=None)
+        return replace(mode, A=A, B=B, d=d, guards=guards, waves=None, beside=None)
 
     names = (f"{wave} {order}" for order in orders for wave in ("sine", "cosine"))
-    at, rate = [0.0] * (more - 1), [0.0] * (more - 2)
 
     return PiecewiseLinearSystem(
         states=(*system.states, "sine", "cosine", *names),
         build=build,
         start=system.start,
         clearances=system.clearances,
-        displacement=tuple(np.insert(r, n, [swing * r[n], *at]) for r in system.displacement),
-        velocity=tuple(
-            np.insert(r, n, [0.0, swing * drive.omega * r[n], *rate]) for r in system.velocity
-        ),
+        displacement=tuple(np.insert(r, n, r[n] * drives) for r in system.displacement),
+        velocity=tuple(np.insert(r, n, r[n] * rate) for r in system.velocity),
         continuous=system.continuous,
     )

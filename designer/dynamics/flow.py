@@ -1,4 +1,4 @@
-"""Exact flow of a piecewise-linear system under a sinusoidal drive.
+"""Exact flow of a piecewise-linear system under a periodic drive.
 
 The general engine: any number of states and modes, constant terms, guards that see the drive. Each
 step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -51,19 +52,28 @@ class Flow:
     """The flow of one system under one drive; keeps the tables of the modes it has met.
 
     fast : take the modal fast path where it fits; False: always the general kernel.
+
+    Raises
+    ------
+    ValueError : other waves than the drive's for a drive that is no sine itself.
     """
 
     def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
+        if system.orders is not None and not drive.is_sine:
+            raise ValueError("waves beside a drive that is no sine")
+        if system.mirror is not None and any(order % 2 == 0 for order in drive.orders):
+            # Half a period later the drive is not its own negative.
+            system = replace(system, mirror=None)
         self.system = system
         self.drive = drive
-        fast = fast and not system.orders
+        fast = fast and not system.orders and drive.is_sine
         self._modal = modal_tables.tables(system, drive) if fast and not system.working else None
         tabulated = fast and self._modal is None and system.size <= MOST_STATES
         self._tabulated = TabulatedModes(system, drive) if tabulated else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         alone = zip(system.displacement, system.state_in, strict=True)
-        self._orders = system.orders or ()
+        self.orders = system.orders or drive.orders
         self._watched = [row for row, state in alone if state is None]
         self._tables = self._room(4, 2)
         self._budget: Budget | None = None
@@ -83,8 +93,12 @@ class Flow:
         """Steps that the general kernel takes for one drive period in the mode of rest; more where
         a contact is stiffer."""
         A = self.system.mode(self.system.start).A
-        fastest = self.drive.omega * max(self._orders, default=1)
-        return self.drive.period / mode_tables.step_length(A, fastest)
+        return self.drive.period / mode_tables.step_length(A, self.fastest)
+
+    @property
+    def fastest(self) -> float:
+        """Angular frequency of the fastest wave that acts."""
+        return self.drive.omega * max(self.orders, default=1)
 
     @property
     def met(self) -> list[ModeKey]:
@@ -128,7 +142,7 @@ class Flow:
         """
         x = np.array(x, dtype=float)
         _check(x, self.system.size, periods, points)
-        key = self.system.mode_at(x, self.drive.offset, mode)
+        key = self.mode_at(x, 0.0, mode)
         stretches = periods * points if stretches is None else stretches
         phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float, order="C")
         plain = points == 1 and not measure and stretches == periods
@@ -154,6 +168,13 @@ class Flow:
                 return result
         return self._run_general(x, stretches, points, key, phi, max_events, room, measure=measure)
 
+    def mode_at(self, x: Array, phase: float, near: ModeKey | None = None) -> ModeKey:
+        """Key of the mode that holds at state x (n,) and drive phase ``phase`` [rad]; as of
+        ``PiecewiseLinearSystem.mode_at``."""
+        angle = np.array([phase])
+        u, beside = float(self.drive.at(angle)[0]), float(self.drive.beside_at(angle)[0])
+        return self.system.mode_at(x, u, near, beside=beside)
+
     def to_strobe(self, x: Array, phase: float) -> FlowResult:
         """Start in state x (n,) at drive phase ``phase`` [rad] and run to the next strobe; by the
         general kernel.
@@ -164,8 +185,7 @@ class Flow:
         """
         x = np.array(x, dtype=float)
         _check(x, self.system.size, 1, 1)
-        u = self.drive.offset + self.drive.amplitude * np.sin(phase)
-        key, nothing = self.system.mode_at(x, u), np.zeros((0, 0))
+        key, nothing = self.mode_at(x, phase), np.zeros((0, 0))
         return self._run_general(
             x, 1, 1, key, nothing, MAX_EVENTS, 0, measure=False, phase=phase % (2.0 * np.pi)
         )
@@ -185,7 +205,7 @@ class Flow:
     ) -> FlowResult:
         """The same by the general kernel, which builds modes as it meets them. phase : of the drive
         at the start."""
-        z, before = mode_tables.augmented_state(x, phase, self._orders), phi.copy()
+        z, before = mode_tables.augmented_state(x, phase, self.orders), phi.copy()
         clock, budget = np.array([phase / self.drive.omega, 0.0, 0.0]), self._budget or Budget()
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
         log = self._log(x, stretches, room)
@@ -201,7 +221,7 @@ class Flow:
                 clock,
                 cursor,
                 self.drive.period / points,
-                working_modes.anchors(points, self._orders),
+                working_modes.anchors(points, self.orders),
                 phi,
                 depth,
                 max_events,
@@ -385,8 +405,7 @@ class Flow:
     def _impacts(self, log: Log, met: int) -> Impacts:
         """The impacts in the log, with their velocities."""
         when, at, stop = log.when[:met], log.at[:met], log.stop[:met]
-        swing = self.drive.amplitude * self.drive.omega
-        rates = np.column_stack([at, swing * np.cos(self.drive.omega * when)])
+        rates = np.column_stack([at, self.drive.rate_at(self.drive.omega * when)])
         rows = np.array(self.system.velocity)[stop[:, 0]] if met else np.zeros(rates.shape)
         return Impacts(when, stop[:, 0], stop[:, 1], (rates * rows).sum(axis=1), at)
 
@@ -414,7 +433,7 @@ class Flow:
             self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
         ]
         mode_tables.fill(
-            self._tables, number, mode, touched, self._watched, self.drive, self._orders
+            self._tables, number, mode, touched, self._watched, self.drive, self.orders
         )
         self._index[key] = number
         self._keys.append(key)
@@ -430,7 +449,7 @@ class Flow:
     def _room(self, modes: int, guards: int) -> ModeTables:
         """Empty tables for so many modes with so many guards each."""
         clearances, watched = len(self.system.clearances), len(self._watched)
-        width = self.system.size + 3 + 2 * len(self._orders)
+        width = self.system.size + 3 + 2 * len(self.orders)
         return mode_tables.empty_tables(modes, guards, width, clearances, watched)
 
     def _link(self, number: int, guard: int) -> None:

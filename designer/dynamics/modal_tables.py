@@ -28,7 +28,9 @@ TURNS = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0.0, np.pi, 8, end
 
 def tables(system: PiecewiseLinearSystem, drive: Drive) -> ModalTables | None:
     """The tables of a system under a drive, or None where the fast path does not fit."""
-    if system.size != 4 or len(system.clearances) != 1 or system.orders is not None:
+    if system.size != 4 or len(system.clearances) != 1:
+        return None
+    if system.orders is not None or not drive.is_sine:
         return None
     modes = _modes(system)
     if modes is None:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from designer.base.arrays import Array
+from designer.dynamics.drive_shape import Shape
 from designer.dynamics.piecewise_linear import Drive, Mode
 from designer.kernels import kernel_general as kernel
 from designer.kernels.kernel_algebra import exponential_terms, rows_of_terms
@@ -25,13 +26,15 @@ def augmented(mode: Mode, drive: Drive, orders: Sequence[int] = ()) -> Array:
     n, more = len(mode.d), 2 * len(orders)
     M = np.zeros((n + 3 + more, n + 3 + more))
     M[:n, :n] = mode.A
-    M[:n, n] = drive.amplitude * mode.B
-    M[:n, n + 2] = mode.d + drive.offset * mode.B
+    M[:n, n:] = np.outer(mode.B, drive_row(drive, orders))
+    M[:n, n + 2] += mode.d
+    if mode.beside is not None:
+        M[:n, n:] += np.outer(mode.beside, second_row(drive, orders))
     M[n, n + 1] = drive.omega
     M[n + 1, n] = -drive.omega
     if mode.waves is not None:
-        M[:n, n + 1] = drive.amplitude * mode.waves[:, 0]
-        M[:n, n + 3 :] = drive.amplitude * mode.waves[:, 1:]
+        M[:n, n + 1] += drive.amplitude * mode.waves[:, 0]
+        M[:n, n + 3 :] += drive.amplitude * mode.waves[:, 1:]
     for i, order in enumerate(orders):
         sine = n + 3 + 2 * i
         M[sine, sine + 1], M[sine + 1, sine] = order * drive.omega, -order * drive.omega
@@ -46,9 +49,31 @@ def augmented_state(x: Array, angle: float, orders: Sequence[int] = ()) -> Array
 
 def augmented_row(row: Array, drive: Drive, orders: Sequence[int] = ()) -> Array:
     """A row over (x, u, 1) as one over z."""
-    C, D, e = row[:-2], row[-2], row[-1]
-    ends = [D * drive.amplitude, 0.0, e + D * drive.offset]
-    return np.concatenate([C, ends, np.zeros(2 * len(orders))])
+    ends = row[-2] * drive_row(drive, orders)
+    ends[2] += row[-1]
+    return np.concatenate([row[:-2], ends])
+
+
+def drive_row(drive: Drive, orders: Sequence[int] = ()) -> Array:
+    """(N - n,) the drive as a row over what z has beside the state."""
+    row = _row(drive.amplitude, drive.shape, orders)
+    row[2] = drive.offset
+    return row
+
+
+def second_row(drive: Drive, orders: Sequence[int] = ()) -> Array:
+    """(N - n,) the second drive likewise; zero where there is none."""
+    if drive.second is None:
+        return np.zeros(3 + 2 * len(orders))
+    return _row(drive.second.amplitude, drive.second.shape, orders)
+
+
+def _row(amplitude: float, shape: Shape, orders: Sequence[int]) -> Array:
+    row = np.zeros(3 + 2 * len(orders))
+    for order, *waves in shape:
+        first = 0 if order == 1 else 3 + 2 * list(orders).index(order)
+        row[first : first + 2] = amplitude * np.array(waves)
+    return row
 
 
 def step_length(A: Array, omega: float) -> float:
@@ -95,10 +120,9 @@ def fill(
     count, taylors = len(mode.guards), tables.guard[i]
     if count:
         C, D, e = mode.guard_rows
-        none = np.zeros((count, 2 * len(orders)))
-        ahead = np.column_stack(
-            [C, D * drive.amplitude, np.zeros(count), e + D * drive.offset, none]
-        )  # as of ``augmented_row``
+        ahead = np.column_stack([C, np.outer(D, drive_row(drive, orders))])
+        ahead[:, C.shape[1] + 2] += e  # as of ``augmented_row``
+        ahead[:, C.shape[1] :] += np.outer(mode.guards_beside, second_row(drive, orders))
         for g in range(count):
             rows_of_terms(ahead[g], powers, taylors[g])
         chords = np.einsum("k,gkj->gj", CHORD, np.abs(taylors[:count]))

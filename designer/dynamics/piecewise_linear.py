@@ -1,11 +1,12 @@
-"""A piecewise-linear system with one sinusoidal drive: the common ground of model and circuit.
+"""A piecewise-linear system with one periodic drive: the common ground of model and circuit.
 
 In each mode the state x (n entries) follows
 
-    x' = A x + B u(t) + d,      u(t) = amplitude · sin(ω t + phase) + offset
+    x' = A x + B u(t) + d,      u(t) = amplitude · shape(ω t) + offset
 
-until a guard becomes positive. The drive's cosine and harmonics of it may act too, times the same
-amplitude: forces of other phases and of other shapes. A guard is a linear function C x + D u + e of
+until a guard becomes positive. The shape is a sine, or another sum of harmonics where one voltage
+drives all. Where the drive is a sine, its cosine and harmonics may act beside it, times the same
+amplitude: forces of phases and shapes that differ. A guard is a linear function C x + D u + e of
 state and drive, negative inside its mode, and names the mode on its other side. A mode's key is a
 tuple of small integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an
 op-amp: -1 at its lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else
@@ -26,6 +27,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.dynamics.drive_shape import SINE, Shape, slope, wave
 
 LONGEST_WALK = 512
 """Mode changes after which the search for the mode of a state gives up."""
@@ -51,6 +53,8 @@ class Guard:
     clearance: int = -1
     """Index of the clearance whose contact begins or ends here, or -1. Such guards are scaled to
     displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop."""
+    beside: float = 0.0
+    """Coefficient of the second drive."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class Mode:
     waves: Array | None = None
     """(n, 1 + 2 h) input vectors of ``PiecewiseLinearSystem.waves``, without the amplitude; None
     where the drive is a sine."""
+    beside: Array | None = None
+    """(n,) input vector of the second drive; None where there is none."""
 
     @cached_property
     def guard_rows(self) -> tuple[Array, Array, Array]:
@@ -79,10 +85,29 @@ class Mode:
         C = np.array([g.C for g in self.guards])
         return C, np.array([g.D for g in self.guards]), np.array([g.e for g in self.guards])
 
+    @cached_property
+    def guards_beside(self) -> Array:
+        """(guards,) coefficients of the second drive."""
+        return np.array([g.beside for g in self.guards])
+
+
+@dataclass(frozen=True)
+class SecondDrive:
+    """A drive w(t) = amplitude · shape(omega · t) beside the first, of its frequency."""
+
+    amplitude: float
+    """Amplitude of the shape."""
+    shape: Shape
+    """What it is the sum of, over the amplitude."""
+
+    def at(self, angle: Array) -> Array:
+        """(k,) w at angles ωt (k,)."""
+        return self.amplitude * wave(self.shape, angle)
+
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive u(t) = amplitude · sin(omega · t) + offset.
+    """The drive u(t) = amplitude · shape(omega · t) + offset.
 
     Raises
     ------
@@ -92,9 +117,13 @@ class Drive:
     omega: float
     """Angular frequency, in rad per unit of the system's time."""
     amplitude: float = 1.0
-    """Amplitude of the sine."""
+    """Amplitude of the shape."""
     offset: float = 0.0
     """Constant part of the drive."""
+    shape: Shape = SINE
+    """What it is the sum of, over the amplitude."""
+    second: SecondDrive | None = None
+    """What else drives."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.omega < np.inf):
@@ -106,6 +135,39 @@ class Drive:
     @property
     def period(self) -> float:
         return 2.0 * np.pi / self.omega
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether it is a sine about its offset, and nothing else drives."""
+        return self.shape == SINE and self.second is None
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Multiples of ``omega`` that act beside it, in either drive."""
+        more = () if self.second is None else self.second.shape
+        return tuple(sorted({n for n, *_ in (*self.shape, *more)} - {1}))
+
+    def at(self, angle: Array) -> Array:
+        """(k,) u at angles ωt (k,)."""
+        return self.amplitude * wave(self.shape, angle) + self.offset
+
+    def beside_at(self, angle: Array) -> Array:
+        """(k,) the second drive at angles ωt (k,); 0 where there is none."""
+        return np.zeros_like(angle) if self.second is None else self.second.at(angle)
+
+    def beside_rate_at(self, angle: Array) -> Array:
+        """(k,) the second drive's rate at angles ωt (k,)."""
+        if self.second is None:
+            return np.zeros_like(angle)
+        return self.omega * self.second.amplitude * wave(slope(self.second.shape), angle)
+
+    def rate_at(self, angle: Array) -> Array:
+        """(k,) du/dt at angles ωt (k,)."""
+        return self.amplitude * self.omega * wave(slope(self.shape), angle)
+
+    def bend_at(self, angle: Array) -> Array:
+        """(k,) d²u/dt² at angles ωt (k,)."""
+        return self.amplitude * self.omega**2 * wave(slope(slope(self.shape)), angle)
 
 
 @dataclass
@@ -134,7 +196,8 @@ class PiecewiseLinearSystem:
     """Keys of the modes that a board as it should be moves between, ``start`` first; the fast path
     of circuits tabulates them."""
     orders: tuple[int, ...] | None = None
-    """The h harmonics that act beside the drive's sine and cosine; None where it is a sine."""
+    """The h harmonics that act beside the drive's sine and cosine; None where there is nothing but
+    the drive."""
     _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
 
     @property
@@ -171,8 +234,10 @@ class PiecewiseLinearSystem:
             known = self._modes[key] = self.build(key)
         return known
 
-    def mode_at(self, x: Array, u: float, near: ModeKey | None = None) -> ModeKey:
-        """Key of the mode that holds at state x (n,) and drive u.
+    def mode_at(
+        self, x: Array, u: float, near: ModeKey | None = None, *, beside: float = 0.0
+    ) -> ModeKey:
+        """Key of the mode that holds at state x (n,) and drive u, with the second drive ``beside``.
 
         Walks from ``near`` (default: ``start``) across the most violated guard until none is
         violated. Where that walk meets a mode twice it goes on across the first violated guard
@@ -191,7 +256,7 @@ class PiecewiseLinearSystem:
             mode = self.mode(key)
             cycling = cycling or key in seen
             seen.add(key)
-            values = [float(g.C @ x) + g.D * u + g.e for g in mode.guards]
+            values = [float(g.C @ x) + g.D * u + g.e + g.beside * beside for g in mode.guards]
             floors = [ROUNDING * _size(g, x, u) if cycling else 0.0 for g in mode.guards]
             violated = [i for i, value in enumerate(values) if value > floors[i]]
             if not violated:

@@ -55,13 +55,11 @@ def turning_points_of(
 ) -> list[TurningPoint]:
     """Every turning point of each displacement, seen from each of its stops; see ``heights``."""
     system, drive = flow.system, flow.drive
-    rate = max(_rate(flow, orbit), drive.omega * max(system.orders or (), default=1))
+    rate = max(_rate(flow, orbit), flow.fastest)
     points = int(np.clip(np.ceil(drive.period * rate / RESOLUTION), FEWEST, MOST))
     x = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=points).strobes
     angle = 2.0 * np.pi * np.arange(len(x)) / points
-    u = drive.amplitude * np.sin(angle) + drive.offset
-    du = drive.amplitude * drive.omega * np.cos(angle)
-    ddu = -(drive.omega**2) * drive.amplitude * np.sin(angle)
+    u, du, ddu = drive.at(angle), drive.rate_at(angle), drive.bend_at(angle)
     looked_at = range(len(system.clearances)) if clearances is None else clearances
     stops = [(j, side, row) for j in looked_at for side, row in system.contact_rows(j).items()]
     if not stops:
@@ -91,18 +89,19 @@ def _rate(flow: Flow, orbit: Orbit) -> float:
 def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
     """(nodes, states) x' and x'', each node in the mode that holds there at its drive phase."""
     drive, orders = flow.drive, flow.system.orders
-    u = drive.amplitude * np.sin(angle) + drive.offset
-    du = drive.amplitude * drive.omega * np.cos(angle)
+    u, du = drive.at(angle), drive.rate_at(angle)
+    beside, moving = drive.beside_at(angle), drive.beside_rate_at(angle)
     waves = drive.amplitude * flow.system.waves(angle)
-    turns = _turned(waves, u - drive.offset, drive.omega, orders or ())
+    turns = _turned(waves, drive.amplitude * np.sin(angle), drive.omega, orders or ())
     first, second = np.empty_like(x), np.empty_like(x)
     left, near = np.arange(len(x)), None
     while len(left):
-        near = flow.system.mode_at(x[left[0]], float(u[left[0]]), near)
+        near = flow.mode_at(x[left[0]], float(angle[left[0]]), near)
         mode = flow.system.mode(near)
         holds = np.ones(len(left), dtype=bool)
         for guard in mode.guards:
-            holds &= x[left] @ guard.C + guard.D * u[left] + guard.e <= 0.0
+            value = x[left] @ guard.C + guard.D * u[left] + guard.e
+            holds &= value + guard.beside * beside[left] <= 0.0
         holds[0] = True  # by rounding a guard may be above zero where its mode was found
         nodes, left = left[holds], left[~holds]
         first[nodes] = x[nodes] @ mode.A.T + u[nodes, None] * mode.B + mode.d
@@ -110,6 +109,9 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
         if mode.waves is not None:
             first[nodes] += waves[nodes] @ mode.waves.T
             second[nodes] += turns[nodes] @ mode.waves.T
+        if mode.beside is not None:
+            first[nodes] += beside[nodes, None] * mode.beside
+            second[nodes] += moving[nodes, None] * mode.beside
         second[nodes] += first[nodes] @ mode.A.T
     return first, second
 

@@ -113,7 +113,10 @@ def _rows(synthesis: Synthesis, response: str) -> list[tuple[str, str]]:
     rows = [
         ("exact circuit", response),
         ("generator", format_quantity(setting.frequency_hz, "Hz")),
-        ("amplitude, peak", format_quantity(setting.amplitude_v_peak, "V")),
+        (
+            "amplitude, peak",
+            ", ".join(format_quantity(v, "V") for v in setting.excitation.amplitudes),
+        ),
         ("largest error", f"{100.0 * design.errors.max_error:.2g} % ({design.certificate.status})"),
     ]
     for each in design.checks:

@@ -25,7 +25,6 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit import nominal
 from designer.circuit.design import Design
 from designer.circuit.ensemble import displacement
-from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
@@ -122,8 +121,7 @@ class _Asked:
 def subject(made: Synthesis, r: ModelResponse) -> GateSubject:
     """The nominal circuit of a design, on the orbit that this response has there."""
     reduction = nominal.nominal_reduction(made.design)
-    scales = made.design.errors.scales
-    excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b, r.omega))
+    excitation = made.design.excitation(r.b, r.omega)
     return GateSubject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
 
 

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from designer.base.csv_tables import csv_text
 from designer.base.second_process import Ask
 from designer.base.units import distinct_texts
 from designer.check import checked_design
-from designer.circuit.design import Design, settings
+from designer.circuit.design import Design, GeneratorSetting, settings
+from designer.dynamics.drive_shape import Shape, wave
 from designer.dynamics.orbit import SETTLED
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import state_names
@@ -36,8 +39,12 @@ COLUMNS = (
 DIGITS = 6
 """Significant ones of the scale card."""
 SIDES = {1: "upper", -1: "lower"}
+WAVEFORM_POINTS = 4096
+"""Values in ``waveform.csv``."""
 OMEGA_DIGITS = 6
 """Significant ones of ω where it follows from SI values; more where they tell responses apart."""
+SECOND = ("amplitude2_v_peak", "amplitude2_vpp", "phase2_deg")
+"""Further columns, of boards that a generator's second channel drives too."""
 MECHANISM = "mechanism_hz"
 """A further column, of models with SI values."""
 LOAD = "high-Z"
@@ -69,11 +76,29 @@ def setup_csv(
             "offset_v": repr(s.offset_v),
             "load": LOAD,
             "start": _start(recipe, si) + _coexisting(r),
+            **_second(s),
             **({} if si is None else {MECHANISM: hertz(si.hertz(s.omega))}),
         }
         for s, omega, r, recipe in zip(bench_settings, omegas, responses, recipes, strict=True)
     ]
-    return csv_text(COLUMNS if si is None else (*COLUMNS, MECHANISM), rows)
+    more = SECOND if any(s.second is not None for s in bench_settings) else ()
+    return csv_text((*COLUMNS, *more, *(() if si is None else (MECHANISM,))), rows)
+
+
+def _second(setting: GeneratorSetting) -> dict[str, str]:
+    """What the generator's second channel is set to."""
+    if setting.second is None:
+        return {}
+    peak = volts(setting.second.amplitude)
+    values = peak, repr(2.0 * float(peak)), f"{setting.excitation.second_phase_deg:.5g}"
+    return dict(zip(SECOND, values, strict=True))
+
+
+def waveform_csv(shape: Shape) -> str:
+    """``waveform.csv``, or ``waveform2.csv``: a period of the generator's voltage over its peak,
+    from drive phase 0 on, a value a line, as generators read an arbitrary waveform."""
+    angle = 2.0 * np.pi * np.arange(WAVEFORM_POINTS) / WAVEFORM_POINTS
+    return "".join(f"{-value:.7f}\n" for value in wave(shape, angle).tolist())
 
 
 def _start(recipe: Recipe | None, si: SiScales | None) -> str:
@@ -150,7 +175,10 @@ def _amplitudes(
     modelfile: ModelFile, design: Design, b: float
 ) -> list[tuple[str, float, str, float]]:
     volts = [float(v) for v in design.volts(b)]
-    gain = (b / design.model.b) * sum(float(g) for g in design.errors.drive_gain)
+    each = design.errors.drive_gain, design.errors.second_gain
+    gains = [(b / design.model.b) * float(gain.sum()) for gain in each]
+    names = ("generator volt", "volt of the generator's second channel")
+    driving = [(name, gain) for name, gain in zip(names, gains, strict=True) if gain]
     states = state_names(len(volts) // 2)
     rows = [(f"volts per unit of {s}", v, "V", b) for s, v in zip(states, volts, strict=True)]
     si = modelfile.si
@@ -159,12 +187,13 @@ def _amplitudes(
             (f"model units of {s} per volt", 1.0 / v, "1/V", b)
             for s, v in zip(states, volts, strict=True)
         ]
-        return [*rows, ("model force per generator volt", gain, "1/V", b)]
+        return [*rows, *((f"model force per {name}", gain, "1/V", b) for name, gain in driving)]
     length, speed = si.length_scale, si.speed_scale
     for i, (s, v) in enumerate(zip(states, volts, strict=True)):
         name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
         rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))
-    return [*rows, ("newtons per generator volt", gain * si.force_scale, "N/V", b)]
+    force = si.force_scale
+    return [*rows, *((f"newtons per {name}", gain * force, "N/V", b) for name, gain in driving)]
 
 
 def _coexisting(response: ModelResponse) -> str:

@@ -28,7 +28,7 @@ from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.design_rules.rule_subject import RuleSubject
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.folders import board_files
-from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes
+from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes, waveform_csv
 from designer.folders.design_findings import error_warnings, findings, subject_of
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
@@ -40,6 +40,8 @@ from designer.spice import deck
 from designer.spread.part_grades import better_grades
 
 SETUP = "setup.csv"
+WAVEFORMS = "waveform.csv", "waveform2.csv"
+"""Of the generator's channels."""
 
 
 def check(modelfile: ModelFile, catalog: Catalog) -> None:
@@ -57,8 +59,20 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(synthesis),
         "scales.csv": scales_csv(modelfile, design, synthesis.model_responses),
+        **{
+            name: waveform_csv(shape)
+            for name, shape in zip(waveform_names(modelfile), design.drive_shapes, strict=False)
+        },
         **board_files.bills(synthesis),
     }
+
+
+def waveform_names(modelfile: ModelFile) -> tuple[str, ...]:
+    """The waveforms that a generator's channels have to be given; none where all are sines."""
+    system = modelfile.model.second_order()
+    if all(n == 1 for shape in system.drive_shapes for n, *_ in shape):
+        return ()
+    return WAVEFORMS[: len(system.drive_shapes)]
 
 
 def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:

@@ -15,7 +15,7 @@ from designer.base.version import __version__
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis
 from designer.folders import board_files
-from designer.folders.design_files import load
+from designer.folders.design_files import load, waveform_names
 from designer.folders.design_findings import FINDINGS, findings, subject_of
 from designer.folders.model_source import design_inputs_of, source
 from designer.model.model_file import ModelFile
@@ -71,7 +71,7 @@ def grade_inputs(modelfile: ModelFile, catalog: Catalog) -> dict[str, str]:
 
 def design_stage(modelfile: ModelFile, inputs: dict[str, Any]) -> Stages:
     """The stage of a design, with the names of its files."""
-    files = [*DESIGN_FILES, *board_files.names(modelfile)]
+    files = [*DESIGN_FILES, *waveform_names(modelfile), *board_files.names(modelfile)]
     files += [MEASURED] if modelfile.measured is not None else []
     return {"design": (inputs, files)}
 

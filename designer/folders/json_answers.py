@@ -9,11 +9,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from designer.base.plain_json import FORMAT, plain
+from designer.dynamics.drive_shape import SINE
+from designer.dynamics.piecewise_linear import SecondDrive
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.base.arrays import Array
     from designer.check.simulation import Simulated
-    from designer.circuit.design import Design
+    from designer.circuit.design import Design, GeneratorSetting
     from designer.circuit.netlist import Circuit
     from designer.dynamics.orbit import Orbit
     from designer.model.find_responses import ModelResponse
@@ -71,6 +73,8 @@ def synthesis_json(
                 **mechanism_json(s.omega, modelfile.si),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
+                **({} if s.shape == SINE else {"shape": [list(wave) for wave in s.shape]}),
+                **({} if s.second is None else {"second": _second(s, s.second)}),
                 "expected": r.expected,
                 "found": r.found,
             }
@@ -82,6 +86,15 @@ def synthesis_json(
         "solver": design.solver,
         "provenance": provenance,
         "cost": {"seconds": seconds, "synthesis_seconds": design.seconds},
+    }
+
+
+def _second(setting: GeneratorSetting, second: SecondDrive) -> dict[str, Any]:
+    """The generator's second channel, ahead of the first by its phase."""
+    return {
+        "amplitude_v_peak": second.amplitude,
+        "phase_deg": setting.excitation.second_phase_deg,
+        "shape": [list(wave) for wave in second.shape],
     }
 
 

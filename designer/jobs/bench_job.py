@@ -15,6 +15,7 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.circuit.design import GeneratorSetting
 from designer.dynamics.counts import read_counts
+from designer.dynamics.drive_shape import SINE
 from designer.folders.report_sections import BENCHED as NAME
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
@@ -111,8 +112,12 @@ def _fits(record: BenchedRecord) -> bool:
 def check_fits(
     prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
 ) -> None:
-    """InputError where boards with laws, or with dampers in their stops, are to be fitted: the fit
-    knows contacts alone, and rates that are continuous there."""
+    """InputError where the generator gives no sine, for records are recognised by it, and where
+    boards with laws, or with dampers in their stops, are to be fitted: the fit knows contacts
+    alone, and rates that are continuous there."""
+    if prediction.synthesis.design.drive_shapes != (SINE,):
+        found = "a board that more than a sine drives"
+        raise InputError(None, "--record", found, "records of a board that a sine drives")
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
     for option, wanted in asked.items():

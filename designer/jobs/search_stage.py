@@ -24,6 +24,7 @@ from designer.centering.design_search import look, search as design_search
 from designer.centering.ngspice_check import AgreementCheck
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import search_json
+from designer.folders.design_files import waveform_names
 from designer.folders.design_source import design_inputs, design_stage
 from designer.folders.model_source import model_file
 from designer.folders.origin import provenance
@@ -58,7 +59,7 @@ def searched_into(
     inputs = design_inputs(modelfile, catalog)
     inputs |= {"version": __version__, "rules": RULES, "seed": options.seed}
     todo = folder.decide(
-        {"search": (inputs, [*FILES, *DESIGN_FILES])},
+        {"search": (inputs, [*FILES, *DESIGN_FILES, *waveform_names(modelfile)])},
         overwrite=options.overwrite,
         resume=options.resume,
         asked={"model": modelfile.text},

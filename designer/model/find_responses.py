@@ -262,7 +262,7 @@ class _Span:
             return float(self.extremes[used[0], 0]), float(self.extremes[used[0], 1])
         states = self.flow.run(self.start, self.periods, points=DENSE).strobes
         phase = 2.0 * np.pi * np.arange(len(states)) / DENSE
-        drive = self.flow.drive.amplitude * np.sin(phase) + self.flow.drive.offset
+        drive = self.flow.drive.at(phase)
         moves = states @ row[:-1] + row[-1] * drive
         return float(moves.min()), float(moves.max())
 

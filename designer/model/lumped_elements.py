@@ -17,6 +17,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
+from designer.dynamics.drive_shape import SINE, Shape
 from designer.model.clearance import Side
 from designer.model.element_keys import GROUND, NAME, combination, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
@@ -29,7 +30,6 @@ from designer.model.law_elements import (
     quantity_of,
 )
 from designer.model.matrices import Matrices
-from designer.model.mechanics import SINE, Shape
 from designer.model.waveforms import Waveform, series
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import one_of
+from designer.dynamics.drive_shape import SINE
 from designer.model.clearance import Clearance, combined
 from designer.model.cubic_law import MOST_POINTS
 from designer.model.element_keys import GROUND
@@ -35,7 +36,7 @@ from designer.model.law_elements import (
 )
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
 from designer.model.matrices import Matrices
-from designer.model.mechanics import SINE, HarmonicForce, SecondOrderSystem
+from designer.model.mechanics import HarmonicForce, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")

@@ -11,7 +11,7 @@ with the ground watch z + y.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -21,6 +21,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.dynamics.drive_shape import SINE, Channel, Shape, channels
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
 from designer.model.clearance import Clearance
 from designer.model.dead_zones import dead_zones
@@ -41,9 +42,6 @@ class HarmonicForce:
 
 ROUNDING = 1e-12
 """Of the size of its terms: a sum below it is none."""
-Shape = tuple[tuple[int, float, float], ...]
-"""(n, amplitude of sin nωt, amplitude of cos nωt) of each wave of a sum."""
-SINE: Shape = ((1, 1.0, 0.0),)
 
 
 @dataclass(frozen=True)
@@ -162,16 +160,69 @@ class SecondOrderSystem:
         """The ground's displacement at a drive frequency."""
         return displacement_shape(self.base, self.base_acceleration, self.base_shape, omega)
 
-    def drive_force(self, omega: float) -> Array:
-        """(n,) amplitude of the sine in the force on each mass at a drive frequency, the ground's
-        included."""
-        return self.drive_waves(omega)[0].sine
+    def channels(self, omega: float) -> tuple[Channel, ...] | None:
+        """What a circuit's generator drives the masses with at a drive frequency, the ground's
+        forces included, by its channels, one or two; None where it takes more. Their shapes, and
+        their order, are the same at every frequency."""
+        if self.driven_by_sine and not self._ratio_varies:
+            return (Channel(SINE, self.drive_waves(omega)[0].sine),)
+        if not self._ratio_varies:
+            return channels(_parts(self.drive_waves(omega)))
+        own = channels(_parts(self._own_waves))
+        ground = channels(_parts(self._without_forces.drive_waves(omega)))
+        if own is None or ground is None or len(own) > 1:
+            return None
+        return (*own, *ground)
+
+    @property
+    def _ratio_varies(self) -> bool:
+        """Whether forces of their own act beside the ground's, which grow with the frequency."""
+        return bool(self.base) and any(
+            wave.sine.any() or wave.cosine.any() for wave in self._own_waves
+        )
+
+    @cached_property
+    def _without_forces(self) -> SecondOrderSystem:
+        """Driven by the ground alone."""
+        none = np.zeros(self.size)
+        return replace(self, force=none, quadrature=none, harmonics=())
+
+    @property
+    def _own_waves(self) -> tuple[HarmonicForce, ...]:
+        """Without the ground's."""
+        return (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
+
+    def drive_force(self, omega: float, channel: int = 0) -> Array:
+        """(n,) amplitude of a channel's shape in the force on each mass at a drive frequency; 0 for
+        a channel that there is not.
+
+        Raises
+        ------
+        ValueError : it takes more than two channels.
+        """
+        every = self._channels(omega)
+        return every[channel].force if channel < len(every) else np.zeros(self.size)
+
+    @property
+    def largest_force(self) -> float:
+        """Largest amplitude of a force at the model's own frequency."""
+        return max(float(np.abs(c.force).max()) for c in self._channels(self.own_frequency))
+
+    @cached_property
+    def drive_shapes(self) -> tuple[Shape, ...]:
+        """Of each channel; raises as ``drive_force``."""
+        return tuple(each.shape for each in self._channels(self.own_frequency))
+
+    def _channels(self, omega: float) -> tuple[Channel, ...]:
+        found = self.channels(omega)
+        if found is None:
+            raise ValueError("forces that take more than two channels")
+        return found
 
     def drive_waves(self, omega: float) -> tuple[HarmonicForce, ...]:
         """All forces at a drive frequency, the ground's included, by their order; the first is that
         of the drive itself."""
-        own = (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
-        waves = {wave.order: np.stack([wave.sine, wave.cosine]) for wave in own}
+        waves = _parts(self._own_waves)
         if self.ground_moves:
             for n, *parts in self.base_shape:
                 acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
@@ -325,7 +376,7 @@ class SecondOrderSystem:
         stops, count = contacts[: len(self.clearances)], len(self.clearances)
         A0 = self.state_matrix()
         B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
-        B0[1::2] = self.over_mass(self.drive_force(omega or 0.0))
+        B0[1::2] = self.over_mass(self.drive_waves(omega or 0.0)[0].sine)
         d0[1::2] = self.over_mass(self.constant)
         waves, orders = self._waves(omega or 0.0), self.orders
 
@@ -369,6 +420,11 @@ def _without_rounding(less: Array, whole: Array) -> Array:
     """What is left of ``whole``, with zeros where that is rounding."""
     rounding = ROUNDING * max(np.abs(less).max(initial=0.0), np.abs(whole).max(initial=0.0))
     return np.where(np.abs(less) > rounding, less, 0.0)
+
+
+def _parts(waves: Iterable[HarmonicForce]) -> dict[int, Array]:
+    """By order the (2, n) amplitudes of sine and cosine."""
+    return {wave.order: np.stack([wave.sine, wave.cosine]) for wave in waves}
 
 
 @dataclass(frozen=True)

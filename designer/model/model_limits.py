@@ -187,8 +187,7 @@ LIMITS = (
     ModelLimit(
         "another phase, but as phase of a [[force]] of format 2",
         "`[base] phase`, `phi`",
-        "phase of a [[force]] of format 2, which counts from the drive's sine, that of a [base]; "
-        "no circuit makes another than 0 or half a turn",
+        "phase of a [[force]] of format 2, which counts from the drive's sine, that of a [base]",
         keys=r"\w*phase\w*|phi\w?|angle|lag|lead",
     ),
     ModelLimit(
@@ -224,8 +223,7 @@ LIMITS = (
     ModelLimit(
         "a drive that is no sine, but as waveform or harmonics of a force or base of format 2",
         "`pulse`, `noise`, `[[waveform]]`",
-        "waveform with terms, or harmonics, of a [[force]] or [base] of format 2; no circuit makes "
-        "them",
+        "waveform with terms, or harmonics, of a [[force]] or [base] of format 2",
         tables=r"waveforms?|harmonics?|signals?|sweep|chirp|noise",
         keys=r"waveform\w*|harmonics?|shape|square|triangle|sawtooth|pulse\w*|terms|noise|"
         r"random\w*|signal|chirp|sweep",

@@ -12,14 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.dynamics.drive_shape import SINE, Shape
 from designer.dynamics.orbit import Orbit
-from designer.model.mechanics import (
-    SINE,
-    MechanicalModel,
-    SecondOrderSystem,
-    Shape,
-    displacement_shape,
-)
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem, displacement_shape
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 

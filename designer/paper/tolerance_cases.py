@@ -128,10 +128,7 @@ def _circuits(
         settings = [one.excitation(r.omega) for r in wanted]
         yield name, one.circuit, *_questions(one.circuit, one.volts, settings, wanted)
     design = synthesise(modelfile, catalog).design
-    settings = [
-        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b, r.omega))
-        for r in wanted
-    ]
+    settings = [design.excitation(r.b, r.omega) for r in wanted]
     yield RECTIFIER, design.circuit, *_questions(design.circuit, design.volts(), settings, wanted)
 
 

@@ -227,6 +227,14 @@ def _settings_note(data: ReportData) -> str:
         "contact and nearest grazing (the smaller of shallowest contact and nearest miss) are "
         "those of the nominal circuit."
     )
+    drive = data.checked[0].excitation
+    if drive.second is not None:
+        text += " The second amplitude is that of the generator's second channel"
+        ahead = drive.second_phase_deg
+        text += f", {ahead:.4g}° ahead of the first." if ahead else "."
+    if drive.is_waveform:
+        text += " The generator gives the waveform of waveform.csv"
+        text += "." if drive.second is None else ", its second channel that of waveform2.csv."
     if any(c.gate is not None for c in data.checked):
         text += (
             " The largest difference is between ngspice's runs at the strobes, in per cent of "

@@ -217,13 +217,17 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
             scale = si.speed_scale if speed else si.length_scale
             unit = "m/s" if speed else "m"
             rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
-    gain = float(np.sum(design.errors.drive_gain))
-    if gain > 0.0:
+    gains = design.errors.drive_gain, design.errors.second_gain
+    for name, each in zip(("generator", "second channel"), gains, strict=True):
+        gain = float(np.sum(each))
+        if gain <= 0.0:
+            continue
         rows.append(
-            ("generator for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
+            (f"{name} for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
         )
         if si is not None:
-            rows.append(("one generator volt", words.quantity(gain * si.force_scale, "N")))
+            one = "one generator volt" if name == "generator" else f"one volt of the {name}"
+            rows.append((one, words.quantity(gain * si.force_scale, "N")))
     return table(("scale", "value"), rows, (1,))
 
 

@@ -77,7 +77,9 @@ def settings_table(data: ReportData) -> Table | None:
         **_frequencies(data),
         "b": lambda c: words.number(c.model.b),
         "frequency": lambda c: words.quantity(c.excitation.frequency, "Hz"),
-        "amplitude (peak)": lambda c: words.quantity(c.excitation.amplitude, "V"),
+        "amplitude (peak)": lambda c: ", ".join(
+            words.quantity(volts, "V") for volts in c.excitation.amplitudes
+        ),
         "shortest contact": contact,
         "nearest grazing": lambda c: words.quantity(
             min(c.circuit.penetration, c.circuit.miss), "V", 3

@@ -140,7 +140,7 @@ def circuit_cells(
     and what several of them share. fittings : drawn at the nodes of the circuit, with its parts.
     """
     pins = {net for s in circuit.sections for net in s.nets}
-    rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
+    rails = {GROUND, POSITIVE, NEGATIVE, *circuit.generator_nets}
     shown = {net for part in fittings for net in part.nets}
     visible = frozenset(pins | rails | shown | _stage_outputs(circuit))
     two_pin = [*(p for p in circuit.parts if not isinstance(p, Section)), *fittings]
@@ -245,7 +245,7 @@ def board_cells(
     supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in outside]
     behind = [n for n in (POSITIVE, NEGATIVE) if n not in outside and n in pads]
     supply += [f"{rail}: {', '.join(pads[rail])}" for rail in behind]
-    supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
+    supply = [*(f"{net}: {', '.join(pads[net])}" for net in circuit.generator_nets), *supply]
     for package in circuit.packages:
         pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
         if pads_of:

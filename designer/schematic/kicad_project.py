@@ -217,7 +217,7 @@ def files(project: Project) -> dict[str, str]:
         f"{name}.kicad_pcb": expression_text(pads),
         f"{name}.kicad_pro": settings(name, circuit, project.limits),
         f"{name}.net": expression_text(netlist(name, listed)),
-        models: kicad_sim.models(circuit, project.components),
+        models: kicad_sim.models(circuit, project.components, project.run),
         f"{LIBRARY}.kicad_sym": expression_text(library(shapes(sheet))),
         "sym-lib-table": _table("sym_lib_table", f"{LIBRARY}.kicad_sym"),
         "fp-lib-table": _table("fp_lib_table", f"{LIBRARY}.pretty"),

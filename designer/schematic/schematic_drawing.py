@@ -100,9 +100,8 @@ class _Page:
         if title:
             self.text(x, y, " ".join(title.split())[:120], 15)
             y -= 1.2
-        limits = (
-            f"rails ± {circuit.supply:g} V, {circuit.opamp}, generator at {circuit.generator.net}"
-        )
+        generator = " and ".join(circuit.generator_nets)
+        limits = f"rails ± {circuit.supply:g} V, {circuit.opamp}, generator at {generator}"
         self.text(x, y, limits, TITLE_SIZE, FAINT)
         y -= 1.6
         for row in (*circuit_cells(circuit), board_cells(circuit, self.numbers)):

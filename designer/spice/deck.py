@@ -7,6 +7,7 @@ only through ``title_line``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,8 +16,9 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import card
 from designer.circuit.board_values import Board
-from designer.circuit.netlist import Circuit, Excitation, Reference
+from designer.circuit.netlist import Circuit, Excitation, Generator, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
+from designer.dynamics.drive_shape import Shape
 from designer.spice import opamp_model
 from designer.spice.opamp_model import Rung, literal
 
@@ -91,13 +93,11 @@ def write(
         title_line(title),
         f"* designer deck, format {FORMAT}",
         *map(comment_line, notes),
-        f"{circuit.generator.name} {circuit.generator.net} 0 "
-        f"SIN({literal(drive.offset)} {literal(drive.amplitude)} {literal(drive.frequency)} "
-        "0 0 180)",
+        *generators(circuit, drive),
     ]
     lines += _sources(circuit, board, rung)
     lines += resistors(circuit, board)
-    lines += capacitors(circuit, board, initial, drive.offset)
+    lines += capacitors(circuit, board, initial, drive.at_start)
     lines += diodes(circuit, charge=rung != "ideal")
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
     lines += [
@@ -166,18 +166,10 @@ def _outputs(
     x = np.zeros(len(circuit.states)) if initial is None else initial
     reduction = Reduction(circuit, board)
     try:
-        voltage = reduction.solution(reduction.system().start).voltage
+        volts = reduction.voltages(reduction.system().start, x, excitation.at_start)
     except FloatingCircuit:
         return {}
-    return {
-        s.name: float(
-            np.clip(
-                voltage[s.output] @ np.concatenate([x, [excitation.offset, 1.0]]),
-                *board.rails[s.name],
-            )
-        )
-        for s in circuit.sections
-    }
+    return {s.name: float(np.clip(volts[s.output], *board.rails[s.name])) for s in circuit.sections}
 
 
 def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
@@ -195,6 +187,55 @@ def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
     return lines + (SHUNT_REFERENCE if shunts else [])
 
 
+def generators(circuit: Circuit, excitation: Excitation, *, turned: bool = True) -> list[str]:
+    """The element lines of the generator's channels; turned : as of ``generator``."""
+    return [
+        line
+        for number, channel in enumerate(circuit.generators)
+        for line in generator(channel, excitation.channel(number), turned=turned)
+    ]
+
+
+def generator(
+    channel: Generator, excitation: Excitation, *, turned: bool = True, bottom: str = "0"
+) -> list[str]:
+    """The element lines of a channel of the generator, at this frequency and amplitude: a source
+    for each wave of its shape, one on top of the other, the first with the offset.
+
+    turned : half a turn of phase makes the generator's voltage the negative of the shape; else a
+    negative amplitude does, and a phase is written only where a wave has one. bottom : the net that
+    the last one stands on.
+    """
+    name, net = channel.name, channel.net
+    waves = sine_waves(excitation.shape)
+    below = [f"{net}h{n}" for n, *_ in waves[1:]] + [bottom]
+    lines, offset = [], excitation.offset
+    for k, (n, size, phase) in enumerate(waves):
+        own, top = (name, net) if k == 0 else (f"{name}h{n}", below[k - 1])
+        peak, degrees = excitation.amplitude * size, phase
+        if turned:
+            degrees = (phase + 180.0) % 360.0
+        else:
+            peak = -peak
+        end = f" 0 0 {degrees:.12g}" if turned or degrees else ""
+        lines.append(
+            f"{own} {top} {below[k]} SIN({literal(offset)} {literal(peak)} "
+            f"{literal(n * excitation.frequency)}{end})"
+        )
+        offset = 0.0
+    return lines
+
+
+def sine_waves(shape: Shape) -> list[tuple[int, float, float]]:
+    """(n, amplitude, phase [degrees]) of a shape: amplitude · sin(nωt + phase). One that is a sine
+    but for its sign has no phase."""
+    out = []
+    for n, sine, cosine in shape:
+        size, phase = math.hypot(sine, cosine), math.degrees(math.atan2(cosine, sine))
+        out.append((n, size, phase) if cosine else (n, sine, 0.0))
+    return out
+
+
 def shunt_reference(reference: Reference, volts: float) -> str:
     """The element line of a reference that is a `SHUNT_REFERENCE`."""
     r = reference
@@ -210,13 +251,13 @@ def resistors(circuit: Circuit, board: Board) -> list[str]:
 
 
 def capacitors(
-    circuit: Circuit, board: Board, initial: Array | None, generator: float
+    circuit: Circuit, board: Board, initial: Array | None, channels: tuple[float, float]
 ) -> list[str]:
-    """The element lines of the capacitors, with their voltages at t = 0. generator : its voltage
-    then [V]."""
+    """The element lines of the capacitors, with their voltages at t = 0. channels : of the
+    generator, their voltages then [V]."""
     states = np.zeros(len(circuit.states)) if initial is None else initial
     start = dict(zip(circuit.states, states, strict=True))
-    start |= following(circuit, board, states, generator)
+    start |= following(circuit, board, states, channels)
     return [
         f"{c.name} {c.plus} {c.minus} {literal(board.values[c.name])} "
         f"IC={literal(start.get(c.name, 0.0))}"
@@ -225,21 +266,18 @@ def capacitors(
 
 
 def following(
-    circuit: Circuit, board: Board, states: Array, generator: float = 0.0
+    circuit: Circuit, board: Board, states: Array, channels: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, float]:
     """Voltages of the capacitors that follow from the states; 0 V where no mode holds at these."""
     if not circuit.dependent_capacitors:
         return {}
     reduction = Reduction(circuit, board)
     try:
-        voltage = reduction.solution(reduction.system().mode_at(states, generator)).voltage
+        key = reduction.system().mode_at(states, channels[0], beside=channels[1])
+        volts = reduction.voltages(key, states, channels)
     except ArithmeticError:
         return {}
-    inputs = np.concatenate([states, [generator, 1.0]])
-    return {
-        c.name: float((voltage[c.plus] - voltage[c.minus]) @ inputs)
-        for c in circuit.dependent_capacitors
-    }
+    return {c.name: volts[c.plus] - volts[c.minus] for c in circuit.dependent_capacitors}
 
 
 def diode_names(circuit: Circuit) -> dict[str, str]:
@@ -294,7 +332,7 @@ def newton_bounds(circuit: Circuit, board: Board, rung: Rung) -> str:
 def voltages(circuit: Circuit, *, stage: bool = True) -> str:
     """The voltages that a run saves: states, outputs of the dead zones (``stage``), generator."""
     nets = circuit.outputs if stage else circuit.state_nets
-    return " ".join(f"v({net})" for net in (*nets, circuit.generator.net))
+    return " ".join(f"v({net})" for net in (*nets, *circuit.generator_nets))
 
 
 def title_line(text: str) -> str:

@@ -42,7 +42,7 @@ from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
-from designer.spice.static_rests import StaticRest, drive_of, static_rests
+from designer.spice.static_rests import STILL, StaticRest, drive_of, static_rests
 
 Complex = NDArray[np.complex128]
 
@@ -55,8 +55,6 @@ DEEPEST = 5
 GAIN = 1e8
 """Open-loop gain of the op-amps, with which ngspice finds more operating points than with an
 endless one; it errs by the noise gain over it, a tenth of `FLOOR` at a noise gain of 10 000."""
-STILL = 1e-9
-"""Of the largest displacement: one below it is none."""
 HOLDING = 1e15
 """Inductance [H] beside each integrator's capacitor: a wire at rest, nothing at any frequency."""
 
@@ -157,36 +155,50 @@ def check(design: Design, responses: Sequence[ModelResponse], pool: SpicePool) -
     rests = static_rests(design, model, responses)
     centre = _resonance(model)
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
-    curve = rests if _seen(design) else ()
+    curve = [rest for rest in rests if rest.near != rest.far and _seen(design)]
 
-    jobs = [_ac(design, rest, low, high) for rest in rests]
+    looks = [(rest, 0) for rest in rests]
+    looks += [
+        (rest, channel)
+        for rest in rests[:1]
+        for channel in range(1, len(design.circuit.generators))
+    ]
+    jobs = [_ac(design, rest, low, high, channel) for rest, channel in looks]
     jobs += [_dc(design, rest) for rest in curve]
     answers = {}
     for number, answer in pool.map(jobs):
         answers[number] = answer
         doing(f"{len(answers)} of {len(jobs)} runs")
-    findings = [_transfer(design, model, rest, answers[i]) for i, rest in enumerate(rests)]
-    sweeps = [(rest, answers[len(rests) + i]) for i, rest in enumerate(curve)]
+    findings = [_transfer(design, model, *look, answers[i]) for i, look in enumerate(looks)]
+    sweeps = [(rest, answers[len(looks) + i]) for i, rest in enumerate(curve)]
     return EquationCheck((*findings, *_curve(design, model, sweeps)), low, high)
 
 
 def transfer(
-    model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int = 0
+    model: SecondOrderSystem,
+    omega: Array,
+    sides: tuple[int, ...],
+    mass: int = 0,
+    channel: int = 0,
 ) -> Complex:
-    """(k,) displacement of a mass per unit of drive at ``omega`` (k,), each dead zone in contact
-    with this side or open (0)."""
-    return np.array([_impedance(model, w, sides)[1][mass] for w in omega])
+    """(k,) displacement of a mass per unit of a channel of the drive at ``omega`` (k,), each dead
+    zone in contact with this side or open (0)."""
+    return np.array([_impedance(model, w, sides, channel)[1][mass] for w in omega])
 
 
-def _moved(model: SecondOrderSystem, omega: float, sides: tuple[int, ...]) -> int:
-    """Index of the first mass that the drive moves: while a clearance is open, nothing else may
-    join the others to it."""
-    displacements = np.abs(_impedance(model, omega, sides)[1])
+def _moved(model: SecondOrderSystem, omega: float, sides: tuple[int, ...], channel: int = 0) -> int:
+    """Index of the first mass that a channel of the drive moves: while a clearance is open, nothing
+    else may join the others to it."""
+    displacements = np.abs(_impedance(model, omega, sides, channel)[1])
     return int(np.flatnonzero(displacements > STILL * displacements.max())[0])
 
 
 def explained(
-    model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int = 0
+    model: SecondOrderSystem,
+    omega: Array,
+    sides: tuple[int, ...],
+    mass: int = 0,
+    channel: int = 0,
 ) -> Array:
     """(k,) largest |dH/H| for a relative change of 1 in every coefficient of the equations.
 
@@ -203,7 +215,7 @@ def explained(
     first = np.eye(model.size)[0]
     rows = rows or [(first, first, "displacement", float(model.stiffness[0, 0]))]
     for k, w in enumerate(omega):
-        terms, right = _impedance(model, w, sides)
+        terms, right = _impedance(model, w, sides, channel)
         left = np.linalg.inv(sum(terms))[mass]
         size = sum(float((np.abs(left)[:, None] * np.abs(t) * np.abs(right)).sum()) for t in terms)
         for row, push, quantity, slope in rows:
@@ -215,21 +227,28 @@ def explained(
 
 
 def _drive_error(
-    design: Design, model: SecondOrderSystem, omega: Array, sides: tuple[int, ...], mass: int
+    design: Design,
+    model: SecondOrderSystem,
+    omega: Array,
+    sides: tuple[int, ...],
+    mass: int,
+    channel: int,
 ) -> Array:
     """(k,) |dH/H| that the drive explains: the driven masses share the force in a ratio of their
     own, which is no coefficient of the equations and not in their error."""
-    wanted = drive_of(model)
-    error = np.abs(np.where(wanted, design.errors.drive_gain * design.amplitude() - wanted, 0.0))
+    wanted = drive_of(model, channel)
+    gain = design.errors.second_gain if channel else design.errors.drive_gain
+    made = gain * design.amplitude(channel=channel)
+    error = np.abs(np.where(wanted, made - wanted, 0.0))
     out = np.zeros(len(omega))
     for k, w in enumerate(omega):
-        terms, right = _impedance(model, w, sides)
+        terms, right = _impedance(model, w, sides, channel)
         out[k] = float(np.abs(np.linalg.inv(sum(terms))[mass]) @ error) / abs(right[mass])
     return out
 
 
 def _impedance(
-    model: SecondOrderSystem, omega: float, sides: tuple[int, ...]
+    model: SecondOrderSystem, omega: float, sides: tuple[int, ...], channel: int
 ) -> tuple[list[Complex], Complex]:
     """Terms of Z = -ω²M + iωC + K + contacts, and the displacements Z⁻¹ force."""
     terms = [
@@ -242,7 +261,7 @@ def _impedance(
             both = np.outer(model.push(zone), model.displacement(zone))
             terms.append((dict(zone.sides)[side].stiffness * both).astype(complex))
             terms.append(1j * omega * zone.damping * both)
-    return terms, np.linalg.solve(sum(terms), drive_of(model).astype(complex))
+    return terms, np.linalg.solve(sum(terms), drive_of(model, channel).astype(complex))
 
 
 def _resonance(model: SecondOrderSystem) -> float:
@@ -262,12 +281,13 @@ def _deck(
     sides: tuple[int, ...],
     *,
     turned: bool = False,
+    second: str = "DC 0",
 ) -> str:
     """The deck that is simulated in time, with another generator line and analysis, held at rest.
 
     generator [V], sides : at the first operating point; ngspice looks for it from where the
     reduction says it is. turned : the generator's poles are exchanged, so that its voltage counts
-    negative.
+    negative. second : of the generator's second channel.
     """
     circuit = design.circuit
     board = replace(nominal_board(circuit, ideal=True), inverse_gain=1.0 / GAIN)
@@ -292,6 +312,8 @@ def _deck(
         if word == circuit.generator.name:
             poles = f"0 {circuit.generator.net}" if turned else f"{circuit.generator.net} 0"
             line = f"{circuit.generator.name} {poles} {source}"
+        elif circuit.second is not None and word == circuit.second.name:
+            line = f"{word} {circuit.second.net} 0 {second}"
         elif word == ".tran":
             line = "\n".join([*resting, analysis])
         elif word == ".save":
@@ -337,10 +359,14 @@ def _volts(design: Design, force: float) -> float:
     return -force * design.amplitude()
 
 
-def _ac(design: Design, resting: StaticRest, low: float, high: float) -> SpiceJob[Waveforms]:
+def _ac(
+    design: Design, resting: StaticRest, low: float, high: float, channel: int
+) -> SpiceJob[Waveforms]:
     generator = _volts(design, 0.5 * (resting.near + resting.far))
-    source, card = f"DC {generator!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, generator, resting.sides)
+    card = f".ac dec {POINTS} {low!r} {high!r}"
+    first, second = (f" AC {int(channel == k)}" for k in range(2))
+    source = f"DC {generator!r}{first}"
+    text = _deck(design, source, card, generator, resting.sides, second=f"DC 0{second}")
     nets = design.circuit.displacements
     return SpiceJob(text, nets, high * (1.0 - 1e-6), _whole, "ac")
 
@@ -368,20 +394,22 @@ def _transfer(
     design: Design,
     model: SecondOrderSystem,
     resting: StaticRest,
+    channel: int,
     answer: Waveforms | SimulationFailed,
 ) -> EquationFinding:
-    name = f"transfer, {resting.place(model)}"
+    name = f"transfer, {resting.place(model)}" + (", second channel" if channel else "")
     bound = FLOOR
     if isinstance(answer, SimulationFailed):
         return EquationFinding(name, float("nan"), bound, answer.reason)
     scales, sides = design.errors.scales, resting.sides
     omega = 2.0 * np.pi * answer.axis * scales.seconds
-    mass = _moved(model, float(omega[len(omega) // 2]), sides)
-    unit = -scales.volts[2 * mass] / design.amplitude()
-    wanted = unit * transfer(model, omega, sides, mass)
+    mass = _moved(model, float(omega[len(omega) // 2]), sides, channel)
+    unit = -scales.volts[2 * mass] / design.amplitude(channel=channel)
+    wanted = unit * transfer(model, omega, sides, mass, channel)
     deviation = np.abs(answer.signals[design.circuit.displacements[mass]] / wanted - 1.0)
-    explained_error = design.errors.max_error * explained(model, omega, sides, mass)
-    bounds = np.expm1(explained_error + _drive_error(design, model, omega, sides, mass)) + FLOOR
+    explained_error = design.errors.max_error * explained(model, omega, sides, mass, channel)
+    driven = _drive_error(design, model, omega, sides, mass, channel)
+    bounds = np.expm1(explained_error + driven) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 

@@ -5,7 +5,8 @@ exact circuit on n-p-q, and with each other on every strobe within a stated boun
 op-amps the wave itself must be the exact circuit's, within another. Where the exact
 circuit's response is not periodic there is no strobe and no wave to compare: the three runs must
 only call it what the exact circuit does. The largest step is min(T/200, shortest contact/N): it
-follows the contact, for T/200 miscounts the eight-impact response. Both bounds are halved together
+follows the contact, for T/200 miscounts the eight-impact response; a harmonic of the generator's
+voltage has 50 steps. All bounds are halved together
 until the settings pass, which finds N.
 """
 
@@ -44,7 +45,7 @@ from designer.spice.read_orbit import (
 )
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
-STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
+STEPS_PER_PERIOD, STEPS_PER_CONTACT, STEPS_PER_WAVE = 200, 20, 50
 MOST_STEPS = 40_000
 """Of a period, at the first level: a contact shorter than T/2000 gets fewer steps than others. A
 run of more would take minutes, and such an orbit is next to grazing."""
@@ -269,8 +270,7 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
     flow = Flow(system, excitation.drive)
     apart = period / WAVE_POINTS
     lap = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=WAVE_POINTS).strobes[:-1]
-    swing = np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
-    u = excitation.offset - excitation.amplitude * swing
+    u = excitation.drive.at(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
     shortest = period
     stops = [
         (k, side, row)
@@ -303,7 +303,8 @@ def contact_lengths(touching: NDArray[np.bool_]) -> NDArray[np.intp]:
 def first_steps(subject: GateSubject, contact: float) -> int:
     """Steps of a period that the first level takes; contact : length of the shortest [s]."""
     wanted = int(np.ceil(STEPS_PER_CONTACT * subject.period / contact))
-    return min(max(STEPS_PER_PERIOD, wanted), MOST_STEPS)
+    wave = STEPS_PER_WAVE * max(order for order, *_ in subject.excitation.shape)
+    return min(max(STEPS_PER_PERIOD, wanted, wave), MOST_STEPS)
 
 
 def check(

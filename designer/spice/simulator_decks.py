@@ -8,9 +8,10 @@ junction of a diode, but not in a formula. The clamps are so steep that a limit 
 fraction of a millivolt.
 
 ``portable`` keeps to what simulators after SPICE 2 share: R, C, D, V, I, linear E and G, without
-parameters, expressions, subcircuits or a phase of the generator (its amplitude is negative
-instead). ``ltspice`` has one op-amp as a subcircuit with parameters, so that another model can take
-its place, and LTspice's options. Text from a model file enters only through ``title_line``.
+parameters, expressions or subcircuits. The generator has a negative amplitude in the place of half
+a turn of phase; a phase is written only where a force has another. ``ltspice`` has one op-amp as a
+subcircuit with parameters, so that another model can take its place, and LTspice's options. Text
+from a model file enters only through ``title_line``.
 """
 
 from __future__ import annotations
@@ -100,10 +101,8 @@ def _block(circuit: Circuit, board: Board, run: ResponseRun, number: int, count:
     drive, first = run.excitation, number == 1
     step = literal(run.settings.max_step)
     lines = [
-        # Half a turn of phase, so that the model's sine and the circuit agree (``Excitation``).
-        f"{circuit.generator.name} {circuit.generator.net} 0 "
-        f"SIN({literal(drive.offset)} {literal(-drive.amplitude)} {literal(drive.frequency)})",
-        *deck.capacitors(circuit, board, run.initial, run.excitation.offset),
+        *deck.generators(circuit, drive, turned=False),
+        *deck.capacitors(circuit, board, run.initial, drive.at_start),
         f".tran {step} {literal(run.stop_time)} 0 {step} uic",
     ]
     state = "switched on" if first else "switched off: a star stands before each line"

@@ -25,6 +25,8 @@ INSIDE = 0.9
 """Of the force that closes the clearance: how far the dead zone's line goes."""
 ROOM = 0.8
 """Of the saturation: how far any state may be pushed by the constant force."""
+STILL = 1e-9
+"""Of the largest displacement: a smaller one is none."""
 ROUNDS = 8
 """How often the contacts of a rest are corrected before it counts as none."""
 
@@ -55,9 +57,10 @@ class StaticRest:
         return f"{word} {model.dead_zones[self.zone].name}"
 
 
-def drive_of(model: SecondOrderSystem) -> Array:
-    """(n,) forces of the drive at the model's own frequency, by which the generator is set."""
-    return model.drive_force(model.own_frequency)
+def drive_of(model: SecondOrderSystem, channel: int = 0) -> Array:
+    """(n,) forces of a channel of the drive at the model's own frequency, by which the generator is
+    set."""
+    return model.drive_force(model.own_frequency, channel)
 
 
 def static_rests(
@@ -97,6 +100,15 @@ class _Statics:
                 push = push + side * stop.stiffness * stop.gap * back
         by_force = np.asarray(np.linalg.solve(closed, drive_of(model)))
         return by_force, np.asarray(np.linalg.solve(closed, push))
+
+    def _moved(self, sides: tuple[int, ...], zone: int) -> float:
+        """A dead zone's displacement per unit of drive, in these contacts; 0 for rounding."""
+        row, by_force = (
+            self.model.displacement(self.model.dead_zones[zone]),
+            self.displaced(sides)[0],
+        )
+        moved = float(row @ by_force)
+        return moved if abs(moved) > STILL * float(np.abs(by_force).max()) else 0.0
 
     def force(self, sides: tuple[int, ...], zone: int, side: int, depth: float) -> float:
         """The force at which a displacement is so far past a stop, in these contacts."""
@@ -141,17 +153,18 @@ class _Statics:
         sides = (0,) * len(self.model.dead_zones)
         ends = []
         for k, zone in enumerate(self.model.dead_zones):
-            row = self.model.displacement(zone)
-            if zone.quantity == "velocity" or row @ self.displaced(sides)[0] == 0.0:
+            moved = self._moved(sides, k)
+            if zone.quantity == "velocity" or not moved:
                 continue
             for side, _ in zone.sides:
                 own = tuple(side * (j == k) for j in range(len(sides)))
-                turn = side * np.sign(row @ self.displaced(sides)[0])
+                turn = side * np.sign(moved)
                 ends.append((float(turn), self.force(own, k, side, 0.0)))
         high = min((end for turn, end in ends if turn > 0.0), default=None)
         low = max((end for turn, end in ends if turn < 0.0), default=None)
-        if low is None and high is None:
-            return None
+        if low is None and high is None:  # no constant force of the drive moves any displacement
+            rests = self.holds(sides, 0.0) == sides and not self.clipped(sides, 0.0)
+            return StaticRest(sides, None, 0.0, 0.0) if rests else None
         if low is None:
             low = -high if high > 0.0 else 2.0 * high  # type: ignore[operator]
         if high is None:
@@ -181,8 +194,7 @@ class _Statics:
         wanted = min(DEPTH * size, reach) if reach > 0.0 else NEAR * size
         sides = tuple(side * (j == zone) for j in range(len(zones)))
         for _ in range(ROUNDS):
-            row = self.model.displacement(zones[zone])
-            if row @ self.displaced(sides)[0] == 0.0:
+            if not self._moved(sides, zone):
                 return None
             depth = self._held_back(sides, zone, side, wanted)
             near, far = (self.force(sides, zone, side, d) for d in (NEAR * depth, depth))

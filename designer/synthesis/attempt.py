@@ -71,10 +71,11 @@ class Order:
     """Price class by resistance."""
     levels: tuple[frozenset[str], ...]
     """Groups of equal resistors that only set a level: those of each inverter and sum."""
-    drive: tuple[str, ...]
-    """Names of the resistors from the generator, one for each driven mass."""
-    largest: float
-    """Largest of the generator's amplitudes, over that at the model's clearance."""
+    drives: tuple[tuple[str, ...], ...]
+    """For each of the generator's channels the names of its resistors, one for each mass that it
+    drives."""
+    largest: tuple[float, ...]
+    """For each the largest of its amplitudes, over that at the model's clearance."""
     drive_force: float = 1.0
     """``least_drive`` of the wanted responses."""
     aims: Aims = NO_AIMS
@@ -88,7 +89,7 @@ class Order:
         catalog: Catalog,
         peaks: Peaks,
         *,
-        largest: float = 1.0,
+        largest: tuple[float, ...] = (1.0,),
         drive_force: float = 1.0,
         aims: Aims = NO_AIMS,
         apart: frozenset[int] = frozenset(),
@@ -128,7 +129,7 @@ class Order:
                 v: price("resistor", v, spec.resistor_grade) for v in resistors.tolist()
             },
             levels=equal_resistors(unit),
-            drive=drive_resistors(unit),
+            drives=tuple(drive_resistors(unit, k) for k in range(len(unit.generators))),
             largest=largest,
             drive_force=drive_force,
             aims=aims,
@@ -354,21 +355,39 @@ def _inverters(
 def _drive(
     order: Order, limits: ConditionLimits, values: Mapping[str, float], thrifty: bool
 ) -> dict[str, float] | Shortfall:
-    """The resistors that make the forces with the generator's amplitude: the forces' ratios as
-    exact as can be, the amplitude up to what a generator gives."""
-    names = order.drive
+    """The resistors that make the forces with the generator's amplitudes: the forces' ratios as
+    exact as can be, the amplitudes up to what a generator gives."""
+    out: dict[str, float] = {}
+    for channel, names in enumerate(order.drives):
+        own = _drive_of(order, limits, {**values, **out}, names, channel, thrifty=thrifty)
+        if isinstance(own, Shortfall):
+            return own
+        out |= own
+    return out
+
+
+def _drive_of(
+    order: Order,
+    limits: ConditionLimits,
+    values: Mapping[str, float],
+    names: tuple[str, ...],
+    channel: int,
+    *,
+    thrifty: bool,
+) -> dict[str, float] | Shortfall:
+    """Those of one channel."""
     if not names:
         return {}
     equal = equal_parts(names, order.spec.matched, values)
     if equal is None:
         return Shortfall("matched parts", False)
-    volts = _volts_per_ohm(order, limits, values)
+    volts = _volts_per_ohm(order, limits, values, channel)
     roots = [equal.of(name) for name in names]
     lists = {
         root: np.array([equal.value[root]]) if root in equal.value else order.resistors
         for root in roots
     }
-    aim = GENERATOR_PEAK / order.largest
+    aim = GENERATOR_PEAK / order.largest[channel]
     if len(names) > 1:
         return dict(zip(names, _in_ratio(volts, roots, lists, aim), strict=True))
     own = lists[roots[0]]
@@ -380,25 +399,37 @@ def _drive(
     return {names[0]: max((v for v in known if least * top <= v <= top), default=top)}
 
 
-def _volts_per_ohm(order: Order, limits: ConditionLimits, values: Mapping[str, float]) -> Array:
-    """(driven,) generator volts [V peak] that each driven mass needs for each ohm."""
+def _volts_per_ohm(
+    order: Order, limits: ConditionLimits, values: Mapping[str, float], channel: int
+) -> Array:
+    """(driven,) generator volts [V peak] that each mass driven by a channel needs for each ohm."""
     # They do not enter the coefficients, so any value will do to find what they need.
     placeholder = float(order.resistors[-1])
-    trial = order.build({**values, **dict.fromkeys(order.drive, placeholder)})
+    every = dict.fromkeys([name for names in order.drives for name in names], placeholder)
+    trial = order.build({**values, **every})
     errors = order.errors(trial, limits.swing)
     system = order.model.second_order()
-    wanted = system.drive_force(system.own_frequency)
+    wanted = system.drive_force(system.own_frequency, channel)
+    gain = errors.second_gain if channel else errors.drive_gain
     driven = wanted != 0.0
-    return np.asarray(wanted[driven] / (errors.drive_gain[driven] * placeholder))
+    return np.asarray(wanted[driven] / (gain[driven] * placeholder))
 
 
-def relative_amplitude(model: MechanicalModel, response: ModelResponse) -> float:
-    """The generator's amplitude of a response over that at the model's clearance and own frequency;
-    a moving ground's force follows the drive frequency."""
+def largest_amplitudes(
+    model: MechanicalModel, responses: Sequence[ModelResponse]
+) -> tuple[float, ...]:
+    """For each of the generator's channels its largest amplitude of the responses over that at the
+    model's clearance and own frequency; a moving ground's force follows the drive frequency."""
     system = model.second_order()
-    own = system.drive_force(system.own_frequency)
-    forces = system.drive_force(response.omega)[own != 0.0] / own[own != 0.0]
-    return model.b / response.b * float(forces.max(initial=0.0))
+    largest = []
+    for channel in range(len(system.drive_shapes)):
+        own = system.drive_force(system.own_frequency, channel)
+        ratios = [
+            model.b / r.b * system.drive_force(r.omega, channel)[own != 0.0] / own[own != 0.0]
+            for r in responses
+        ]
+        largest.append(max((float(each.max(initial=0.0)) for each in ratios), default=1.0))
+    return tuple(largest)
 
 
 def _in_ratio(

@@ -190,32 +190,41 @@ def _into(reference: Reference, circuit: Circuit, at: Mapping[str, Array]) -> Ar
 
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
     """(k, q) values of these rows (q, n + 2) on the strobes."""
-    inputs = np.column_stack([sampled.x, sampled.u, np.ones(len(sampled.u))])
-    return _by_mode(sampled, lambda key: rows(sampled.reduction.solution(key)), inputs)
+    drive = sampled.flow.drive
+    u, beside = drive.at(sampled.angle), drive.beside_at(sampled.angle)
+    inputs = np.column_stack([sampled.x, u, np.ones(len(u))])
+    return _by_mode(sampled, lambda _, solved: rows(solved), inputs, beside)
 
 
 def _rates(sampled: Sampled, rows: Callable[[Solution], Array], circuit: Circuit) -> Array:
     """(k, sections) derivatives of these rows, one a section, on the strobes [1/s]; 0 where the
     section's loop is open."""
     drive = sampled.flow.drive
-    time = sampled.step * np.arange(len(sampled.x))
-    moving = drive.amplitude * drive.omega * np.cos(drive.omega * time)
+    moving, beside = drive.rate_at(sampled.angle), drive.beside_rate_at(sampled.angle)
+    inputs = np.column_stack([sampled.slope, moving, np.zeros(len(moving))])
 
-    def closed(key: ModeKey) -> Array:
+    def closed(key: ModeKey, solved: Solution) -> Array:
         shares = [abs(feedback_share(circuit, section, key)) for section in circuit.sections]
         loop = (np.array(shares) >= CLOSED)[:, None]
-        return np.asarray(loop * rows(sampled.reduction.solution(key)))
+        return np.asarray(loop * rows(solved))
 
-    return _by_mode(sampled, closed, np.column_stack([sampled.slope, moving, np.zeros(len(time))]))
+    return _by_mode(sampled, closed, inputs, beside)
 
 
-def _by_mode(sampled: Sampled, rows: Callable[[ModeKey], Array], inputs: Array) -> Array:
+def _by_mode(
+    sampled: Sampled, rows: Callable[[ModeKey, Solution], Array], inputs: Array, beside: Array
+) -> Array:
+    """inputs : (k, n + 2) of states, generator and 1. beside : (k,) of its second channel."""
+    reduction = sampled.reduction
     out: Array | None = None
     for i, key in enumerate(sampled.keys):
         inside = sampled.at == i
         if not inside.any():
             continue
-        value = inputs[inside] @ rows(key).T
+        value = inputs[inside] @ rows(key, reduction.solution(key)).T
+        if sampled.flow.drive.second is not None:
+            second = rows(key, reduction.by_second(key))[:, -2]
+            value += np.outer(beside[inside], second)
         if out is None:
             out = np.empty((len(inputs), value.shape[1]))
         out[inside] = value

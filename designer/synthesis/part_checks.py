@@ -77,7 +77,6 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
 
 MOST_DEAD_ZONES = 8
 """On one board."""
-_ONE_GENERATOR = "one generator, with a sine, drives them all"
 
 
 def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
@@ -88,16 +87,12 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
     InputError : the first such element, why, and what would be near.
     """
     system = model.second_order()
-    if system.orders:
-        orders = ", ".join(map(str, system.orders))
-        found = f"forces at {orders} times the drive's frequency"
-        raise InputError(None, "force", found, "for a circuit sines alone: " + _ONE_GENERATOR)
-    if not system.driven_by_sine:
+    if system.channels(system.own_frequency) is None:
         expected = (
-            f"for a circuit forces in phase or in antiphase: {_ONE_GENERATOR}; a phase that all "
-            "forces have may be left out"
+            "for a circuit forces that are the sums of two shapes, of any sizes and signs: a "
+            "generator has two channels, and a displacement of the ground takes one beside forces"
         )
-        raise InputError(None, "force.phase", "forces of another phase than the drive", expected)
+        raise InputError(None, "force", "forces of more than two phases or shapes", expected)
     for clearance in system.clearances:
         jumps = [stop.jump for _, stop in clearance.sides if stop.jump]
         if jumps:
@@ -116,16 +111,9 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "base.stops",
                 "fixed",
                 '"base" for a circuit: a threshold cannot follow the ground, whose displacement is '
-                "no voltage",
+                "no voltage; or no [base] and its forces on the masses: k Y sin ωt of a spring and "
+                "d ω Y a quarter turn ahead of a damper",
             )
-    if system.base and system.force.any():
-        raise InputError(
-            None,
-            "base.amplitude",
-            system.base,
-            "no base, or no force with an amplitude: one generator drives both, and their ratio "
-            "changes with the frequency",
-        )
     zones = system.dead_zones
     for zone in zones:
         most = max(len(zone.terms), len(zone.pushed))
@@ -236,10 +224,11 @@ def equal_resistors(circuit: Circuit) -> tuple[frozenset[str], ...]:
     return tuple(out)
 
 
-def drive_resistors(circuit: Circuit) -> tuple[str, ...]:
-    """Resistors from the generator, or its inverse, to the driven masses, in the masses' order."""
+def drive_resistors(circuit: Circuit, channel: int = 0) -> tuple[str, ...]:
+    """Resistors from a channel of the generator, or its inverse, to the masses that it drives, in
+    their order."""
     masses = len(circuit.states) // 2
-    names = (drive_resistor(masses, mass) for mass in range(masses))
+    names = (drive_resistor(masses, mass, channel) for mass in range(masses))
     return tuple(name for name in names if name in circuit.values)
 
 
@@ -248,7 +237,8 @@ def matching_resistors(circuit: Circuit) -> tuple[str, ...]:
     a supply to a reference. Only these can gain from a second part."""
     held = {net for ref in circuit.references for net in ref.nets}
     rails = {supply.net for supply in circuit.supplies}
-    others = set(drive_resistors(circuit)).union(*equal_resistors(circuit))
+    others = {*drive_resistors(circuit), *drive_resistors(circuit, 1)}
+    others |= frozenset().union(*equal_resistors(circuit))
     return tuple(
         r.name
         for r in circuit.resistors

@@ -38,9 +38,9 @@ from designer.synthesis.attempt import (
     Attempt,
     Order,
     attempt,
+    largest_amplitudes,
     linear_block,
     linear_question,
-    relative_amplitude,
 )
 from designer.synthesis.further_stages import idle_shares
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
@@ -153,7 +153,7 @@ def synthesise(
     """
     began = time.perf_counter()
     check_choices(model, spec, catalog)
-    largest = max((relative_amplitude(model, r) for r in responses), default=1.0)
+    largest = largest_amplitudes(model, responses)
     drive = least_drive(model, responses)
     make = partial(Order.of, model, spec, catalog, peaks, largest=largest, drive_force=drive)
     order = make(aims=aims)
@@ -526,7 +526,7 @@ def verified(
         doing("voltages and currents of the finished circuit")
         board = nominal_reduction(design)
         loads = output_loads.design_loads(design, board, responses)
-    amplitudes = [design.amplitude(r.b, r.omega) for r in responses] or [design.amplitude()]
+    amplitudes = design.largest_amplitudes(responses)
     checks = side_conditions.verify(design, conditions, order.opamp, order.peaks, amplitudes, loads)
     _tell(design, checks)
     low, high = order.spec.frequency

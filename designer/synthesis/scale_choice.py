@@ -205,14 +205,15 @@ class ScaleChoice:
         """The drive's resistors at half of the generator's largest amplitude [ohm]."""
         order, program = self.order, self.program
         system, volts = order.model.second_order(), program.volts(z)
-        force = system.drive_force(system.own_frequency)
         out = {}
-        for name, mass in zip(order.drive, np.flatnonzero(force).tolist(), strict=True):
-            state = 2 * mass + 1
-            rate = volts[state] * abs(force[mass]) / system.mass[mass] / np.exp(z[0])
-            amperes = rate * np.exp(z[program.shared[f"C{state + 1}"]])
-            ohms = 0.5 * GENERATOR_PEAK / (order.largest * amperes)
-            out[name] = float(np.clip(ohms, order.resistors[0], order.resistors[-1]))
+        for channel, (names, largest) in enumerate(zip(order.drives, order.largest, strict=True)):
+            force = system.drive_force(system.own_frequency, channel)
+            for name, mass in zip(names, np.flatnonzero(force).tolist(), strict=True):
+                state = 2 * mass + 1
+                rate = volts[state] * abs(force[mass]) / system.mass[mass] / np.exp(z[0])
+                amperes = rate * np.exp(z[program.shared[f"C{state + 1}"]])
+                ohms = 0.5 * GENERATOR_PEAK / (largest * amperes)
+                out[name] = float(np.clip(ohms, order.resistors[0], order.resistors[-1]))
         return out
 
     def _over_limit(self, circuit: Circuit, volts: Array) -> float:

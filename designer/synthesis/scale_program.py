@@ -569,7 +569,7 @@ class _Maker:
     def _constant(self, mass: int) -> None:
         """A constant force."""
         force = float(self.system.wired.constant[mass])
-        unit = np.abs(self.system.drive_force(self.system.own_frequency)).max()
+        unit = self.system.largest_force
         if self.lead is not None:
             unit = abs(self.system.spanning_stiffness[mass, mass]) * self.lead
         log = -self._current(force, mass) + self._reference
@@ -577,15 +577,16 @@ class _Maker:
         self._row([constant_resistor(mass)], log, size, held=True, constant=True)
 
     def _generator(self) -> None:
-        """Its amplitude, with the least resistor that it can have."""
+        """The amplitudes of its channels, with the least resistor that each can have."""
         if "generator" not in self.within.conditions:
             return
-        forces = self.system.drive_force(self.system.own_frequency)
         least = float(np.log(self.order.resistors[0]))
         limit = StatedLimit("generator", "amplitude", GENERATOR_PEAK, "V")
-        for mass in np.flatnonzero(forces).tolist():
-            volts = self._current(float(forces[mass]), mass) + least
-            self._keep(volts + float(np.log(self.order.largest)), limit)
+        for channel, largest in enumerate(self.order.largest):
+            forces = self.system.drive_force(self.system.own_frequency, channel)
+            for mass in np.flatnonzero(forces).tolist():
+                volts = self._current(float(forces[mass]), mass) + least
+                self._keep(volts + float(np.log(largest)), limit)
 
     # What the nets say
 

@@ -58,7 +58,7 @@ def verify(
 ) -> tuple[ConditionCheck, ...]:
     """These conditions on the finished circuit, in the order of ``SIDE_CONDITIONS``.
 
-    amplitudes : of the generator, one for each response [V peak]. loads : peak voltages and
+    amplitudes : of the generator, the largest of each channel [V peak]. loads : peak voltages and
     currents of the sections; None where no response was wanted, and then only the states' peaks
     count and no current is known.
     """

@@ -57,7 +57,7 @@ class Statics:
     def __init__(self, circuit: Circuit) -> None:
         self.circuit = circuit
         self._equations = NodalEquations(circuit, nominal_board(circuit))
-        self._nets = [net for net in circuit.nets if net != circuit.generator.net]
+        self._nets = [net for net in circuit.nets if net not in circuit.generator_nets]
 
     @cached_property
     def shifts(self) -> tuple[Shifts, ...]:
@@ -128,7 +128,11 @@ def least_drive(model: MechanicalModel, responses: Sequence[ModelResponse]) -> f
     the wanted response that is driven least."""
     system = model.second_order()
     drives = [(r.omega, model.b / r.b) for r in responses] or [(system.own_frequency, 1.0)]
-    return min(float(np.abs(system.drive_force(omega)).sum()) * share for omega, share in drives)
+    channels = range(len(system.drive_shapes))
+    return min(
+        sum(float(np.abs(system.drive_force(omega, k)).sum()) for k in channels) * share
+        for omega, share in drives
+    )
 
 
 def forces(

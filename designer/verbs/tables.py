@@ -102,10 +102,20 @@ def synthesised(answer: Mapping[str, Any]) -> None:
                     **response_cells(r, rows, "mechanism_hz"),
                     "frequency": f"{r['frequency_hz']:.4g} Hz",
                     "amplitude (peak, high-Z)": f"{r['amplitude_v_peak']:.4g} V",
+                    **_second_channel(r),
                 }
                 for r in rows
             ),
         )
+
+
+def _second_channel(knob: Mapping[str, Any]) -> dict[str, str]:
+    """Amplitude and phase of the generator's second channel, where there is one."""
+    if "second" not in knob:
+        return {}
+    second = knob["second"]
+    phase = f", {second['phase_deg']:.4g}° ahead" if second["phase_deg"] else ""
+    return {"second channel (peak)": f"{second['amplitude_v_peak']:.4g} V{phase}"}
 
 
 def tolerance(answer: Mapping[str, Any]) -> None:

@@ -65,8 +65,7 @@ def follow(
 def whole_states(states: Array, excitation: Excitation) -> Array:
     """(k, n + 2) what rows of a circuit are over: states (k, n), ``POINTS`` of them a drive period
     from phase 0, the generator [V] and 1."""
-    drive = excitation.drive
-    u = drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS) + drive.offset
+    u = excitation.drive.at(2.0 * np.pi * np.arange(len(states)) / POINTS)
     return np.column_stack([states, u, np.ones(len(states))])
 
 

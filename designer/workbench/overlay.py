@@ -22,7 +22,6 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
-from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
@@ -150,7 +149,7 @@ class Overlay:
     @property
     def excitation(self) -> Excitation:
         """The generator's setting that the exact circuit has."""
-        return Excitation(self.setting.frequency_hz, self.setting.amplitude_v_peak)
+        return self.setting.excitation
 
     def ngspice_job(
         self, prediction: BoardPrediction, fit: BoardFit | None = None, number: int = 0
@@ -212,9 +211,7 @@ def _orbits(
         setting = replace(
             response.setting, frequency_hz=motion.frequency, amplitude_v_peak=amplitude
         )
-        orbit = settle(
-            Flow(system, Drive(2.0 * np.pi * motion.frequency, -amplitude)), response.orbit.start
-        )
+        orbit = settle(Flow(system, setting.excitation.drive), response.orbit.start)
         if orbit.n:
             yield setting, orbit
 

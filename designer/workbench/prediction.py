@@ -16,7 +16,6 @@ from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
-from designer.dynamics.piecewise_linear import Drive
 from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
@@ -113,8 +112,7 @@ class PredictedResponse:
     @property
     def question(self) -> Question:
         """What a board is asked of it."""
-        drive = Excitation(self.setting.frequency_hz, self.setting.amplitude_v_peak)
-        return Question(self.spec, drive, self.orbit, None)
+        return Question(self.spec, self.setting.excitation, self.orbit, None)
 
 
 class BoardPrediction:
@@ -175,13 +173,13 @@ class BoardPrediction:
 
     def waves(self, orbit: Orbit, setting: GeneratorSetting) -> dict[str, Array]:
         """(n · POINTS,) voltage of each net [V] along an orbit of the nominal board."""
-        drive = Drive(2.0 * np.pi * setting.frequency_hz, -setting.amplitude_v_peak)
+        drive = setting.excitation.drive
         flow = Flow(self.reduction.system(), drive)
         run = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=POINTS)
         states = run.strobes[:-1]
         angle = 2.0 * np.pi * np.arange(len(states)) / POINTS
         waves = dict(zip(self.circuit.state_nets, states.T, strict=True))
-        waves[self.generator] = -setting.amplitude_v_peak * np.sin(angle)
+        waves[self.generator] = drive.at(angle)
         for stop in self.zones:
             moved = sum(factor * waves[net] for net, factor in stop.displacement.items())
             waves[stop.output] = stop.output_of(np.asarray(moved))
@@ -213,7 +211,7 @@ class BoardPrediction:
             same = abs(motion.frequency / setting.frequency_hz - 1.0) < SAME_FREQUENCY
             louder = abs(motion.amplitude / setting.amplitude_v_peak - 1.0)
             if same and not louder > SAME_AMPLITUDE:  # nan: the generator was not recorded
-                return Excitation(setting.frequency_hz, setting.amplitude_v_peak)
+                return setting.excitation
         return None
 
     @cached_property

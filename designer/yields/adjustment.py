@@ -8,7 +8,7 @@ the generator is another constant force, so one setting takes them away together
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,16 +25,16 @@ class Adjustment:
     frequency: float = 0.0
     """Over the frequency."""
     amplitude: float = 0.0
-    """Over the amplitude."""
+    """Over the amplitude, of both channels where there are two."""
     offset: float = 0.0
     """The DC offset, over the amplitude."""
 
     def of(self, excitation: Excitation) -> Excitation:
         """The generator's setting after the change."""
-        return Excitation(
-            excitation.frequency * (1.0 + self.frequency),
-            excitation.amplitude * (1.0 + self.amplitude),
-            excitation.offset + self.offset * excitation.amplitude,
+        return replace(
+            excitation.louder(1.0 + self.amplitude),
+            frequency=excitation.frequency * (1.0 + self.frequency),
+            offset=excitation.offset + self.offset * excitation.amplitude,
         )
 
     @property

@@ -123,8 +123,8 @@ class _Person:
         states = run.strobes[:-1]
         trace = states[:, self.system.moving]
         self.high, self.low = self._read(float(trace.max())), self._read(float(trace.min()))
-        wave = flow.drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS)
-        return self._shows(trace, np.column_stack([states, wave + flow.drive.offset]), n)
+        wave = flow.drive.at(2.0 * np.pi * np.arange(len(states)) / POINTS)
+        return self._shows(trace, np.column_stack([states, wave]), n)
 
     def centre(self) -> bool:
         """Turn the DC offset until the peaks of v1 stand equally far beyond the stops, by the rule

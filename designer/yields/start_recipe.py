@@ -73,10 +73,12 @@ class Recipe:
         for k in range(self.steps):
             part = k / self.steps
             yield (
-                Excitation(
-                    _between(self.first.frequency, self.target.frequency, part),
-                    _between(self.first.amplitude, self.target.amplitude, part),
-                    self.target.offset,
+                replace(
+                    self.target.louder(
+                        _between(self.first.amplitude, self.target.amplitude, part)
+                        / self.target.amplitude
+                    ),
+                    frequency=_between(self.first.frequency, self.target.frequency, part),
                 ),
                 self.hold,
             )
@@ -110,7 +112,7 @@ class Recipe:
         end = [f"wait {_seconds(self.wait_seconds)} or longer", *self._success()]
         if self.way is RecipeKind.DIRECT:
             return "; ".join(["switch on at this setting", *end])
-        first = f"set {self._hertz(self.first)}, {volts(self.first.amplitude)} V peak, switch on"
+        first = f"set {self._hertz(self.first)}, {_peaks(self.first)}, switch on"
         return "; ".join([first, self._sweep(), *end])
 
     def _sweep(self) -> str:
@@ -120,7 +122,7 @@ class Recipe:
         slower = f" (up to {SLOWER} times slower is fine)" if self.slower else ""
         if self.way is RecipeKind.AMPLITUDE:
             how = f"in {took}" if self.smooth else steps
-            return f"raise the amplitude to {volts(self.target.amplitude)} V peak {how}{slower}"
+            return f"raise the amplitude to {_peaks(self.target)} {how}{slower}"
         to = self._hertz(self.target)
         if not self.smooth:
             return f"step to {to} {steps}, without a break in phase{slower}"
@@ -181,6 +183,12 @@ class Recipe:
             "wait_seconds": self.wait_seconds,
             **{name: getattr(self, name) for name in (*counts, "smooth", "slower", "text")},
         }
+
+
+def _peaks(at: Excitation) -> str:
+    """The amplitudes of the generator's channels."""
+    first = f"{volts(at.amplitude)} V peak"
+    return first if at.second is None else f"{first} and {volts(at.second.amplitude)} V peak"
 
 
 def _between(first: float, last: float, part: float) -> float:

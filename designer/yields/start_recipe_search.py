@@ -16,7 +16,6 @@ import numpy as np
 from designer.base.progress import doing, part
 from designer.base.second_process import Ask
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
@@ -120,7 +119,7 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
     )
 
     def sweep(way: RecipeKind, frequency: float, amplitude: float) -> Recipe:
-        first = Excitation(frequency, amplitude, target.offset)
+        first = replace(target.louder(amplitude / target.amplitude), frequency=frequency)
         ratio = max(
             abs(math.log(frequency / target.frequency)),
             abs(math.log(amplitude / target.amplitude)),

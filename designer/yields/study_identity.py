@@ -109,7 +109,7 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         "questions": [
             {
                 "spec": q.spec.as_dict(),
-                "excitation": nine_digits(asdict(q.excitation)),
+                "excitation": nine_digits(q.excitation.as_dict()),
                 "start": nine_digits([float(v) for v in q.start.start]),
                 "nominal": q.start.response,
             }

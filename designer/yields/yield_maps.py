@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,6 @@ from designer.base.arrays import Array
 from designer.base.defaults import OVERS, Over
 from designer.base.errors import InputError
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Excitation
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
@@ -340,8 +339,8 @@ class _NominalOrbits:
         """The generator at this ω or b."""
         e, ratio = self.question.excitation, value / self.used
         if self.over == "b":
-            return Excitation(e.frequency, e.amplitude / ratio, e.offset).drive
-        return Excitation(e.frequency * ratio, e.amplitude, e.offset).drive
+            return e.louder(1.0 / ratio).drive
+        return replace(e, frequency=e.frequency * ratio).drive
 
     def window(self) -> tuple[tuple[float, float], tuple[bool, bool]]:
         """Edges of the window around the setting in use; whether each is only the search's end."""

@@ -82,6 +82,27 @@ def test_thirty_in_a_row_are_linked_in_every_way(monkeypatch: pytest.MonkeyPatch
     assert min(kinds[kind] for kind in ("damped stops", "combination", "mass matrix")) >= 5
 
 
+def test_thirty_in_a_row_are_driven_in_every_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Never by one sine, and never by more than a generator of two channels gives."""
+    monkeypatch.setattr(
+        stranger_systems._Drawn,
+        "with_response",
+        lambda self, title: self._elements(title) + "\n[[response]]\nomega = 1.0\n",
+    )
+    kinds: Counter[str] = Counter()
+    channels: Counter[int] = Counter()
+    for number in range(30):
+        stranger = draw(5, number, "driven")
+        system = parse_model_file(stranger.text).model.second_order()
+        shapes = system.drive_shapes
+        assert shapes != (((1, 1.0, 0.0),),) or "phase" in stranger.text
+        kinds.update(kind for kind in stranger.kinds if kind in dict(stranger_systems.DRIVES))
+        channels[len(shapes)] += 1
+    assert sum(kinds.values()) == 30
+    assert kinds.keys() == dict(stranger_systems.DRIVES).keys()
+    assert min(channels[1], channels[2]) >= 5
+
+
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
 

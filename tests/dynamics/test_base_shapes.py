@@ -14,12 +14,10 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.fidelity.system_runge_kutta import rates_of
 from designer.model.absolute_motion import absolute_extremes
-from designer.model.circuit_table import CircuitSpec
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of
 from designer.model.system_equations import equations_of
-from designer.synthesis.part_checks import check_system
 from tests.shared.system_text import clearance, system_text
 
 GROUNDED = ("a", "ground")
@@ -118,10 +116,7 @@ def test_what_is_no_shape_is_refused(text: str, field: str) -> None:
     assert caught.value.field == field
 
 
-def test_it_is_told_in_equations_and_refused_by_circuits() -> None:
+def test_it_is_told_in_equations() -> None:
     model = parse_model_file(BLOCK + STOP + base(SHAPES["harmonics"][0])).model
     line = equations_of(model)[-1]  # type: ignore[arg-type]
     assert line == "y = Y sin ωt + Y.2 sin(2ωt + φ.2) + Y.3 sin 3ωt"
-    with pytest.raises(InputError) as caught:
-        check_system(model, CircuitSpec(dead_zone="rectifier"))
-    assert caught.value.field == "force"

@@ -52,6 +52,8 @@ class Mechanism:
     constants: list[float] = field(default_factory=list)
     base: float = 0.0
     fixed_stops: bool = False
+    waves: list[tuple[int, int, float, float]] = field(default_factory=list)
+    """Further forces (mass, n, amplitude, phase): amplitude · sin(nωt + phase)."""
 
     def ground(self, t: float) -> tuple[float, float]:
         """Displacement and velocity of the ground."""
@@ -73,6 +75,8 @@ class Mechanism:
         push = np.array(self.forces) * math.sin(self.omega * t)
         if self.constants:
             push += self.constants
+        for mass, order, amplitude, phase in self.waves:
+            push[mass] += amplitude * math.sin(order * self.omega * t + phase)
         place = np.append(y[:n], self.ground(t)[0])
         speed = np.append(y[n:], self.ground(t)[1])
         push = np.append(push, 0.0)

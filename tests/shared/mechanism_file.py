@@ -45,9 +45,18 @@ def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str,
         return [(*map(place, t["between"]), value_of(t[key])) for t in data.get(kind, [])]  # type: ignore[misc]
 
     forces, constants = [0.0] * len(names), [0.0] * len(names)
+    waves: list[tuple[int, int, float, float]] = []
     for force in data.get("force", []):
-        forces[place(force["on"])] += value_of(force.get("amplitude", 0.0))
-        constants[place(force["on"])] += value_of(force.get("constant", 0.0))
+        mass, amplitude = place(force["on"]), value_of(force.get("amplitude", 0.0))
+        constants[mass] += value_of(force.get("constant", 0.0))
+        if "waveform" not in force:
+            assert "phase" not in force
+            forces[mass] += amplitude
+            continue
+        assert force["waveform"] == "square"
+        turn = math.radians(float(force.get("phase", "0 deg").removesuffix(" deg")))
+        odd = range(1, 2 * force["terms"], 2)
+        waves += [(mass, n, 4.0 * amplitude / (math.pi * n), n * turn) for n in odd]
     base = data.get("base", {})
     masses = [value_of(mass["mass"]) for mass in data["mass"]]
     mechanism = Mechanism(
@@ -60,6 +69,7 @@ def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str,
         constants=constants,
         base=value_of(base.get("amplitude", 0.0)),
         fixed_stops=base.get("stops") == "fixed",
+        waves=waves,
     )
     return mechanism, data["response"]
 

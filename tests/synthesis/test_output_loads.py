@@ -158,10 +158,11 @@ def test_modes_of_many_states_are_those_of_each(seed: int) -> None:
     reduction = Reduction(circuit_of(EXACT), uneven())
     system = reduction.system()
     x = rng.uniform(-9.0, 9.0, (12, 4)) * rng.choice([0.01, 0.1, 1.0], (12, 1))
-    u = rng.uniform(-3.0, 3.0, 12)
-    keys = [system.start]
-    at = output_loads.modes_at(system, x, u, keys)
-    assert [keys[i] for i in at] == [system.mode_at(a, float(b)) for a, b in zip(x, u, strict=True)]
+    angle = rng.uniform(-3.0, 3.0, 12)
+    flow, keys = Flow(system, Drive(1.0, 3.0)), [system.start]
+    at = output_loads.modes_at(flow, x, angle, keys)
+    wanted = [system.mode_at(a, 3.0 * float(np.sin(b))) for a, b in zip(x, angle, strict=True)]
+    assert [keys[i] for i in at] == wanted
 
 
 def test_kirchhoff_holds_at_every_output() -> None:

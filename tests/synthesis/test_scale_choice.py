@@ -22,7 +22,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model_file import parse_model_file
 from designer.synthesis import parts_choice
-from designer.synthesis.attempt import Order, relative_amplitude
+from designer.synthesis.attempt import Order, largest_amplitudes
 from designer.synthesis.further_stages import idle_shares
 from designer.synthesis.limits import ConditionLimits, limits
 from designer.synthesis.scale_box import ScaleBox
@@ -309,7 +309,7 @@ def test_scales_keep_offsets_small_beside_the_drive() -> None:
     found = find(file.model, file.responses)
     spec = replace(file.circuit, dead_zone="rectifier")
     drive, held = least_drive(file.model, found), peaks(file.model, found)
-    largest = relative_amplitude(file.model, found[0])
+    largest = largest_amplitudes(file.model, found[:1])
     order = Order.of(file.model, spec, CATALOG, held, largest=largest, drive_force=drive)
     unit = file.model.second_order().own_frequency
     conditions = spec.active_conditions

@@ -1,0 +1,340 @@
+"""Drives of any shape, and two channels of the generator: parts, boards, decks, and ngspice."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.board.board_parts import board_circuit, fault_current, protection_offset
+from designer.board.kicad_sim import models
+from designer.check.deck_runs import FirstRun
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit.board_parts_only import Connector
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Resistor
+from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
+from designer.dynamics.drive_shape import SINE, wave
+from designer.dynamics.orbit import OrbitStatus
+from designer.folders.bench_tables import setup_csv, waveform_csv
+from designer.folders.design_files import chosen, waveform_names
+from designer.jobs.bench_job import check_fits
+from designer.model.model_file import parse_model_file
+from designer.spice import deck, equation_check, simulator_decks
+from designer.spice.deck import SolverSettings
+from designer.spice.pool import SpicePool
+from designer.spice.worker import open_simulator
+from designer.spread.spread import Spread, draw_many
+from designer.synthesis.output_loads import design_loads
+from designer.workbench.prediction import BoardPrediction
+from designer.yields.adjustment import Adjustment
+from tests.shared.system_text import clearance, system_text, table
+from tests.synthesis.test_law_circuits import shows_what_the_model_does
+
+GROUND = ("ball", "ground")
+PAIR = ("ball", "table")
+
+
+def one(*more: str) -> str:
+    stops = clearance("A", *GROUND, upper=0.5, lower=0.5, stiffness=9.0)
+    return system_text({"ball": 1.0}, {GROUND: 1.0}, {GROUND: 0.1}, stops, *more)
+
+
+def two(*more: str) -> str:
+    springs = {PAIR: 0.7, GROUND: 1.0}
+    dampers = {GROUND: 0.1, ("table", "ground"): 0.2}
+    stops = clearance("A", *PAIR, upper=0.4, stiffness=9.0)
+    return system_text({"ball": 1.0, "table": 1.5}, springs, dampers, stops, *more)
+
+
+RESPONSE = table("response", omega=1.3)
+TEXTS = {
+    "square": one(table("force", on="ball", amplitude=1.0, waveform="square", terms=5), RESPONSE),
+    "phase": one(table("force", on="ball", amplitude=1.0, phase=0.7), RESPONSE),
+    "against each other": two(
+        *(
+            table("force", on=name, amplitude=size, waveform="sawtooth", terms=3, phase=0.7)
+            for name, size in (("ball", 1.0), ("table", -0.6))
+        ),
+        RESPONSE,
+    ),
+    "shaken": two(
+        "[base]\namplitude = 0.5\nharmonics = [[2, 0.2, 0.9], [3, 0.05, 0.2]]\n", RESPONSE
+    ),
+    "two phases": two(
+        table("force", on="ball", amplitude=1.0),
+        table("force", on="table", amplitude=0.6, phase=1.2),
+        RESPONSE,
+    ),
+    "force beside base": two(
+        table("force", on="table", amplitude=0.5, waveform="square", terms=3),
+        "[base]\namplitude = 0.5\n",
+        RESPONSE,
+    ),
+    "three phases": system_text(
+        {"ball": 1.0, "table": 1.5, "top": 0.8},
+        {GROUND: 1.0, PAIR: 0.7, ("table", "top"): 0.9},
+        {GROUND: 0.1, ("table", "ground"): 0.2, ("top", "ground"): 0.1},
+        clearance("A", *GROUND, upper=0.5, stiffness=6.0),
+        *(
+            table("force", on=name, amplitude=0.5, phase=f"{120 * k} deg")
+            for k, name in enumerate(("ball", "table", "top"))
+        ),
+        RESPONSE,
+    ),
+}
+SECOND = ("two phases", "force beside base", "three phases")
+"""Those that take two channels."""
+
+
+@cache
+def made(name: str) -> Synthesis:
+    return synthesise(parse_model_file(TEXTS[name]))
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_chosen_parts_do_what_the_model_does(name: str) -> None:
+    result = made(name)
+    shows_what_the_model_does(result)
+    circuit = result.design.circuit
+    assert (circuit.second is not None) is (name in SECOND)
+    assert {"ig", "ig2"} & set(circuit.nets) == {
+        "against each other": {"ig"}, "three phases": {"ig", "ig2"},
+    }.get(name, set())  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_the_generator_makes_the_forces_of_the_model(name: str) -> None:
+    """Volts through the resistors of each mass, as forces over a period, are those of the file."""
+    result = made(name)
+    design, (response,) = result.design, result.model_responses
+    drive = design.excitation(response.b, response.omega).drive
+    angle = np.linspace(0.0, 2.0 * np.pi, 500)
+    gains = design.errors.drive_gain, design.errors.second_gain
+    volts = drive.at(angle), drive.beside_at(angle)
+    found = -sum(np.outer(v, gain) for v, gain in zip(volts, gains, strict=True))
+    wanted = sum(
+        np.outer(np.sin(w.order * angle), w.sine) + np.outer(np.cos(w.order * angle), w.cosine)
+        for w in design.model.second_order().drive_waves(response.omega)
+    )
+    assert found == pytest.approx(wanted, abs=0.03 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
+    """Two periods from the orbit; the generator's nets have the voltages of the drive."""
+    result = made(name)
+    design, (response,) = result.design, result.model_responses
+    reduction, circuit = nominal_reduction(design), design.circuit
+    excitation = design.excitation(response.b, response.omega)
+    flow = circuit_flow(reduction.system(), design, response)
+    orbit = on_circuit(reduction.system(), design, response)
+    assert orbit.status is OrbitStatus.PERIODIC
+    period = 1.0 / excitation.frequency
+    text = deck.write(
+        circuit, reduction.board, excitation, SolverSettings("trap", period / 4000),
+        title="two periods", stop_time=2.0 * period, initial=orbit.start,
+    )  # fmt: skip
+    nets = (*circuit.state_nets, *circuit.generator_nets)
+    waves = open_simulator("shared").run(text, nets, 2.0 * period)
+    grid = np.arange(2, 800) / 400 * period
+    wanted = flow.run(orbit.start, 2, mode=orbit.mode, points=400).strobes[2:800]
+    angle = flow.drive.omega * grid
+    volts = np.stack([flow.drive.at(angle), flow.drive.beside_at(angle)], axis=1)
+    wanted = np.hstack([wanted, volts[:, : len(circuit.generators)]])
+    for k, net in enumerate(nets):
+        got = np.interp(grid, waves.axis, waves.signals[net])
+        assert np.abs(got - wanted[:, k]).max() < 5e-3 * np.abs(wanted[:, k]).max(), net
+
+
+@pytest.mark.parametrize("name", ["against each other", *SECOND])
+def test_decks_for_other_simulators_have_the_same_generator(name: str) -> None:
+    design, (response,) = made(name).design, made(name).model_responses
+    excitation = design.excitation(response.b, response.omega)
+    circuit, period = design.circuit, 1.0 / excitation.frequency
+    run = simulator_decks.ResponseRun(
+        response.omega, None, excitation, SolverSettings("trap", period / 2000), period, None
+    )
+    nets = circuit.generator_nets
+    both = [
+        open_simulator("batch").run(
+            simulator_decks.write(dialect, circuit, [run], title="a period").replace(
+                ".print tran", ".save"
+            ),
+            nets,
+            period,
+        )
+        for dialect in simulator_decks.DIALECTS
+    ]
+    for waves in both:
+        angle = excitation.drive.omega * waves.axis
+        wanted = excitation.drive.at(angle), excitation.drive.beside_at(angle)
+        for net, volts in zip(nets, wanted, strict=False):
+            assert waves.signals[net] == pytest.approx(volts, abs=1e-3 * np.abs(volts).max())
+
+
+def test_the_sheet_s_generators_are_those_of_the_deck() -> None:
+    design, (response,) = (
+        made("three phases").design,
+        made("three phases").model_responses,
+    )
+    excitation = design.excitation(response.b, response.omega)
+    run = FirstRun(excitation, SolverSettings("trap", 1e-6), 1e-3, None)
+    library = models(design.circuit, (), run)
+    for line in deck.generators(design.circuit, excitation):
+        assert line.replace(" 0 SIN", " bottom SIN") in library
+    assert library.count(".subckt generator") == 2
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_ngspice_s_transfer_functions_are_the_model_s(name: str) -> None:
+    """Of each channel; with another resistor in the second one they are not, and only there."""
+    with SpicePool(2) as pool:
+        right = equation_check.check(made(name).design, made(name).model_responses, pool)
+        assert right.passed, right.problem
+        names = [f.name for f in right.findings]
+        assert ("transfer, open, second channel" in names) is (name in SECOND)
+        assert "transfer, open" in names
+        if name not in SECOND:
+            return
+        design = made(name).design
+        odd = design.model.second_order().drive_force(1.3, 1).nonzero()[0][-1]
+        parts = tuple(
+            replace(p, value=1.2 * p.value)
+            if isinstance(p, Resistor) and p.name == f"R{170 + odd}" else p
+            for p in design.circuit.parts
+        )  # fmt: skip
+        wrong = replace(design, circuit=replace(design.circuit, parts=parts))
+        found = equation_check.check(wrong, made(name).model_responses, pool)
+    assert [f.name for f in found.findings if not f.passed] == ["transfer, open, second channel"]
+
+
+@pytest.mark.parametrize("name", ["against each other", "two phases"])
+def test_boards_answer_as_one_by_one(name: str) -> None:
+    result = made(name)
+    design, (response,) = result.design, result.model_responses
+    orbit = on_circuit(nominal_reduction(design).system(), design, response)
+    boards = draw_many(design.circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 5, range(4))
+    drive = design.excitation(response.b, response.omega).drive
+    asked = range(4), [drive] * 4, np.tile(orbit.start, (4, 1))
+    together, slow = Ensemble(boards), Ensemble(boards, fast=False)
+    predicted = together.quick(*asked)
+    pairs = zip(together.settle(*asked), slow.settle(*asked), predicted, strict=True)
+    for a, b, guess in pairs:
+        assert a.counts == b.counts
+        assert a.start == pytest.approx(b.start, rel=1e-9, abs=1e-9)
+        assert guess is not None
+        assert guess.counts == b.counts
+
+
+def test_loads_know_both_channels() -> None:
+    """The current of every output against a fine sample of the nodal equations."""
+    result = made("two phases")
+    design, (response,) = result.design, result.model_responses
+    reduction = nominal_reduction(design)
+    loads = design_loads(design, reduction, result.model_responses)
+    flow = circuit_flow(reduction.system(), design, response)
+    orbit = on_circuit(reduction.system(), design, response)
+    for start, periods in ((orbit.start, orbit.n), (np.zeros(4), 20)):
+        run = flow.run(start, periods, points=500)
+        angle = 2.0 * np.pi * np.arange(len(run.strobes)) / 500
+        volts = zip(flow.drive.at(angle), flow.drive.beside_at(angle), strict=True)
+        peaks: dict[str, float] = {}
+        for x, (u, w), phase in zip(run.strobes, volts, angle, strict=True):
+            key = flow.mode_at(x, float(phase))
+            one, other = reduction.solution(key).output, reduction.by_second(key).output
+            for name, row in one.items():
+                amperes = abs(row @ [*x, u, 1.0] + other[name][-2] * w)
+                peaks[name] = max(peaks.get(name, 0.0), float(amperes))
+        for name, most in peaks.items():
+            assert most <= loads.of(name).current * (1.0 + 1e-4)
+            if loads.of(name).current_in.endswith("rest") is (periods == 20):
+                assert most == pytest.approx(loads.of(name).current, rel=1e-2)
+
+
+@pytest.mark.parametrize("name", ["square", "two phases", "force beside base"])
+def test_the_bench_is_told_what_each_channel_gives(name: str) -> None:
+    result = made(name)
+    design, file = result.design, result.modelfile
+    text = setup_csv(design, result.model_responses, [None] * len(result.model_responses))
+    (row,) = csv.DictReader(io.StringIO(text))
+    (knob,) = chosen(result)["knobs"]
+    names = waveform_names(file)
+    if name == "square":
+        assert names == ("waveform.csv",)
+        assert "phase2_deg" not in row
+        assert "second" not in knob
+    elif name == "two phases":
+        assert names == ()
+        assert float(row["phase2_deg"]) == pytest.approx(np.rad2deg(1.2), rel=1e-4)
+        assert knob["second"]["phase_deg"] == pytest.approx(np.rad2deg(1.2))
+    else:
+        assert names == ("waveform.csv", "waveform2.csv")
+        assert row["phase2_deg"] == "0"
+    if "amplitude2_v_peak" in row:
+        volts = knob["second"]["amplitude_v_peak"]
+        assert float(row["amplitude2_v_peak"]) == pytest.approx(volts, rel=1e-4)
+        assert float(row["amplitude2_vpp"]) == pytest.approx(2.0 * volts, rel=1e-4)
+    for shape in design.drive_shapes:
+        levels = np.array([float(line) for line in waveform_csv(shape).splitlines()])
+        angle = 2.0 * np.pi * np.arange(len(levels)) / len(levels)
+        assert levels == pytest.approx(-wave(shape, angle), abs=1e-6)
+        assert np.abs(levels).max() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_turned_knob_turns_both_channels() -> None:
+    result = made("two phases")
+    design, (response,) = result.design, result.model_responses
+    own = design.excitation(response.b, response.omega)
+    assert own.second is not None
+    louder = Adjustment(frequency=0.01, amplitude=0.1).of(own)
+    assert louder.second is not None
+    assert louder.second.amplitude == pytest.approx(1.1 * own.second.amplitude)
+    assert louder.amplitude == pytest.approx(1.1 * own.amplitude)
+
+
+def test_the_board_has_a_jack_for_each_channel() -> None:
+    result = made("force beside base")
+    circuit, choice = board_circuit(result)
+    jacks = {p.ways[0]: p.role for p in circuit.fittings if isinstance(p, Connector)}
+    assert jacks["vg"] == "generator"
+    assert jacks["vg2"] == "generator, second channel"
+    # The mass that both drive takes the current of both.
+    values = circuit.values
+    both = 10.0 * (1.0 / values["R12"] + 1.0 / values["R171"])
+    assert fault_current(circuit, "s4", 10.0) == pytest.approx(both)
+    assert protection_offset(circuit, "s4", choice, result.catalog, 0.01) > 0.0
+
+
+def test_no_record_of_such_a_board_is_named() -> None:
+    for name in ("square", "two phases"):
+        assert made(name).design.drive_shapes != (SINE,)
+        with pytest.raises(InputError, match="more than a sine"):
+            check_fits(BoardPrediction(made(name)), fit=False, boards=False, decays=[])
+
+
+THREE = table("force", on="ball", amplitude=1.0, harmonics=[[2, 0.3, 0.0]]) + table(
+    "force", on="table", amplitude=0.6, phase=1.2
+)
+
+
+def test_three_shapes_are_refused() -> None:
+    """Two of the forces, and the ground's beside them."""
+    with pytest.raises(InputError, match="more than two phases or shapes"):
+        synthesise(parse_model_file(two(THREE, "[base]\namplitude = 0.5\n", RESPONSE)))
+
+
+def amplitudes(name: str, omega: float) -> Array:
+    return np.array(made(name).design.excitation(1.0, omega).amplitudes)
+
+
+def test_the_ground_s_channel_follows_the_frequency() -> None:
+    ratios = amplitudes("force beside base", 2.0) / amplitudes("force beside base", 1.0)
+    assert ratios == pytest.approx([1.0, 4.0])
+    assert amplitudes("two phases", 2.0) == pytest.approx(amplitudes("two phases", 1.0))
