@@ -187,7 +187,8 @@ def region(
 
     ends = list(parallel(end, ways, jobs))
     border = np.array([values for values, _ in ends])
-    nominal = np.abs(np.array(at))
+    # Relative to the point; in widths of the window where that lies at 0.
+    nominal = np.where(np.array(at) == 0.0, inside.widths, np.abs(np.array(at)))
     around, best = _boxes(border / nominal, np.array(at) / nominal)
     near, widest = _circles(border / nominal, np.array(at) / nominal)
     return ResponseRegion(

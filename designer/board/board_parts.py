@@ -157,9 +157,9 @@ def _far(resistor: Resistor, net: str) -> str:
 
 
 def drive_resistance(circuit: Circuit, node: str) -> float:
-    """Resistance [Ω] between the generator and a driven summing node, of its first channel where
-    that drives it."""
-    return next(_resistances(circuit, node))
+    """Resistance [Ω] between the generator and a driven summing node, of both channels together
+    where both drive it."""
+    return 1.0 / sum(1.0 / ohms for ohms in _resistances(circuit, node))
 
 
 def _resistances(circuit: Circuit, node: str) -> Iterator[float]:
@@ -176,7 +176,7 @@ def fault_current(circuit: Circuit, node: str, volts: float) -> float:
     """Current [A] into a driven summing node that is at 0 V, from so many volts at each channel of
     the generator: what the inputs of an unpowered op-amp, or the diodes before them, have to
     take."""
-    return sum(volts / ohms for ohms in _resistances(circuit, node))
+    return volts / drive_resistance(circuit, node)
 
 
 def protection_offset(
@@ -270,7 +270,7 @@ def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iter
 def _trimmed_node(circuit: Circuit) -> str | None:
     """The driven summing node that the trim feeds: of the mass at ``trimmed_clearance`` if that is
     driven, else the first; None where nothing is driven."""
-    driven = driven_nodes(circuit)
+    driven = driven_nodes(circuit, circuit.generator) or driven_nodes(circuit)
     own = _driven_at(circuit, trimmed_clearance(circuit)) if circuit.stops else ()
     return next(iter((*own, *driven)), None)
 
@@ -286,7 +286,7 @@ def _driven_at(circuit: Circuit, clearance: int) -> tuple[str, ...]:
     """The summing node of the mass at a clearance, if the generator drives it."""
     state = circuit.states.index(circuit.stops[clearance].state)
     plates = {c.name: c.nets for c in circuit.capacitors}[circuit.states[state + 1]]
-    return tuple(node for node in driven_nodes(circuit) if node in plates)
+    return tuple(node for node in driven_nodes(circuit, circuit.generator) if node in plates)
 
 
 def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:

@@ -173,6 +173,8 @@ class ScaledBoards:
         setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
         if not drive.is_sine:
             setting += np.ravel(drive.shape).tolist()
+        if drive.second is not None:
+            setting += [drive.second.amplitude, *np.ravel(drive.second.shape).tolist()]
         wanted = [str(spec.expect), spec.twin, spec.symmetric]
         extent = [boards.start, boards.stop, list(stretches)]
         return [self._whose, nine_digits(setting), wanted, extent]

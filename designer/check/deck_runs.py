@@ -107,12 +107,22 @@ def circuit_notes(synthesis: Synthesis, run: FirstRun) -> tuple[str, ...]:
         "For ngspice 36 or later: its XSPICE code model limit is used. Run: ngspice -b circuit.cir",
         *_circuit(synthesis),
         f"Response: {text}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak"
-        + ("" if drive.second is None else f"; VM2: {drive.second.amplitude:.6g} V peak"),
-        "Another response: frequency and amplitude of VM1 are in setup.csv, with how to start it.",
+        + ("" if drive.second is None else f", VM2 with {drive.second.amplitude:.6g} V peak"),
+        *_other_responses(drive),
         "The start voltages (IC=) belong to this response alone, and .tran to its frequency",
         "Every response with its own start, and other simulators: designer export DIR --deck NAME,",
         "with ltspice or portable, writes circuit-ltspice.cir or circuit-portable.cir",
     )
+
+
+def _other_responses(drive: Excitation) -> Iterator[str]:
+    """How the generator is set for another response."""
+    if drive.drive.is_sine:
+        yield "Another response: frequency and amplitude of VM1 are in setup.csv, with its start."
+        return
+    if drive.is_waveform:
+        yield "VM1h2, VM1h3 ... stand under VM1: harmonics of its waveform, whose peak is said here"
+    yield "Another response: setup.csv says peaks and frequency, a deck as below has every source."
 
 
 def simulator_notes(

@@ -20,6 +20,7 @@ from designer.base.errors import InputError
 from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
+from designer.check.absolute_motion import absolute_extremes
 from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, spice_trace
 from designer.check.coexistence import Coexistence
 from designer.check.trust import Trust
@@ -33,7 +34,6 @@ from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
-from designer.model.absolute_motion import absolute_extremes
 from designer.model.driven import model_flow
 from designer.model.find_responses import (
     STARTS,

@@ -13,7 +13,7 @@ from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.circuit.nodal_bandwidth import LaggingEquations
-from designer.dynamics.piecewise_linear import ModeKey, motion_of_states
+from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, motion_of_states
 from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
 from designer.kernels import kernel_mode_tables as kernel
 
@@ -79,17 +79,20 @@ def mode_rows(boards: Boards, key: ModeKey, nets: Sequence[str]) -> ModeRows:
     return ModeRows(mode.rates, np.stack([mode.voltage[net] for net in nets], axis=1))
 
 
-def _equations(boards: Boards) -> NodalEquations:
+def _equations(boards: Boards, channel: int = 0) -> NodalEquations:
     if boards.bandwidth:
-        return LaggingEquations(boards.circuit, boards.stacked, _all_solved)
-    return NodalEquations(boards.circuit, boards.stacked)
+        return LaggingEquations(boards.circuit, boards.stacked, _all_solved, channel=channel)
+    return NodalEquations(boards.circuit, boards.stacked, channel=channel)
 
 
 class BoardModes:
-    """Some of the working modes of N boards, in the form of the fast path."""
+    """Some of the working modes of N boards, in the form of the fast path.
 
-    def __init__(self, boards: Boards) -> None:
-        circuit, self._boards = boards.circuit, boards
+    channel : of the generator, that drives them.
+    """
+
+    def __init__(self, boards: Boards, channel: int = 0) -> None:
+        circuit, self._boards, self._channel = boards.circuit, boards, channel
         self.targets = GuardTargets(circuit.working)
         between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
         self.modes = empty_modes(
@@ -106,6 +109,7 @@ class BoardModes:
     def take(self, which: Index) -> BoardModes:
         """Those of some boards, for themselves: what is added to them is not added here."""
         out = object.__new__(BoardModes)
+        out._channel = self._channel
         out._boards, out.targets = self._boards.take(which), self.targets.copy()
         parts = {name: getattr(self.modes, name)[which] for name in OF_EACH}
         rest = {
@@ -139,6 +143,38 @@ class BoardModes:
         beside = (next((way for way in ways if key in way), frozenset()) for key in keys)
         self.add(sorted(frozenset().union(*beside)))
 
+    def alone(self, board: int, beside: BoardModes | None = None) -> dict[ModeKey, Mode]:
+        """The modes of one board in the form of the general kernel. beside : those of the
+        generator's second channel."""
+        own, n = self.modes, self.modes.A.shape[-1]
+        out = {}
+        for k, key in enumerate(self.targets.keys):
+            if not own.good[board, k] or (beside is not None and not beside.modes.good[board, k]):
+                continue
+            count = int(own.guards[k])
+            rows = own.guard[board, k, :count]
+            second = np.zeros(count) if beside is None else beside.modes.guard[board, k, :count, n]
+            guards = tuple(
+                Guard(
+                    rows[g, :n].copy(),
+                    float(rows[g, n]),
+                    float(rows[g, n + 1]),
+                    self.targets.beyond(k, g),
+                    int(own.clearance[k, g]),
+                    float(second[g]),
+                )
+                for g in range(count)
+            )
+            out[key] = Mode(
+                own.A[board, k].copy(),
+                own.B[board, k].copy(),
+                own.d[board, k].copy(),
+                guards,
+                tuple(own.side[k].tolist()),
+                beside=None if beside is None else beside.modes.B[board, k].copy(),
+            )
+        return out
+
     def enter_all(self) -> bool:
         """Solve all working modes; returns whether one was not there yet."""
         before = len(self.targets.keys)
@@ -150,7 +186,7 @@ class BoardModes:
         new = [key for key in keys if key not in self.targets.numbers]
         if not new:
             return
-        equations = _equations(self._boards)
+        equations = _equations(self._boards, self._channel)
         solved = [_solved(equations, key) for key in new]
         most = max((len(mode.exits) for mode in solved), default=0)
         self.modes = grown(self.modes, len(self.targets.keys) + len(new), most)

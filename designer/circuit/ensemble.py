@@ -241,6 +241,8 @@ class Ensemble:
         try:
             reduction = self.reduction(board)
             system, start = reduction.system(), reduction.state(start)
+            if self._modes is not None and not (system.built or drive.is_sine):
+                system.know(self._modes.alone(board, self._beside))
             flow = Flow(system, drive, fast=self._fast)
             if brief:
                 orbit = attractors.settle(flow, start, budget=Budget(BRIEF), watch=0)
@@ -372,6 +374,13 @@ class Ensemble:
                 periods=spent,
             )
             yield SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+
+    @cached_property
+    def _beside(self) -> working.BoardModes | None:
+        """The modes by the generator's second channel; None where there is none."""
+        if self.boards.circuit.second is None:
+            return None
+        return working.BoardModes(self.boards, 1)
 
     @cached_property
     def _in_clearances(self) -> Index:

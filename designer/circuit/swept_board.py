@@ -173,8 +173,16 @@ class BoardSubject:
             "frequency": self.frequency,
             "amplitude": self.amplitude,
             "offset": self.offset,
-            **({} if shapes == (SINE,) else {"shapes": shapes}),
+            **({} if shapes == (SINE,) else {"shapes": shapes, "ratio": self._ratio}),
         }
+
+    @property
+    def _ratio(self) -> float:
+        """Of the second channel's amplitude to the first one's at the model's own frequency; 0
+        without one."""
+        design = self.design
+        first, *others = (design.amplitude(channel=k) for k in range(len(design.drive_shapes)))
+        return others[0] / first if others else 0.0
 
     def setting_ratios(self, boards: Iterable[Board]) -> dict[str, Array]:
         """(boards,) by setting, its value on the nominal board over that on each board, at which

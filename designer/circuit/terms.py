@@ -54,7 +54,9 @@ def entry_resistor(masses: int, state: int, source: int) -> str:
 
 def drive_resistor(masses: int, mass: int, channel: int = 0) -> str:
     """Name of the resistor from a channel of the generator to a mass."""
-    return f"R{170 + mass}" if channel else term_resistor(masses, mass, 2 * masses + 1)
+    if not channel:
+        return term_resistor(masses, mass, 2 * masses + 1)
+    return f"R{(170 if masses <= MOST_PLAIN else 1900) + mass}"
 
 
 def _sign(value: Any) -> int:

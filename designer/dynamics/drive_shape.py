@@ -17,6 +17,9 @@ POINTS = 64
 """Of a period of the highest harmonic, on which a shape's peaks are looked for."""
 NEWTON = 6
 """Steps from the best of them to a peak: each doubles its digits."""
+LARGEST = 3.0
+"""Of the largest force: what a channel's part of a force may be before another pair of shapes is
+better."""
 ROUNDING = 1e-9
 """Relative: waves of two forces that differ by no more are the same."""
 
@@ -67,8 +70,8 @@ class Channel:
 def channels(waves: Mapping[int, Array]) -> tuple[Channel, ...] | None:
     """The fewest channels, one or two, whose sum the forces are; None where it takes more.
 
-    Two are the shapes of two of the forces, the pair that takes the fewest parts: amplitudes that
-    are not 0, then signs that differ.
+    Two are the shapes of two of the forces: a pair whose sums do not nearly cancel (``LARGEST``),
+    of those the pair that takes the fewest parts, amplitudes that are not 0 and signs that differ.
 
     waves : by order the (2, n) amplitudes of sine and cosine in each force. A shape has the sign of
     the first force that has it.
@@ -84,7 +87,8 @@ def channels(waves: Mapping[int, Array]) -> tuple[Channel, ...] | None:
     fits = [fit for fit in (_fit(basis, whole) for basis in bases) if fit is not None]
     if not fits:
         return None
-    basis, sizes = min(fits, key=lambda fit: _parts(fit[1]))
+    largest = np.linalg.norm(whole, axis=0).max()
+    basis, sizes = min(fits, key=lambda fit: _parts(fit[1] / largest))
     return tuple(_channel(orders, own, size) for own, size in zip(basis.T, sizes, strict=True))
 
 
@@ -111,9 +115,11 @@ def _fit(basis: Array, whole: Array) -> tuple[Array, Array] | None:
     return basis, np.where(np.abs(sizes) > ROUNDING * np.abs(sizes).max(), sizes, 0.0)
 
 
-def _parts(sizes: Array) -> tuple[int, int]:
+def _parts(sizes: Array) -> tuple[bool, int, int, float]:
+    """sizes : (m, n) over the largest force."""
     both = (sizes > 0.0).any(axis=1) & (sizes < 0.0).any(axis=1)
-    return int(np.count_nonzero(sizes)), int(both.sum())
+    most = float(np.abs(sizes).max())
+    return most > LARGEST, int(np.count_nonzero(sizes)), int(both.sum()), most
 
 
 def _channel(orders: list[int], own: Array, sizes: Array) -> Channel:

@@ -19,7 +19,7 @@ field jump (``PiecewiseLinearSystem.continuous``), and tangent vectors with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -226,6 +226,10 @@ class PiecewiseLinearSystem:
         for order in self.orders or ():
             columns += [np.sin(order * angle), np.cos(order * angle)]
         return np.stack(columns, axis=-1)
+
+    def know(self, modes: Mapping[ModeKey, Mode]) -> None:
+        """Take modes that somebody else has built, where they are not there yet."""
+        self._modes |= {key: mode for key, mode in modes.items() if key not in self._modes}
 
     def mode(self, key: ModeKey) -> Mode:
         """The mode of this key, built on its first use."""

@@ -125,6 +125,11 @@ def _rows(synthesis: Synthesis, response: str) -> list[tuple[str, str]]:
         rows.append(
             (each.name.replace("_", " "), f"{each.found:.3g} ({limit} {each.limit:.3g}{held})")
         )
+    if setting.second is not None:
+        ahead = setting.excitation.second_phase_deg
+        rows.insert(
+            3, ("second channel", f"{ahead:.4g}° ahead" if ahead else "the second amplitude")
+        )
     circuit = design.circuit
     rows += [(part.name, format_quantity(part.value, "Ω")) for part in circuit.resistors]
     rows += [(part.name, format_quantity(part.value, "F")) for part in circuit.capacitors]

@@ -176,7 +176,7 @@ def _amplitudes(
 ) -> list[tuple[str, float, str, float]]:
     volts = [float(v) for v in design.volts(b)]
     each = design.errors.drive_gain, design.errors.second_gain
-    gains = [(b / design.model.b) * float(gain.sum()) for gain in each]
+    gains = [(b / design.model.b) * float(np.abs(gain).sum()) for gain in each]
     names = ("generator volt", "volt of the generator's second channel")
     driving = [(name, gain) for name, gain in zip(names, gains, strict=True) if gain]
     states = state_names(len(volts) // 2)

@@ -116,8 +116,9 @@ def check_fits(
     boards with laws, or with dampers in their stops, are to be fitted: the fit knows contacts
     alone, and rates that are continuous there."""
     if prediction.synthesis.design.drive_shapes != (SINE,):
-        found = "a board that more than a sine drives"
-        raise InputError(None, "--record", found, "records of a board that a sine drives")
+        found = "a board whose drive has another shape, a phase of its own, or a second channel"
+        expected = "records of a board that one sine drives; a phase that all forces have may go"
+        raise InputError(None, "--record", found, expected)
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
     for option, wanted in asked.items():

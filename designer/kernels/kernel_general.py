@@ -206,18 +206,35 @@ def _stationary(c: Float, end: float, points: Float) -> int:
 
 
 @leaf
-def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
-    """out = Σ s^k (M h)^k/k! z, by columns of the table."""
-    n = z.shape[0]
-    for i in range(n):
+def _product(matrix: Float, z: Float, n: int, weight: float, out: Float) -> None:
+    """out += weight · matrix z. The rows of the drive, from n on, hold a pair of waves, or the
+    constant, and nothing else; of a sine alone they are too few to be told apart."""
+    size = z.shape[0]
+    whole = size if size == n + 3 else n
+    for i in range(whole):
+        total = 0.0
+        for j in range(size):
+            total += matrix[i, j] * z[j]
+        out[i] += weight * total
+    if whole == size:
+        return
+    out[n + 2] += weight * matrix[n + 2, n + 2] * z[n + 2]
+    first = n
+    while first < size:
+        sine, cosine = z[first], z[first + 1]
+        for i in range(first, first + 2):
+            out[i] += weight * (matrix[i, first] * sine + matrix[i, first + 1] * cosine)
+        first += 3 if first == n else 2
+
+
+@leaf
+def _partial(taylor: Float, z: Float, n: int, s: float, out: Float) -> None:
+    """out = Σ s^k (M h)^k/k! z, by columns of the table. n : states in z."""
+    for i in range(z.shape[0]):
         out[i] = 0.0
     weight = 1.0
     for k in range(taylor.shape[0]):
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += taylor[k, i, j] * z[j]
-            out[i] += weight * total
+        _product(taylor[k], z, n, weight, out)
         weight *= s
 
 
@@ -357,12 +374,10 @@ def advance(
         end = 1.0 if whole else left / h
         if whole:
             for i in range(size):
-                total = 0.0
-                for j in range(size):
-                    total += tables.propagator[mode, i, j] * z[j]
-                z1[i] = total
+                z1[i] = 0.0
+            _product(tables.propagator[mode], z, n, 1.0, z1)
         else:
-            _partial(tables.taylor[mode], z, end, z1)
+            _partial(tables.taylor[mode], z, n, end, z1)
         first, through = end, -1
         for g in range(tables.guards[mode]):
             g0, g1, swing, terms = 0.0, 0.0, 0.0, 0.0
@@ -382,7 +397,7 @@ def advance(
             if tables.target[mode, through] < 0:
                 cursor[3] = through
                 return UNKNOWN_MODE
-            _partial(tables.taylor[mode], z, first, z1)
+            _partial(tables.taylor[mode], z, n, first, z1)
         if measure:
             _measure(tables, mode, z, n, first, depth, log)
         if phi.shape[0] > 0:

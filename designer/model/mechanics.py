@@ -163,11 +163,24 @@ class SecondOrderSystem:
     def channels(self, omega: float) -> tuple[Channel, ...] | None:
         """What a circuit's generator drives the masses with at a drive frequency, the ground's
         forces included, by its channels, one or two; None where it takes more. Their shapes, and
-        their order, are the same at every frequency."""
-        if self.driven_by_sine and not self._ratio_varies:
+        their order, are the same at every frequency: first the one whose constant force would move
+        the first clearance more, for that is where a generator's offset is set."""
+        found = self._two_channels(omega) if self._ratio_varies else self._of_one_ratio(omega)
+        if found is None or len(found) == 1 or not self.dead_zones:
+            return found
+        row = np.linalg.lstsq(
+            self.spanning_stiffness.T, self.displacement(self.dead_zones[0]), rcond=None
+        )[0]
+        moved = [abs(float(row @ each.force)) / float(np.abs(each.force).max()) for each in found]
+        return found[::-1] if moved[1] > moved[0] * (1.0 + ROUNDING) else found
+
+    def _of_one_ratio(self, omega: float) -> tuple[Channel, ...] | None:
+        if self.driven_by_sine:
             return (Channel(SINE, self.drive_waves(omega)[0].sine),)
-        if not self._ratio_varies:
-            return channels(_parts(self.drive_waves(omega)))
+        return channels(_parts(self.drive_waves(omega)))
+
+    def _two_channels(self, omega: float) -> tuple[Channel, ...] | None:
+        """Of forces of their own and of the ground's."""
         own = channels(_parts(self._own_waves))
         ground = channels(_parts(self._without_forces.drive_waves(omega)))
         if own is None or ground is None or len(own) > 1:

@@ -219,12 +219,10 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
             rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
     gains = design.errors.drive_gain, design.errors.second_gain
     for name, each in zip(("generator", "second channel"), gains, strict=True):
-        gain = float(np.sum(each))
+        gain = float(np.abs(each).sum())
         if gain <= 0.0:
             continue
-        rows.append(
-            (f"{name} for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
-        )
+        rows.append((f"{name} for forces of 1 in all", f"{words.quantity(1.0 / gain, 'V')} peak"))
         if si is not None:
             one = "one generator volt" if name == "generator" else f"one volt of the {name}"
             rows.append((one, words.quantity(gain * si.force_scale, "N")))

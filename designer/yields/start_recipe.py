@@ -167,6 +167,11 @@ class Recipe:
             return f"{text} (omega {omega:.4g})"
         return f"{text} ({value_text(omega * self.hertz_scale, 'Hz')} of the mechanism)"
 
+    def _second(self) -> dict[str, float]:
+        """The amplitudes of the second channel, where there is one."""
+        ends = {"amplitude2_v_peak": self.first, "to_amplitude2_v_peak": self.target}
+        return {name: at.second.amplitude for name, at in ends.items() if at.second is not None}
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON: settings in Hz and V, times in drive periods and seconds."""
         counts = ("reached", "trials", "board_reached", "board_trials", "boards", "able")
@@ -176,6 +181,7 @@ class Recipe:
             "amplitude_v_peak": self.first.amplitude,
             "to_frequency_hz": self.target.frequency,
             "to_amplitude_v_peak": self.target.amplitude,
+            **self._second(),
             "steps": self.steps,
             "hold_periods": self.hold,
             "wait_periods": self.wait,

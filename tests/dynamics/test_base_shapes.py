@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.check.absolute_motion import absolute_extremes
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.fidelity.system_runge_kutta import rates_of
-from designer.model.absolute_motion import absolute_extremes
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of

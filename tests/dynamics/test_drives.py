@@ -14,10 +14,10 @@ from scipy.integrate import solve_ivp
 import designer
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.check.absolute_motion import absolute_extremes
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.turning_points import heights
-from designer.model.absolute_motion import absolute_extremes
 from designer.model.driven import model_flow
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.relative_motion import ground_of

@@ -315,7 +315,7 @@ def test_the_board_has_a_jack_for_each_channel() -> None:
 def test_no_record_of_such_a_board_is_named() -> None:
     for name in ("square", "two phases"):
         assert made(name).design.drive_shapes != (SINE,)
-        with pytest.raises(InputError, match="more than a sine"):
+        with pytest.raises(InputError, match="a phase that all forces have may go"):
             check_fits(BoardPrediction(made(name)), fit=False, boards=False, decays=[])
 
 
