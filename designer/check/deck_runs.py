@@ -3,6 +3,7 @@ response in a deck for another simulator, each from its own orbit."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from designer.base.arrays import Array

@@ -87,6 +87,14 @@ def test_three_phases_take_four_resistors() -> None:
     assert second.force == pytest.approx([0.0, 1.0, -1.0])
 
 
+@pytest.mark.parametrize("degree", [1.0, 0.01])
+def test_a_pair_that_nearly_cancels_is_not_taken(degree: float) -> None:
+    """Two phases that hardly differ would have to make a third one, far from both."""
+    turns = np.deg2rad([0.0, degree, 120.0, -120.0])
+    for channel in made_of({1: np.stack([np.cos(turns), np.sin(turns)])}):
+        assert np.abs(channel.force).max() < 2.0
+
+
 def test_three_shapes_are_too_many() -> None:
     waves = {n: np.zeros((2, 3)) for n in (1, 2, 3)}
     for k, n in enumerate(waves):

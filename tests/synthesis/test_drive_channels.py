@@ -14,6 +14,7 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.board.board_parts import board_circuit, fault_current, protection_offset
 from designer.board.kicad_sim import models
+from designer.catalog.parts_catalog import load_catalog
 from designer.check.deck_runs import FirstRun
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.board_parts_only import Connector
@@ -22,7 +23,7 @@ from designer.circuit.netlist import Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.dynamics.drive_shape import SINE, wave
 from designer.dynamics.orbit import OrbitStatus
-from designer.folders.bench_tables import setup_csv, waveform_csv
+from designer.folders.bench_tables import scales_csv, setup_csv, waveform_csv
 from designer.folders.design_files import chosen, waveform_names
 from designer.jobs.bench_job import check_fits
 from designer.model.model_file import parse_model_file
@@ -32,6 +33,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
 from designer.synthesis.output_loads import design_loads
+from designer.synthesis.part_checks import unit_circuit
 from designer.workbench.prediction import BoardPrediction
 from designer.yields.adjustment import Adjustment
 from tests.shared.system_text import clearance, system_text, table
@@ -272,8 +274,8 @@ def test_the_bench_is_told_what_each_channel_gives(name: str) -> None:
         assert "second" not in knob
     elif name == "two phases":
         assert names == ()
-        assert float(row["phase2_deg"]) == pytest.approx(np.rad2deg(1.2), rel=1e-4)
-        assert knob["second"]["phase_deg"] == pytest.approx(np.rad2deg(1.2))
+        assert float(row["phase2_deg"]) == pytest.approx(-np.rad2deg(1.2), rel=1e-4)
+        assert knob["second"]["phase_deg"] == pytest.approx(-np.rad2deg(1.2))
     else:
         assert names == ("waveform.csv", "waveform2.csv")
         assert row["phase2_deg"] == "0"
@@ -338,3 +340,44 @@ def test_the_ground_s_channel_follows_the_frequency() -> None:
     ratios = amplitudes("force beside base", 2.0) / amplitudes("force beside base", 1.0)
     assert ratios == pytest.approx([1.0, 4.0])
     assert amplitudes("two phases", 2.0) == pytest.approx(amplitudes("two phases", 1.0))
+
+
+def test_the_first_channel_is_where_an_offset_moves_the_clearance() -> None:
+    """A shaker on each of two masses that nothing joins but a clearance at the second."""
+    springs = {("a", "ground"): 1.0, ("b", "ground"): 1.5, ("a", "b"): 1e-3}
+    text = system_text(
+        {"a": 1.0, "b": 1.0}, springs, {("a", "ground"): 0.1, ("b", "ground"): 0.1},
+        clearance("A", "b", "ground", upper=0.3, stiffness=8.0),
+        table("force", on="a", amplitude=1.0),
+        table("force", on="b", amplitude=0.5, phase=1.0),
+        RESPONSE,
+    )  # fmt: skip
+    system = parse_model_file(text).model.second_order()
+    assert [c.force.nonzero()[0].tolist() for c in system.channels(1.3) or ()] == [[1], [0]]
+    assert system.drive_shapes[1] == SINE
+
+
+def test_twelve_masses_have_a_name_for_every_part() -> None:
+    """A second channel and a constant force on the last of them."""
+    names = [f"m{k}" for k in range(1, 13)]
+    pairs = [(names[0], "ground"), *zip(names[1:], names[:-1], strict=True)]
+    text = system_text(
+        dict.fromkeys(names, 1.0), dict.fromkeys(pairs, 4.0), dict.fromkeys(pairs, 0.4),
+        clearance("A", "m1", "ground", upper=0.3, stiffness=8.0),
+        *(table("force", on=name, amplitude=0.5) for name in names[:10]),
+        *(table("force", on=name, amplitude=0.5, phase=1.0) for name in names[10:]),
+        *(table("force", on=name, constant=0.1) for name in names),
+        '[circuit]\ndead_zone = "rectifier"\n', RESPONSE,
+    )  # fmt: skip
+    file = parse_model_file(text)
+    circuit = unit_circuit(file.model, file.circuit, load_catalog())
+    assert {"R1910", "R1911", "R171"} <= {part.name for part in circuit.parts}
+
+
+def test_the_scale_card_has_the_size_of_forces_that_cancel() -> None:
+    made_ = made("three phases")
+    rows = csv.DictReader(io.StringIO(scales_csv(made_.modelfile, made_.design, ())))
+    values = {row["quantity"]: float(row["value"]) for row in rows}
+    gain = np.abs(made_.design.errors.second_gain).sum()
+    name = "model force per volt of the generator's second channel"
+    assert values[name] == pytest.approx(gain, rel=1e-5)
