@@ -50,14 +50,15 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
     ramp = C / scale.seconds  # siemens for one unit a unit of time, before the scales
     values = {f"C{i + 1}": C for i in range(2 * n)}
     values |= {f"R{k}": 10e3 for k in (*range(100, 100 + 4 * n), 190, 191, 206, 207)}
-    force = system.drive_force(system.own_frequency)
+    force, second = (system.drive_force(system.own_frequency, k) for k in (0, 1))
     zones, system = system.dead_zones, _linear_part(system)
-    for t in terms(system.damping.tolist(), system.stiffness.tolist(), force.tolist()):
+    matrices = system.damping.tolist(), system.stiffness.tolist(), force.tolist()
+    for t in terms(*matrices, second=second.tolist()):
         kind, i, j = t.quantity
         if kind == "mass":
             rate, source = 1.0, float(volts[2 * i + 1])
         elif kind == "force":
-            rate, source = abs(force[i]) / system.mass[i], scale.generator
+            rate, source = abs((force, second)[j][i]) / system.mass[i], scale.generator
         else:
             matrix = system.damping if kind == "damping" else system.stiffness
             rate = abs(matrix[i, j]) / system.mass[i]
@@ -134,9 +135,10 @@ def exact_circuit(system: SecondOrderSystem, scale: Scale, stage: DeadZoneStage 
     with damping are apart, whatever the stage says."""
     damped = {i for i, zone in enumerate(system.dead_zones) if zone.damping}
     stage = replace(stage, apart=stage.apart | damped)
-    force, linear = system.drive_force(system.own_frequency).tolist(), _linear_part(system)
+    force, second = (system.drive_force(system.own_frequency, k).tolist() for k in (0, 1))
+    linear = _linear_part(system)
     circuit = build.build(
-        terms(linear.damping.tolist(), linear.stiffness.tolist(), force),
+        terms(linear.damping.tolist(), linear.stiffness.tolist(), force, second=second),
         exact_values(system, scale),
         CATALOG.opamp("TL074C"),
         supply=15.0,
