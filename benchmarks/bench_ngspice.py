@@ -33,7 +33,6 @@ from designer.base.defaults import cores
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit import nominal
-from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.model.model_file import read_model_file
 from designer.spice import numerics_gate as gate
@@ -102,8 +101,7 @@ def subjects(made: Synthesis) -> dict[int, tuple[float, GateSubject]]:
     for r in made.model_responses:
         orbit = on_circuit(system, made.design, r)
         if orbit.n == 1 and orbit.p == orbit.q and orbit.p not in out:
-            frequency = made.design.errors.scales.frequency(r.omega)
-            excitation = Excitation(frequency, made.design.amplitude(r.b))
+            excitation = made.design.excitation(r.b, r.omega)
             out[orbit.p] = r.omega, GateSubject(reduction, excitation, orbit)
     return out
 

@@ -27,7 +27,6 @@ from designer.base.plain_json import dumps
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
 from designer.circuit.board_values import nominal_board
-from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import describe, shoot
@@ -101,7 +100,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
     questions = tuple(
         Question(
             r.spec,
-            Excitation(made.design.errors.scales.frequency(r.omega), made.design.amplitude(r.b)),
+            made.design.excitation(r.b, r.omega),
             on_circuit(system, made.design, r),
             None,
         )

@@ -161,9 +161,7 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     (response,) = made.model_responses
     reduction = nominal.nominal_reduction(made.design)
     orbit = on_circuit(reduction.system(), made.design, response)
-    excitation = Excitation(
-        made.design.errors.scales.frequency(response.omega), made.design.amplitude(response.b)
-    )
+    excitation = made.design.excitation(response.b, response.omega)
     flow = circuit_flow(reduction.system(), made.design, response)
     row |= {
         "model": response.orbit.response,

@@ -30,7 +30,7 @@ from designer.circuit.board_parts_only import (
     Trimmer,
 )
 from designer.circuit.stop import Contact, Stop
-from designer.dynamics.drive_shape import SINE, Shape
+from designer.dynamics.drive_shape import SINE, Shape, has_harmonics
 from designer.dynamics.piecewise_linear import Drive, SecondDrive
 
 
@@ -549,8 +549,7 @@ class Excitation:
     @property
     def is_waveform(self) -> bool:
         """Whether a channel gives no sine, so that all have to be given their waveforms."""
-        more = () if self.second is None else self.second.shape
-        return any(n > 1 for n, *_ in (*self.shape, *more))
+        return has_harmonics(self.shape, () if self.second is None else self.second.shape)
 
     def channel(self, number: int) -> Excitation:
         """What one of the generator's channels gives, as of a generator that has no other; nothing

@@ -40,6 +40,7 @@ from .drive_shape import (
     Channel as Channel,
     Shape as Shape,
     channels as channels,
+    has_harmonics as has_harmonics,
     wave as wave,
 )
 from .drive_states import (

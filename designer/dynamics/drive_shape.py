@@ -30,6 +30,11 @@ def wave(shape: Shape, angle: Array) -> Array:
     return np.asarray(sum(terms, np.zeros_like(angle)))
 
 
+def has_harmonics(*shapes: Shape) -> bool:
+    """Whether any of them is more than a sine of whichever phase."""
+    return any(n > 1 for shape in shapes for n, *_ in shape)
+
+
 def slope(shape: Shape) -> Shape:
     """Its derivative by ωt."""
     return tuple((n, -n * cosine, n * sine) for n, sine, cosine in shape)

@@ -26,6 +26,7 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.design_rules.rule_subject import RuleSubject
+from designer.dynamics.drive_shape import has_harmonics
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes, waveform_csv
@@ -70,7 +71,7 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
 def waveform_names(modelfile: ModelFile) -> tuple[str, ...]:
     """The waveforms that a generator's channels have to be given; none where all are sines."""
     system = modelfile.model.second_order()
-    if all(n == 1 for shape in system.drive_shapes for n, *_ in shape):
+    if not has_harmonics(*system.drive_shapes):
         return ()
     return WAVEFORMS[: len(system.drive_shapes)]
 

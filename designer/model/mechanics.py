@@ -165,6 +165,16 @@ class SecondOrderSystem:
         forces included, by its channels, one or two; None where it takes more. Their shapes, and
         their order, are the same at every frequency: first the one whose constant force would move
         the first clearance more, for that is where a generator's offset is set."""
+        # A choice of parts asks for the same few frequencies hundreds of times.
+        if omega not in self._known_channels:
+            self._known_channels[omega] = self._ordered_channels(omega)
+        return self._known_channels[omega]
+
+    @cached_property
+    def _known_channels(self) -> dict[float, tuple[Channel, ...] | None]:
+        return {}
+
+    def _ordered_channels(self, omega: float) -> tuple[Channel, ...] | None:
         found = self._two_channels(omega) if self._ratio_varies else self._of_one_ratio(omega)
         if found is None or len(found) == 1 or not self.dead_zones:
             return found

@@ -303,7 +303,7 @@ def contact_lengths(touching: NDArray[np.bool_]) -> NDArray[np.intp]:
 def first_steps(subject: GateSubject, contact: float) -> int:
     """Steps of a period that the first level takes; contact : length of the shortest [s]."""
     wanted = int(np.ceil(STEPS_PER_CONTACT * subject.period / contact))
-    wave = STEPS_PER_WAVE * max(order for order, *_ in subject.excitation.shape)
+    wave = STEPS_PER_WAVE * max(subject.excitation.drive.orders, default=1)
     return min(max(STEPS_PER_PERIOD, wanted, wave), MOST_STEPS)
 
 

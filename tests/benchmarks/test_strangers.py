@@ -65,13 +65,18 @@ def test_ten_in_a_row_have_every_law() -> None:
     assert kinds == dict(LAWS)
 
 
-def test_thirty_in_a_row_are_linked_in_every_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The files are read as they are; no response is looked for here."""
+@pytest.fixture
+def no_response_sought(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files as they are drawn: that takes no time."""
     monkeypatch.setattr(
         stranger_systems._Drawn,
         "with_response",
         lambda self, title: self._elements(title) + "\n[[response]]\nomega = 1.0\n",
     )
+
+
+@pytest.mark.usefixtures("no_response_sought")
+def test_thirty_in_a_row_are_linked_in_every_way() -> None:
     kinds: Counter[str] = Counter()
     for number in range(30):
         stranger = draw(5, number, "linked")
@@ -82,13 +87,9 @@ def test_thirty_in_a_row_are_linked_in_every_way(monkeypatch: pytest.MonkeyPatch
     assert min(kinds[kind] for kind in ("damped stops", "combination", "mass matrix")) >= 5
 
 
-def test_thirty_in_a_row_are_driven_in_every_way(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("no_response_sought")
+def test_thirty_in_a_row_are_driven_in_every_way() -> None:
     """Never by one sine, and never by more than a generator of two channels gives."""
-    monkeypatch.setattr(
-        stranger_systems._Drawn,
-        "with_response",
-        lambda self, title: self._elements(title) + "\n[[response]]\nomega = 1.0\n",
-    )
     kinds: Counter[str] = Counter()
     channels: Counter[int] = Counter()
     for number in range(30):

@@ -57,7 +57,7 @@ def paper() -> dict[float, GateSubject]:
     return {
         r.omega: GateSubject(
             reduction,
-            Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)),
+            design.excitation(r.b, r.omega),
             on_circuit(system, design, r),
         )
         for r in found
@@ -247,7 +247,7 @@ def test_a_board_for_low_rails() -> None:
     reduction = nominal.nominal_reduction(design)
     subject = GateSubject(
         reduction,
-        Excitation(design.errors.scales.frequency(1.55), design.amplitude(first.b)),
+        design.excitation(first.b, first.omega),
         on_circuit(reduction.system(), design, first),
     )
     assert subject.orbit.response == "1-1-1"

@@ -71,8 +71,7 @@ def made(name: str) -> Synthesis:
 
 def excitation_of(result: Synthesis) -> Excitation:
     design, (response,) = result.design, result.model_responses
-    frequency = design.errors.scales.frequency(response.omega)
-    return Excitation(frequency, design.amplitude(response.b, response.omega))
+    return design.excitation(response.b, response.omega)
 
 
 @pytest.mark.parametrize("name", TEXTS)

@@ -27,7 +27,7 @@ from designer.folders.bench_tables import scales_csv, setup_csv, waveform_csv
 from designer.folders.design_files import chosen, waveform_names
 from designer.jobs.bench_job import check_fits
 from designer.model.model_file import parse_model_file
-from designer.spice import deck, equation_check, simulator_decks
+from designer.spice import deck, equation_check, numerics_gate, simulator_decks
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.worker import open_simulator
@@ -381,3 +381,23 @@ def test_the_scale_card_has_the_size_of_forces_that_cancel() -> None:
     gain = np.abs(made_.design.errors.second_gain).sum()
     name = "model force per volt of the generator's second channel"
     assert values[name] == pytest.approx(gain, rel=1e-5)
+
+
+def test_the_gate_s_first_step_follows_the_harmonics_of_either_channel() -> None:
+    design, (response,) = (
+        made("force beside base").design,
+        made("force beside base").model_responses,
+    )
+    excitation = design.excitation(response.b, response.omega)
+    reduction = nominal_reduction(design)
+    orbit = on_circuit(reduction.system(), design, response)
+    own = numerics_gate.GateSubject(reduction, excitation, orbit)
+    assert excitation.second is not None
+    turned = replace(
+        excitation, shape=excitation.second.shape,
+        second=replace(excitation.second, shape=excitation.shape),
+    )  # fmt: skip
+    steps = [
+        numerics_gate.first_steps(replace(own, excitation=e), 1.0) for e in (excitation, turned)
+    ]
+    assert steps == [5 * numerics_gate.STEPS_PER_WAVE] * 2
