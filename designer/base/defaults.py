@@ -11,8 +11,8 @@ StudyEngine = Literal["exact", "bandwidth", "auto", "ngspice"]
 """Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample;
 "bandwidth": the same with op-amps that lag, in both."""
 STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "bandwidth", "auto", "ngspice")
-Over = Literal["omega", "b", "grade", "omega-grade"]
-OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")
+Over = Literal["omega", "b", "grade", "omega-grade", "temperature"]
+OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade", "temperature")
 """What a yield map is made over."""
 SEED = 1
 """Of the random numbers."""

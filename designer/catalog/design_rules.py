@@ -175,6 +175,15 @@ RULES: tuple[DesignRule, ...] = (
         least=True,
     ),
     _rule(
+        "temperature",
+        "Room between the boards' temperatures and the ends of the op-amp's range",
+        0, "°C",
+        "the op-amp's data sheet; [spread] temperature of the model file, 25 °C without it",
+        "take an op-amp of a wider range (TL074H, OPA4192), or keep the boards at other "
+        "temperatures",
+        least=True,
+    ),
+    _rule(
         "slew",
         "Fastest change of an output over the least guaranteed slew rate",
         0.2, "",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -26,6 +26,13 @@ FORBIDDEN = "!"
 """Stands in front of a family's name that a model file does not let parts be bought from."""
 
 UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
+
+ROOM = 25.0
+"""°C at which figures hold, and parts have the values that they are sold for."""
+
+LEAST_LEFT, MOST_DOUBLINGS = 0.01, 30.0
+"""What is left of a figure at any temperature, and how often a bias current doubles at most,
+however far a slope is drawn out."""
 
 ASSUMED_IMPEDANCE = 1.0
 """Dynamic impedance [Ω] of a reference whose data sheet gives none."""
@@ -183,6 +190,31 @@ class OpAmp(CatalogEntry):
     # What no simulation knows of stays out of repr, which is part of what a study is known by.
     input_current: Annotated[Figure | None, fields.figure("A")] = field(default=None, repr=False)
     """Absolute maximum of the current into an input [A]; None where no sheet gives it."""
+    temperature: Annotated[Figure | None, fields.figure("°C", signed=True)] = field(
+        default=None, repr=False
+    )
+    """Temperatures that it is specified for [°C], the lowest and the highest as min and max."""
+    # What changes with temperature and age moves boards by the spread, which a study is known by.
+    offset_drift: Annotated[Figure | None, fields.figure("V/K")] = field(default=None, repr=False)
+    """Size of the offset's change with temperature [V/K]: typ as a standard deviation, none beyond
+    max."""
+    bias_doubling: Annotated[Figure | None, fields.figure("K")] = field(default=None, repr=False)
+    """Warming that doubles the bias current [K]; None where it does not grow so."""
+    gbw_drift: Annotated[Figure | None, fields.figure("1/K", signed=True)] = field(
+        default=None, repr=False
+    )
+    """Relative change of the gain-bandwidth with temperature [1/K]."""
+    slew_drift: Annotated[Figure | None, fields.figure("1/K", signed=True)] = field(
+        default=None, repr=False
+    )
+    """Relative change of the slew rate with temperature [1/K]."""
+    saturation_drift: Annotated[Figure | None, fields.figure("V/K", signed=True)] = field(
+        default=None, repr=False
+    )
+    """Change of the output limits' size with temperature [V/K]."""
+    offset_ageing: Annotated[Figure | None, fields.figure("V")] = field(default=None, repr=False)
+    """Size of the offset's change over the years [V]: typ as a standard deviation, none beyond
+    max."""
     cases: tuple[PartCase, ...] = field(default=(), repr=False)
     """Other cases that it is sold in, with the same pins."""
 
@@ -211,9 +243,50 @@ class OpAmp(CatalogEntry):
         """Whether it works from rails of ± ``supply`` [V]."""
         return (self.supply.min or 0.0) <= supply <= (self.supply.max or math.inf)
 
+    def over(self, temperatures: tuple[float, float] | None) -> OpAmp:
+        """The same op-amp with bounds that hold from one temperature [°C] to another.
+
+        What is typical stays: it is that of ``ROOM``. None: at ``ROOM`` alone. A figure of which
+        the catalogue has no change with temperature stays as it is.
+        """
+        if temperatures is None:
+            return self
+        warmer = tuple(t - ROOM for t in (*temperatures, ROOM))
+        drift = 0.0 if self.offset_drift is None else self.offset_drift.about_zero[1]
+        offset = drift * max(map(abs, warmer))
+        doubling = self.bias_doubling
+        doublings = 0.0 if doubling is None else max(warmer) / doubling.nominal
+        bias = 2.0 ** min(doublings, MOST_DOUBLINGS)
+
+        def lowest(figure: Figure, drift: Figure | None, *, relative: bool) -> Figure:
+            slope = 0.0 if drift is None else drift.nominal
+            low = figure.nominal if figure.min is None else figure.min
+            moved = min((low if relative else 1.0) * slope * dt for dt in warmer)
+            return replace(figure, min=max(low + moved, LEAST_LEFT * low)) if moved else figure
+
+        def reach(figure: Figure) -> Figure:
+            return lowest(figure, self.saturation_drift, relative=False)
+
+        return replace(
+            self,
+            offset=_up_to(self.offset, lambda most: most + offset),
+            offset_limit=self.offset_limit + offset,
+            bias=_up_to(self.bias, lambda most: most * bias),
+            gbw=lowest(self.gbw, self.gbw_drift, relative=True),
+            slew=lowest(self.slew, self.slew_drift, relative=True),
+            swing=reach(self.swing),
+            swing_2k=None if self.swing_2k is None else reach(self.swing_2k),
+        )
+
     def saturation_at(self, supply: float) -> float:
         """Typical output limit [V] at rails of ± ``supply``: the distance to the rail stays."""
         return supply - (self.rated_supply - self.saturation.nominal)
+
+
+def _up_to(figure: Figure, moved: Callable[[float], float]) -> Figure:
+    """A figure with its upper bound moved, where it has one or a typical value alone."""
+    most = figure.nominal if figure.max is None else figure.max
+    return replace(figure, max=moved(most)) if moved(most) != most else figure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,6 +325,8 @@ class ReferenceEntry(BoardEntry):
     """The currents that it regulates in [A]."""
     impedance: Annotated[Figure | None, fields.figure("Ω")] = None
     """Dynamic impedance [Ω]; None where it is not known."""
+    drift: Annotated[float | None, fraction("120e-6 is 120 ppm", zero=True)] = None
+    """Most that the voltage changes over 1000 h, ± as a fraction; None where not known."""
     pins: Annotated[Mapping[str, str], fields.pins("cathode", "anode")] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )

@@ -62,6 +62,16 @@ class Figure:
                 return value
         raise AssertionError("a figure has at least one value")
 
+    @property
+    def about_zero(self) -> tuple[float, float]:
+        """Of a size of either sign: its standard deviation, and what none lies beyond.
+
+        The typical size is taken for the deviation. Of the two, the one that the sheet does not
+        give is a third of the other, or three times it.
+        """
+        sigma = self.nominal / 3.0 if self.typ is None else self.typ
+        return sigma, 3.0 * sigma if self.max is None else self.max
+
 
 _BOUNDS = ("min", "typ", "max")
 

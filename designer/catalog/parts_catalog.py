@@ -85,10 +85,17 @@ class Catalog:
     """The cases that a board takes; what is sold in no such case is no choice."""
     refused: frozenset[str] = frozenset()
     """Names of the families that a model file does not let parts be bought from."""
+    temperatures: tuple[float, float] | None = None
+    """Lowest and highest temperature of the boards [°C], over which bounds of op-amps have to hold
+    (``OpAmp.over``); None: ``ROOM`` alone."""
 
     def mounted(self, mounting: Mounting) -> Catalog:
         """The same catalogue for a board that takes these cases."""
         return replace(self, mounting=mounting)
+
+    def at(self, temperatures: tuple[float, float] | None) -> Catalog:
+        """The same catalogue for boards of these temperatures."""
+        return replace(self, temperatures=temperatures)
 
     def bought_from(self, choice: Mapping[Kind, Sequence[str]]) -> Catalog:
         """The same catalogue with the choice of families that a model file states.

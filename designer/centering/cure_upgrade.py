@@ -239,7 +239,12 @@ def with_same_parts(
             design, Reduction(circuit, nominal_board(circuit)), loading
         )
     checks = side_conditions.verify(
-        design, conditions, catalog.opamp(circuit.opamp), model_peaks, amplitudes, needed
+        design,
+        conditions,
+        catalog.opamp(circuit.opamp).over(catalog.temperatures),
+        model_peaks,
+        amplitudes,
+        needed,
     )
     stated = {c.quantity: c.limit for c in base.design.checks}
     numbers = {k: v for k, v in base.design.conditions.items() if k not in stated}

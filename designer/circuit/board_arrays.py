@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,9 @@ from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Circuit
 
 _RAILS = ("low", "high")
-_OF_A_BOARD = ("values", "offset", "bias", "reference", "drop", "supply", "gain_bandwidth")
+_OF_A_BOARD = (
+    "values", "offset", "bias", "reference", "drop", "supply", "gain_bandwidth", "slew",
+)  # fmt: skip
 _BY_NAME = (*_OF_A_BOARD, *_RAILS)
 
 
@@ -44,6 +46,8 @@ class Boards:
     """Gain-bandwidth product [Hz] by section."""
     inverse_gain: Array
     """(N,) 1/open-loop gain."""
+    slew: Mapping[str, Array] = field(default_factory=dict)
+    """Slew rate [V/s] by section."""
     bandwidth: bool = False
     """Whether they are computed with op-amps that lag, see ``reduction.Reduction``."""
 

@@ -12,7 +12,8 @@ from designer.circuit.netlist import Circuit
 class Board:
     """One copy of a circuit with its actual values: what a Monte Carlo sample is.
 
-    What is missing has no offset and no bias, and the circuit's own supply and bandwidth.
+    What is missing has no offset and no bias, and the circuit's own supply, bandwidth and slew
+    rate.
     """
 
     values: Mapping[str, float]
@@ -33,6 +34,8 @@ class Board:
     """Volts of the rails by name."""
     gain_bandwidth: Mapping[str, float] = field(default_factory=dict)
     """Gain-bandwidth product [Hz] by section, which ngspice's models with a bandwidth use."""
+    slew: Mapping[str, float] = field(default_factory=dict)
+    """Slew rate [V/s] by section, likewise."""
 
     @property
     def mirror_symmetric(self) -> bool:

@@ -40,7 +40,7 @@ def offset(s: RuleSubject) -> Iterator[Finding]:
     for at in s.forces:
         share = offset_forces(at, limit)
         total = float(np.hypot.reduce(list(share.values())))
-        more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
+        more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections{s.warm}"
         yield Finding(total, _most(share), more=_with_clearance(s, at, more))
 
 
@@ -57,7 +57,7 @@ def bias(s: RuleSubject) -> Iterator[Finding]:
         yield Finding(
             total,
             _most(share),
-            more=_with_clearance(s, at, f"{value_text(limit, 'A')} at each input"),
+            more=_with_clearance(s, at, f"{value_text(limit, 'A')} at each input{s.warm}"),
         )
 
 

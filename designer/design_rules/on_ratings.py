@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from designer.catalog.design_rule import Finding, NotRun, value_text
+from designer.catalog.entries import ROOM
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Diode
 from designer.circuit.noise_gains import conductance, stages
 from designer.design_rules.rule_subject import RuleSubject
@@ -146,12 +147,32 @@ def bulk(s: RuleSubject) -> Iterator[Finding]:
         yield Finding(total / at_pins, rail, more=more + value_text(at_pins, "F"))
 
 
+def temperature(s: RuleSubject) -> Iterator[Finding]:
+    """Room between the boards' temperatures and the ends of the op-amp's range.
+
+    Raises
+    ------
+    NotRun : the catalogue has no range.
+    """
+    stands = s.opamp.temperature
+    if stands is None:
+        raise NotRun(f"the catalogue has no range of temperatures of {s.opamp.name}")
+    low, high = s.catalog.temperatures or (ROOM, ROOM)
+    for end, room in (
+        (stands.min, None if stands.min is None else low - stands.min),
+        (stands.max, None if stands.max is None else stands.max - high),
+    ):
+        if room is not None:
+            at = low if end == stands.min else high
+            yield Finding(room, s.opamp.name, more=f"boards at {at:g} °C, specified to {end:g} °C")
+
+
 def slew(s: RuleSubject) -> Iterator[Finding]:
     """Fastest change of each output over what is guaranteed."""
     limit = guaranteed(s.opamp.slew)
     for section in s.circuit.sections:
         peak = s.operating.slew[section.name]
-        more = f"{peak.value / 1e6:.3g} V/µs of {limit / 1e6:.3g} V/µs"
+        more = f"{peak.value / 1e6:.3g} V/µs of {limit / 1e6:.3g} V/µs{s.warm}"
         yield Finding(peak.value / limit, _at(section.name, peak), more=more)
 
 
@@ -160,7 +181,7 @@ def gain_bandwidth(s: RuleSubject) -> Iterator[Finding]:
     limit, fastest = bandwidth_limit(s.opamp), value_text(s.fastest, "Hz")
     for stage in stages(s.circuit):
         product = stage.bandwidth(s.fastest)
-        more = f"a noise gain of {product / s.fastest:.3g} times {fastest}"
+        more = f"a noise gain of {product / s.fastest:.3g} times {fastest}{s.warm}"
         yield Finding(product, stage.section.name, limit, more)
 
 

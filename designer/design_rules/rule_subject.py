@@ -70,8 +70,18 @@ class RuleSubject:
 
     @property
     def opamp(self) -> OpAmp:
-        """The catalogue's entry of the circuit's op-amp."""
-        return self.circuit.figures or self.catalog.opamp(self.circuit.opamp)
+        """The catalogue's entry of the circuit's op-amp, with the bounds that hold at every
+        temperature of the boards."""
+        figures = self.circuit.figures or self.catalog.opamp(self.circuit.opamp)
+        return figures.over(self.catalog.temperatures)
+
+    @property
+    def warm(self) -> str:
+        """Temperatures that bounds hold at, as a part of a sentence; "" where none are stated."""
+        if self.catalog.temperatures is None:
+            return ""
+        low, high = self.catalog.temperatures
+        return f", from {low:g} to {high:g} °C"
 
     @cached_property
     def reduction(self) -> Reduction:

@@ -40,6 +40,7 @@ LOOKS: dict[str, Look] = {
     "common-mode": on_ratings.common_mode,
     "bulk": on_ratings.bulk,
     "reference-current": on_ratings.reference_current,
+    "temperature": on_ratings.temperature,
     "slew": on_ratings.slew,
     "gain-bandwidth": on_ratings.gain_bandwidth,
     "offset-force": on_precision.offset,

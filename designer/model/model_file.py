@@ -112,7 +112,8 @@ class ModelFile:
         return drive_text(omega, None if self.si is None else self.si.hertz(omega))
 
     def choices(self, catalog: Catalog) -> Catalog:
-        """The catalogue restricted to the cases and families that this file allows.
+        """The catalogue restricted to the cases and families that this file allows, for boards of
+        the temperatures that it states.
 
         Raises
         ------
@@ -123,7 +124,8 @@ class ModelFile:
             "capacitor": self.circuit.capacitor_family,
         }
         try:
-            return catalog.mounted(self.board.mounting).bought_from(families)
+            bought = catalog.mounted(self.board.mounting).bought_from(families)
+            return bought.at(self.spread.temperature)
         except InputError as error:
             raise InputError(self.source, error.field, error.found, error.expected) from None
 

@@ -20,7 +20,8 @@ from designer.model.distributions import Binned, Distribution, Normal, Uniform
 DataSheet = Literal["typical", "data sheet"]
 LawName = Literal["uniform", "normal", "binned"]
 LAWS: tuple[LawName, ...] = ("uniform", "normal", "binned")
-ABSOLUTE_ZERO = -273.15
+ABSOLUTE_ZERO, HOTTEST = -273.15, 300.0
+"""°C: a board's temperature lies above the one and not beyond the other, where solder is molten."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,9 @@ class SpreadSpec(FileTable):
     """Tolerance of the references, a fraction; None: the catalogue's."""
     temperature: Annotated[
         tuple[float, float] | None,
-        span("", "a range [low, high] in °C, such as [0, 50]", lambda t: t > ABSOLUTE_ZERO),
+        span(
+            "", "a range [low, high] in °C, such as [0, 50]", lambda t: ABSOLUTE_ZERO < t <= HOTTEST
+        ),
     ] = None
     """Lowest and highest temperature of the board [°C]."""
     ageing: Annotated[

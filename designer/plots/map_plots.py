@@ -26,6 +26,7 @@ _AXES = {
     "omega": "drive frequency ω",
     "b": "clearance b (the generator’s amplitude goes as 1/b)",
     "grade": "grade of resistors and capacitors [%]",
+    "temperature": "temperature of the boards [°C]",
 }
 
 
@@ -86,6 +87,9 @@ def map_chart(label: str, one: YieldMap, *, angular: bool = False) -> Figure:
 
 
 def _marks(axes: Axes, one: YieldMap, scale: float) -> None:
+    if one.over == "temperature":
+        axes.axvline(one.used, color=INK, lw=0.9, ls="--", label="where figures of parts hold")
+        return
     word = "coarsest of the best" if one.over == "grade" else "recommended"
     best = None if one.recommended is None else scale * one.recommended[0]
     if best is None:

@@ -91,6 +91,7 @@ GLOSSARY = (
 def design_page(data: ReportData, pictures: Pictures) -> Page:
     """The page of a run. pictures : those of ``pictures.pictures``; none for Markdown."""
     head: list[Block] = [_purpose(data)]
+    warm = [name for name in pictures if name.startswith("map ") and name.endswith(" temperature")]
     sections = [
         _not_good_enough(data),
         answers(data),
@@ -108,8 +109,16 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         _rare(data, pictures),
         PageSection(
             "Where to sit",
-            [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
+            [
+                tolerance_tables.maps(data),
+                *(p for n, p in pictures.items() if n[:4] == "map " and n not in warm),
+            ],
             "maps",
+        ),
+        PageSection(
+            "Warm and cold boards",
+            [tolerance_tables.over_temperature(data), *(pictures[name] for name in warm)],
+            "temperature",
         ),
         _scales(data),
         _provenance(data),

@@ -37,9 +37,14 @@ def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> st
         parts.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
     if spread.temperature is not None:
         low, high = spread.temperature
-        parts.append(f"temperature uniform from {low:g} to {high:g} °C")
+        within = f"uniform from {low:g} to {high:g} °C" if low < high else f"of {low:g} °C"
+        parts.append(
+            f"temperature {within}, which moves parts and, of the op-amps, {_warm(spread)}"
+        )
     if spread.ageing:
         parts.append(f"ageing of {_ageing(spread)}")
+    if spread.opamps.ageing is not None:
+        parts.append(f"ageing of op-amp offsets {_about_zero(spread.opamps.ageing, 'V')}")
     better = sorted(spread.wanted_grades, key=natural_key)
     for grade in sorted({spread.grades[name] for name in better}):
         names = ", ".join(name for name in better if spread.grades[name] == grade)
@@ -55,6 +60,25 @@ def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> st
         of = f" of {boards} boards, taken in turn" if boards > 1 else ""
         parts.append(f"{values} measured value{'s' * (values != 1)}{of}")
     return "; ".join(parts)
+
+
+def _warm(spread: Spread) -> str:
+    """What temperature does to the op-amps."""
+    drift, changes = spread.opamps, []
+    if drift.offset is not None:
+        changes.append(f"offsets by a slope {_about_zero(drift.offset, 'V/K')}")
+    if drift.bias_doubling is not None:
+        changes.append(f"bias currents by a doubling every {quantity(drift.bias_doubling, 'K')}")
+    if drift.limit:
+        changes.append(f"output limits by {quantity(drift.limit, 'V/K')}")
+    for name, slope in (("gain-bandwidth", drift.gain_bandwidth), ("slew rate", drift.slew)):
+        changes += [f"{name} by {_percent(slope)}/K"] if slope else []
+    return ", ".join(changes) or "nothing that the catalogue knows"
+
+
+def _about_zero(law: Distribution, unit: str) -> str:
+    assert isinstance(law, Normal)
+    return f"normal with σ = {quantity(law.sigma, unit)}, cut at {quantity(law.limit, unit)}"
 
 
 def _ageing(spread: Spread) -> str:

@@ -271,7 +271,26 @@ def maps(data: ReportData) -> Table | None:
         "in use": lambda one: _in_use(one, shown),
         "recommended": lambda one: _recommended(one, shown),
     }
-    return table_of(data.study.maps, columns)
+    return table_of([one for one in data.study.maps if one.over != "temperature"], columns)
+
+
+def over_temperature(data: ReportData) -> Table | None:
+    """The share of the boards that keep each response at each temperature."""
+    rows = [one for one in data.study.maps if one.over == "temperature"]
+    if not rows:
+        return None
+
+    def share(index: int) -> Callable[[YieldMap], str]:
+        return lambda one: _share(one.at(index))
+
+    columns: dict[str, Callable[[YieldMap], str]] = {
+        "response": lambda one: words.name(data.checked[data.study.response_indices[one.question]])
+    }
+    columns |= {
+        f"{celsius:g} °C".replace("-", "−"): share(index)
+        for index, celsius in enumerate(rows[0].axes[0].values)
+    }
+    return table_of(rows, columns)
 
 
 def _window(one: YieldMap, shown: Callable[[float, str], str]) -> str:

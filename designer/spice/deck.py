@@ -123,11 +123,13 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
     figures = circuit.figures
     vendor = rung == "full" and figures.spice is not None
     gbw_of = {} if vendor else board.gain_bandwidth
+    slew_of = {} if vendor else board.slew
     loads = {} if vendor or rung != "full" else circuit.output_loads(board.values)
     more = {
         s.name: {
             **(opamp_model.load(rung, loads[s.name]) if s.name in loads else {}),
             **(opamp_model.bandwidth(rung, figures, gbw_of[s.name]) if s.name in gbw_of else {}),
+            **(opamp_model.slew_rate(rung, slew_of[s.name]) if s.name in slew_of else {}),
         }
         for s in circuit.sections
     }

@@ -127,6 +127,11 @@ def bandwidth(rung: Rung, opamp: OpAmp, gbw: float) -> dict[str, float]:
     return parameters
 
 
+def slew_rate(rung: Rung, slew: float) -> dict[str, float]:
+    """Parameter of one op-amp with a slew rate [V/s] of its own."""
+    return {} if rung == "ideal" else {"slew": slew}
+
+
 def load(rung: Rung, ohms: float) -> dict[str, float]:
     """Parameter of one op-amp whose limits are those into this load [ohm]: on ``full``, where they
     move with the current."""

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 from designer.base.errors import InputError, Unreachable
 from designer.base.schema import did_you_mean, one_of
 from designer.base.units import format_quantity
-from designer.catalog.entries import Kind, PartFamily
+from designer.catalog.entries import ROOM, Kind, OpAmp, PartFamily
 from designer.catalog.fields import Figure
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
-from designer.model.distributions import Distribution, Split, Uniform
+from designer.model.distributions import Distribution, Normal, Split, Uniform
 from designer.model.measured_values import MeasuredBoards
 from designer.model.spread_table import DataSheet, PartRule, SpreadShape, check_binned
-from designer.spread.spread import Group, Spread
+from designer.spread.spread import Group, OpAmpDrift, Spread
 
 if TYPE_CHECKING:
     from designer.model.model_file import ModelFile
@@ -102,6 +102,18 @@ def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Sprea
         catalogue sells no such part, measured values that cannot be of this circuit.
     """
     return _Rules(modelfile, circuit, catalog).spread()
+
+
+def warmed(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
+    """The spread of a model file with all boards at ``ROOM``, and with whatever moves them with
+    temperature, whether or not the file states one.
+
+    Raises
+    ------
+    InputError : as ``spread_of``.
+    """
+    room = replace(modelfile.spread, temperature=(ROOM, ROOM))
+    return spread_of(replace(modelfile, spread=room), circuit, catalog)
 
 
 def check_names(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
@@ -198,6 +210,23 @@ class _Rules:
             groups=(*self.networks(), *self.reels()),
             measured=measured,
             wanted_grades=self.wanted_grades,
+            opamps=self.opamp_drift(opamp),
+        )
+
+    def opamp_drift(self, opamp: OpAmp) -> OpAmpDrift:
+        """What the catalogue says of temperature, where the file states one, and of age, where it
+        leaves that to the catalogue."""
+        old = _about_zero(opamp.offset_ageing) if self.rules.ageing == "catalogue" else None
+        if self.rules.temperature is None:
+            return OpAmpDrift(ageing=old)
+        doubling = opamp.bias_doubling
+        return OpAmpDrift(
+            offset=_about_zero(opamp.offset_drift),
+            ageing=old,
+            bias_doubling=None if doubling is None else doubling.nominal,
+            gain_bandwidth=_slope(opamp.gbw_drift),
+            slew=_slope(opamp.slew_drift),
+            limit=_slope(opamp.saturation_drift),
         )
 
     def refuse(self, key: str, value: object, expected: str) -> InputError:
@@ -368,13 +397,18 @@ class _Rules:
         return bought.family
 
     def ageing(self) -> dict[str, Distribution]:
-        """Of the parts that age: resistors and capacitors by the file's figure, or their own."""
+        """Of the parts that age: resistors and capacitors by the file's figure, or their own;
+        references by the catalogue's, where it has one."""
         laws: dict[str, Distribution] = {}
         for name, part in self.parts.items():
             rule = self.own.get(name)
             if rule is not None and rule.ageing is not None:
                 laws[name] = Uniform(*rule.ageing)
-            elif self.rules.ageing is None or isinstance(part, Reference):
+            elif isinstance(part, Reference):
+                drift = self.catalog.reference(part.model).drift
+                if self.rules.ageing == "catalogue" and drift is not None:
+                    laws[name] = Uniform(-drift, drift)
+            elif self.rules.ageing is None:
                 continue
             elif self.rules.ageing == "catalogue":
                 width = self.drift(name, self.family(part, rule, "ageing", "ageing"))
@@ -433,6 +467,15 @@ class _Rules:
 def kind_of(part: Resistor | Capacitor) -> Kind:
     """Its kind in the catalogue."""
     return "resistor" if isinstance(part, Resistor) else "capacitor"
+
+
+def _about_zero(figure: Figure | None) -> Distribution | None:
+    """Of a size of either sign."""
+    return None if figure is None else Normal(*figure.about_zero)
+
+
+def _slope(figure: Figure | None) -> float:
+    return 0.0 if figure is None else figure.nominal
 
 
 def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Distribution | None:

@@ -9,14 +9,15 @@ inside a loop. The boards of a study are those of (seed, sample index) alone
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.entries import OpAmp
+from designer.catalog.entries import LEAST_LEFT, MOST_DOUBLINGS, ROOM, OpAmp
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import Board
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
@@ -26,9 +27,6 @@ from designer.spread import random_streams
 
 NAME = "bench-1"
 SATURATION_SPREAD = 0.05
-ROOM = 25.0
-"""°C at which parts have the values they are sold for."""
-
 NO_BANDWIDTH = (
     "does not enter the yield: the exact circuit and ngspice's rung ideal, on which it is decided, "
     "have no bandwidth (--rung bandwidth has)"
@@ -59,6 +57,28 @@ class Group:
     own."""
     reel: bool = False
     """Whether they are from one reel, and not of one network."""
+
+
+@dataclass(frozen=True)
+class OpAmpDrift:
+    """What temperature and age do to an op-amp's sections; what is None or 0 stays as it is."""
+
+    offset: Distribution | None = None
+    """Change of each section's offset with temperature [V/K]."""
+    ageing: Distribution | None = None
+    """Change of each section's offset with age [V]."""
+    bias_doubling: float | None = None
+    """Warming that doubles the bias current [K]."""
+    gain_bandwidth: float = 0.0
+    """Relative change of the gain-bandwidth with temperature [1/K]."""
+    slew: float = 0.0
+    """Relative change of the slew rate with temperature [1/K]."""
+    limit: float = 0.0
+    """Change of the output limits' size with temperature [V/K]."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """What is stated, as JSON holds it."""
+        return {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
 
 
 @dataclass(frozen=True)
@@ -94,6 +114,8 @@ class Spread:
     """Laws of the deviation over the grade of the parts that have their own, by part."""
     temperature: tuple[float, float] | None = None
     """Range of the board's temperature [°C]."""
+    opamps: OpAmpDrift = OpAmpDrift()
+    """What temperature and age do to the op-amps."""
     tempco: Mapping[str, Distribution] = field(default_factory=dict)
     """Temperature coefficient [1/K] by part; it counts where there is a temperature."""
     ageing: Mapping[str, Distribution] = field(default_factory=dict)
@@ -130,7 +152,9 @@ class Spread:
         return {"name": self.name} | {
             f.name: _plain(getattr(self, f.name))
             for f in dataclasses.fields(self)
-            if f.name != "wanted_grades"  # ``grades`` holds what is drawn
+            # ``grades`` holds what is drawn of the wanted ones. Boards whose op-amps stay as they
+            # are were drawn so before there was a key for it.
+            if f.name not in ("wanted_grades", *(["opamps"] * (self.opamps == OpAmpDrift())))
         }
 
     def with_grades(self, resistor: float | None = None, capacitor: float | None = None) -> Spread:
@@ -153,14 +177,20 @@ class Spread:
             },
         )
 
+    def at_temperature(self, celsius: float) -> Spread:
+        """The same spread with every board at this temperature [°C], for which its parts have
+        temperature coefficients (``part_rules.warmed``)."""
+        return replace(self, temperature=(celsius, celsius))
+
     def coordinates(self, circuit: Circuit) -> tuple[str, ...]:
         """Names of what is drawn for a board of this circuit, in the order of a cube's columns.
 
         A part's own deviation has the part's name; an op-amp section has ``U1A.offset``,
-        ``U1A.low``, ``U1A.high`` and, where they are spread, ``U1A.bias`` and ``U1A.gbw``; then
-        ``R1.tempco``, ``R1.ageing``, ``VCC``, ``VEE``, ``temperature``, and a group's common
-        ``network:1`` or ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them;
-        ``board`` where several were measured. A measured quantity's is that of its tolerance.
+        ``U1A.low``, ``U1A.high`` and, where they are spread, ``U1A.bias``, ``U1A.gbw``,
+        ``U1A.tempco`` and ``U1A.ageing``, the last two of its offset; then ``R1.tempco``,
+        ``R1.ageing``, ``VCC``, ``VEE``, ``temperature``, and a group's common ``network:1`` or
+        ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them; ``board`` where several
+        were measured. A measured quantity's is that of its tolerance.
         """
         parts = _varying(circuit)
         names = [p.name for p in parts]
@@ -168,6 +198,8 @@ class Spread:
             names += [f"{s.name}.{quantity}" for quantity in ("offset", "low", "high")]
             names += [f"{s.name}.bias"] * self._varies(self.bias, f"{s.name}.bias")
             names += [f"{s.name}.gbw"] * self._varies(self.gain_bandwidth, f"{s.name}.gbw")
+            names += [f"{s.name}.tempco"] * (self._drifting is not None)
+            names += [f"{s.name}.ageing"] * (self.opamps.ageing is not None)
         names += [r.name for r in circuit.rails if self._varies(self.supply, r.name)]
         if self.temperature is not None:
             names.append(TEMPERATURE)
@@ -184,8 +216,8 @@ class Spread:
         """N boards of a cube (N, K) of uniform numbers in [0, 1), columns as ``coordinates``.
 
         Every quantity of a board is non-decreasing in its own numbers, the lower output limits and
-        the negative rail by their magnitude; below room temperature a part's value falls with its
-        temperature coefficient's.
+        the negative rail by their magnitude; below room temperature what changes with temperature
+        falls with its coefficient's.
         """
         names = self.coordinates(circuit)
         if cube.ndim != 2 or cube.shape[1] != len(names):
@@ -195,6 +227,11 @@ class Spread:
     def _varies(self, spread: Distribution | float | None, name: str) -> bool:
         """Whether this quantity of a board is drawn or was measured."""
         return bool(spread) or (self.measured is not None and name in self.measured.values)
+
+    @property
+    def _drifting(self) -> Distribution | None:
+        """Of the change of an offset with temperature, where there is one [V/K]."""
+        return None if self.temperature is None else self.opamps.offset
 
     @property
     def _slow(self) -> tuple[tuple[str, Mapping[str, Distribution]], ...]:
@@ -262,27 +299,23 @@ class _Draw:
             self.which = np.minimum((which * boards).astype(np.intp), boards - 1)
 
     def boards(self) -> Boards:
-        c, spread = self.circuit, self.spread
+        c = self.circuit
         sections = [s.name for s in c.sections]
-        offset = Normal(spread.offset_sigma, spread.offset_limit)
         supply = self.supply()
         low, high = self.limits(supply)
         return Boards(
             circuit=c,
             values={p.name: self.value(p, p.value) for p in _passives(c)},
-            offset={s: self.of_section(f"{s}.offset", offset, 0.0) for s in sections},
+            offset={s: self.offset(s) for s in sections},
             low=low,
             high=high,
-            bias={s: self.of_section(f"{s}.bias", spread.bias, c.bias) for s in sections},
+            bias={s: self.bias(s) for s in sections},
             reference={r.name: self.value(r, r.volts) for r in c.references},
             drop={d.name: self.same(d.model.drop) for d in c.diodes},
             supply=supply,
-            gain_bandwidth={
-                s: self.of_section(f"{s}.gbw", spread.gain_bandwidth, c.gain_bandwidth)
-                for s in sections
-                if f"{s}.gbw" in self.u
-            },
+            gain_bandwidth=self.gain_bandwidth(sections),
             inverse_gain=self.same(1.0 / c.gain),
+            slew=self.slew(sections),
         )
 
     def same(self, value: float) -> Array:
@@ -291,6 +324,55 @@ class _Draw:
     def of_section(self, name: str, law: Distribution | None, typical: float) -> Array:
         """(N,) a quantity of each section by itself; the measured value where there is one."""
         return self.or_measured(name, self.same(typical) if law is None else law.ppf(self.u[name]))
+
+    @cached_property
+    def warmer(self) -> Array:
+        """(N,) by how much each board is warmer than ``ROOM`` [K]."""
+        if self.spread.temperature is None:
+            return self.same(0.0)
+        return Uniform(*self.spread.temperature).ppf(self.u[TEMPERATURE]) - ROOM
+
+    def changed(self, slope: float) -> Array:
+        """(N,) what is left of a figure that changes by this share with each kelvin."""
+        return np.maximum(1.0 + slope * self.warmer, LEAST_LEFT)
+
+    def offset(self, section: str) -> Array:
+        """(N,) input offset [V]: as made or measured, aged, at the board's temperature."""
+        spread = self.spread
+        law = Normal(spread.offset_sigma, spread.offset_limit)
+        offset = self.of_section(f"{section}.offset", law, 0.0)
+        for suffix, more, by in (
+            ("ageing", spread.opamps.ageing, 1.0),
+            ("tempco", spread.opamps.offset, self.warmer),
+        ):
+            if more is not None and f"{section}.{suffix}" in self.u:
+                offset = offset + more.ppf(self.u[f"{section}.{suffix}"]) * by
+        return offset
+
+    def bias(self, section: str) -> Array:
+        """(N,) bias current [A] at the board's temperature."""
+        bias = self.of_section(f"{section}.bias", self.spread.bias, self.circuit.bias)
+        doubling = self.spread.opamps.bias_doubling
+        if doubling is None:
+            return bias
+        return bias * np.exp2(np.minimum(self.warmer / doubling, MOST_DOUBLINGS))
+
+    def gain_bandwidth(self, sections: Sequence[str]) -> dict[str, Array]:
+        """By section [Hz], of those of which it is drawn, or changes with temperature."""
+        spread, typical = self.spread, self.circuit.gain_bandwidth
+        slope = spread.opamps.gain_bandwidth if spread.temperature is not None else 0.0
+        return {
+            s: self.of_section(f"{s}.gbw", spread.gain_bandwidth, typical) * self.changed(slope)
+            for s in sections
+            if f"{s}.gbw" in self.u or slope
+        }
+
+    def slew(self, sections: Sequence[str]) -> dict[str, Array]:
+        """By section [V/s], where it changes with temperature."""
+        figures, slope = self.circuit.figures, self.spread.opamps.slew
+        if figures is None or self.spread.temperature is None or not slope:
+            return {}
+        return dict.fromkeys(sections, figures.slew.nominal * self.changed(slope))
 
     def or_measured(self, name: str, values: Array) -> Array:
         """(N,) the measured value, within its tolerance, where there is one; ``values`` else."""
@@ -308,9 +390,8 @@ class _Draw:
         if name in spread.ageing:
             value = value * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
         if spread.temperature is not None and name in spread.tempco:
-            warmer = Uniform(*spread.temperature).ppf(self.u[TEMPERATURE]) - ROOM
             tempco = self.shared(name, ".tempco", spread.tempco[name])
-            value = value * (1.0 + tempco * warmer)
+            value = value * (1.0 + tempco * self.warmer)
         return value
 
     def shared(self, name: str, suffix: str, law: Distribution) -> Array:
@@ -333,7 +414,7 @@ class _Draw:
 
     def limits(self, supply: Mapping[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lowest and highest output of each section: its distance to the rail stays when the rail
-        moves, and no output passes its rail."""
+        moves, and no output passes its rail, whatever the temperature."""
         c = self.circuit
         law = Uniform(-self.spread.saturation, self.spread.saturation)
         exact = self.same(c.supply)
@@ -341,7 +422,9 @@ class _Draw:
 
         def limit(name: str, nominal: float, rail: Array, sign: float) -> Array:
             wanted = nominal * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
-            return self.or_measured(name, sign * np.minimum(wanted, rail))
+            size = sign * self.or_measured(name, sign * np.minimum(wanted, rail))
+            warm = size + self.spread.opamps.limit * self.warmer
+            return sign * np.clip(warm, LEAST_LEFT * size, np.maximum(size, rail))
 
         nominal = c.output_limits()
         low = {name: limit(f"{name}.low", v, below, -1.0) for name, v in nominal.items()}

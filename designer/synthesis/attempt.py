@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -78,6 +79,8 @@ class Order:
     """For each the largest of its amplitudes, over that at the model's clearance."""
     drive_force: float = 1.0
     """``least_drive`` of the wanted responses."""
+    temperatures: tuple[float, float] | None = None
+    """``Catalog.temperatures``."""
     aims: Aims = NO_AIMS
     """What is aimed at inside the side conditions."""
 
@@ -132,8 +135,14 @@ class Order:
             drives=tuple(drive_resistors(unit, k) for k in range(len(unit.generators))),
             largest=largest,
             drive_force=drive_force,
+            temperatures=catalog.temperatures,
             aims=aims,
         )
+
+    @cached_property
+    def bounds(self) -> OpAmp:
+        """The op-amp with the bounds that hold at every temperature of the boards."""
+        return self.opamp.over(self.temperatures)
 
     @property
     def stiffness(self) -> str:

@@ -347,7 +347,7 @@ class _Search:
     def _limits(self, conditions: frozenset[str]) -> ConditionLimits:
         o = self.order
         unit = o.model.second_order().own_frequency
-        return limits(o.spec, conditions, o.opamp, o.output.limit, o.peaks.fastest, o.aims, unit)
+        return limits(o.spec, conditions, o.bounds, o.output.limit, o.peaks.fastest, o.aims, unit)
 
     def _rounds(self, conditions: frozenset[str], *, slower: bool) -> _Verified | _Missed:
         """Search, verify, tighten what is not kept, and again."""
@@ -527,7 +527,8 @@ def verified(
         board = nominal_reduction(design)
         loads = output_loads.design_loads(design, board, responses)
     amplitudes = design.largest_amplitudes(responses)
-    checks = side_conditions.verify(design, conditions, order.opamp, order.peaks, amplitudes, loads)
+    bounds = order.bounds
+    checks = side_conditions.verify(design, conditions, bounds, order.peaks, amplitudes, loads)
     _tell(design, checks)
     low, high = order.spec.frequency
     numbers = {"frequency_low_hz": low, "frequency_high_hz": high}

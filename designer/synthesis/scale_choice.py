@@ -221,7 +221,7 @@ class ScaleChoice:
         above 0 they are too large."""
         order, rule = self.order, BY_ID["offset-force"]
         assert rule.limit is not None
-        limit = largest_offset(order.opamp)
+        limit = largest_offset(order.bounds)
         at = forces(circuit, order.model.second_order(), volts, order.drive_force)
         each = [np.hypot.reduce(list(offset_forces(shifts, limit).values())) for shifts in at]
         return float(np.log(max(each) / rule.limit))

@@ -335,7 +335,7 @@ class _Maker:
             self._keep(one - other, ratio)
             self._keep(other - one, ratio)
         if "level" in self.within.conditions:
-            least = LEAST_SIGNAL * self.order.opamp.offset_limit
+            least = LEAST_SIGNAL * self.order.bounds.offset_limit
             self._keep(
                 levels[own], StatedLimit("level", "peak at the clearance", least, "V", least=True)
             )
@@ -621,7 +621,7 @@ class _Maker:
             yield ExponentialSum(tuple(-log + float(np.log(LOAD)) for log in loads), limit)
         node = section.inverting
         at = [r for r in there if node in r.nets]
-        hertz = bandwidth_limit(self.order.opamp)
+        hertz = bandwidth_limit(self.order.bounds)
         product = StatedLimit("bandwidth", f"noise gain times frequency of {where}", hertz, "Hz")
         most = -float(np.log(hertz))
         store = [c for c in circuit.capacitors if node in c.nets]

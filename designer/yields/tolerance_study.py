@@ -28,7 +28,8 @@ from designer.model.model_file import need_responses
 from designer.model.tuning_bands import Bands
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
-from designer.spread.spread import NO_BANDWIDTH
+from designer.spread.part_rules import warmed
+from designer.spread.spread import NO_BANDWIDTH, Spread
 from designer.verdicts import cross_check
 from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
 from designer.verdicts.rung_gate import gated
@@ -44,6 +45,7 @@ from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study, plan_study
+from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
 from designer.yields.tuned_yield import tuned_block
 from designer.yields.yield_maps import yield_map
@@ -177,6 +179,9 @@ def tolerance(
     worked out.
     """
     need_responses(synthesis.modelfile)
+    warm = None
+    if "temperature" in maps:
+        warm = warmed(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     at_least("--samples", samples, 1)
@@ -247,7 +252,7 @@ def tolerance(
         study = work.blamed(study)
     if rare:
         study = work.drawn_where_lost(study)
-    return work.mapped(study, maps) if maps else study
+    return work.mapped(study, maps, warm) if maps else study
 
 
 def _why_not(checked: CheckedResponse) -> str:
@@ -403,17 +408,25 @@ class StudyWork:
             found.append(result)
         return replace(study, rare=tuple(found))
 
-    def mapped(self, study: Study, overs: Sequence[Over]) -> Study:
-        """With a yield map of each response over each of these settings."""
+    def mapped(self, study: Study, overs: Sequence[Over], warm: Spread | None = None) -> Study:
+        """With a yield map of each response over each of these settings.
+
+        warm : ``warmed`` of ``yield_map``.
+        """
         maps, parts = [], self.stores.maps(study.plan)
         for over in overs:
             for number, index in enumerate(study.response_indices):
                 b = study.checked[index].model.b
                 name = f"map {over} {number} {b!r}"
+                if over == "temperature":  # what moves boards is not part of the plan
+                    assert warm is not None
+                    name += f" {study_hash(replace(study.plan, spread=warm))}"
                 result = parts.get(name)
                 if result is None:
                     step = self.progress.stage(f"yield map over {over}, response {index + 1}")
-                    result = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                    result = yield_map(
+                        study.plan, number, over, b, warmed=warm, jobs=self.jobs, progress=step
+                    )
                     parts.put({name: replace(result, seconds=0.0)})
                 maps.append(result)
         return replace(study, maps=tuple(maps))

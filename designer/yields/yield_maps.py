@@ -1,8 +1,9 @@
-"""Yield over ω, over b, over the parts' grade, and over ω × grade: where to sit in a window.
+"""Yield over ω, b, the parts' grade, ω × grade, and temperature: where to sit in a window, and what
+becomes of boards that get warm.
 
 At each point the nominal circuit's wanted orbit is continued from the neighbouring point; where the
 nominal circuit does not show the response, the yield is 0 and the point is marked as not there. The
-same boards are asked at every point (and, over the grade, the same uniform numbers), so that
+same boards are asked at every point (over grade and temperature the same uniform numbers), so that
 neighbours differ by their setting and not by the draw. Over b the threshold stays and the
 generator's amplitude goes as 1/b.
 """
@@ -20,22 +21,27 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.defaults import OVERS, Over
 from designer.base.errors import InputError
+from designer.catalog.entries import ROOM
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
-from designer.spread.spread import draw_many
+from designer.spread.spread import Spread, draw_many
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.yield_count import Yield
 
 Counts = NDArray[np.int64]
 
+SET: tuple[Over, ...] = ("omega", "b", "omega-grade")
+"""What the generator is set to along the first axis; the nominal circuit has a window there."""
 POINTS = 17
 """Of ω or b across a window; the setting in use is one more."""
 SAMPLES = 100
 GRADES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
 """Of resistors and capacitors alike."""
+TEMPERATURES = (-20.0, 0.0, 25.0, 40.0, 55.0, 70.0, 85.0)
+"""°C of all boards of a point."""
 PACE, LARGEST_PACE = 0.0025, 0.01
 """Relative: first and largest step of the search for the window's edges."""
 REACH = 0.3
@@ -56,7 +62,8 @@ class Axis:
     """An axis of a yield map."""
 
     name: str
-    """What is varied: "omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
+    """What is varied: "omega", "b", "grade" (a fraction, of resistors and capacitors) or
+    "temperature" (of the boards, in °C)."""
     values: tuple[float, ...]
     """Values of the setting along the axis."""
 
@@ -86,9 +93,10 @@ class YieldMap:
     seed: int
     """Seed that the boards were drawn with."""
     used: float
-    """The setting of the plan, in the first axis's unit."""
+    """The setting of the plan, in the first axis's unit; over the temperature 25 °C."""
     window: tuple[float, float] | None
-    """Edges of the nominal circuit's window in the first axis's unit; None over the grade."""
+    """Edges of the nominal circuit's window in the first axis's unit; None over grade and
+    temperature."""
     open: tuple[bool, bool]
     """Whether the lower and the upper edge of the window lie at the reach of the search."""
     attractors: int
@@ -120,7 +128,7 @@ class YieldMap:
     @property
     def recommended(self) -> tuple[float, ...] | None:
         """The setting in use if none is better, else the best one, on every axis; None where no
-        board is ok anywhere.
+        board is ok anywhere, and over the temperature, which nobody sets.
 
         The best has the interval with the highest lower end; a setting whose interval overlaps it
         is as good. Of the rows of such neighbours that hold a best one, the middle of the longest.
@@ -128,7 +136,7 @@ class YieldMap:
         circuit shows the response there.
         """
         counts = self.there & (self.ok > 0)
-        if not counts.any():
+        if not counts.any() or self.over == "temperature":
             return None
         low, high = (np.where(counts, end, -1.0) for end in (self.low, self.high))
         best = float(low.max())
@@ -187,6 +195,8 @@ def yield_map(
     *,
     values: Sequence[float] | None = None,
     grades: Sequence[float] = GRADES,
+    temperatures: Sequence[float] = TEMPERATURES,
+    warmed: Spread | None = None,
     samples: int = SAMPLES,
     points: int = POINTS,
     quick: bool = False,
@@ -196,10 +206,11 @@ def yield_map(
     """The yield of question ``number`` of the plan over one or two settings.
 
     b : the clearance that the question's amplitude stands for. values : of ω or b; by default
-    ``points`` across the nominal circuit's window and the setting in use. samples : boards at each
-    point. quick : a forecast: the boards that ``Ensemble.quick`` leaves open at a setting are lost
-    if none of the first few of them (``DOUBTED``) shows the response once it is settled.
-    progress : called once an attractor.
+    ``points`` across the nominal circuit's window and the setting in use. temperatures : [°C].
+    warmed : the plan's spread with what moves its boards with temperature (``part_rules.warmed``);
+    needed over it. samples : boards at each point. quick : a forecast: the boards that
+    ``Ensemble.quick`` leaves open at a setting are lost if none of the first few of them
+    (``DOUBTED``) shows the response once it is settled. progress : called once an attractor.
 
     Raises
     ------
@@ -220,16 +231,20 @@ def yield_map(
     window: tuple[float, float] | None = None
     open_ = (False, False)
     settings = [used]
-    if over != "grade" and values is not None:
+    if over in SET and values is not None:
         settings = sorted(set(map(float, values)))
-    elif over != "grade":
+    elif over in SET:
         window, open_ = nominal.window()
         settings = sorted({used, *np.linspace(*window, points).tolist()})
     orbits = nominal.orbits(settings)
-    columns: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
-    counts = {name: np.zeros((len(settings), len(columns)), dtype=np.int64) for name in _COUNTS}
-    for column, grade in enumerate(columns):
-        spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
+    spreads: tuple[Spread, ...] = (plan.spread,)
+    if "grade" in over:
+        spreads = tuple(plan.spread.with_grades(resistor=g, capacitor=g) for g in grades)
+    elif over == "temperature":
+        assert warmed is not None
+        spreads = tuple(map(warmed.at_temperature, temperatures))
+    counts = {name: np.zeros((len(settings), len(spreads)), dtype=np.int64) for name in _COUNTS}
+    for column, spread in enumerate(spreads):
         drawn = draw_many(plan.circuit, spread, seed, range(samples))
         ensemble = Ensemble(plan.modelled(drawn))
         tasks = [
@@ -242,10 +257,11 @@ def yield_map(
         for task, verdict in zip(tasks, verdicts, strict=True):
             counts[str(verdict or Verdict.LOST)][task.setting, column] += 1
         nominal.spent += len(tasks)
-    axes = [] if over == "grade" else [Axis("b" if over == "b" else "omega", tuple(settings))]
+    axes = [Axis("b" if over == "b" else "omega", tuple(settings))] if over in SET else []
     axes += [Axis("grade", tuple(grades))] if "grade" in over else []
+    axes += [Axis("temperature", tuple(temperatures))] if over == "temperature" else []
     size = tuple(len(axis.values) for axis in axes)
-    there = np.tile(np.array([[orbit is not None] for orbit in orbits]), (1, len(columns)))
+    there = np.tile(np.array([[orbit is not None] for orbit in orbits]), (1, len(spreads)))
     return YieldMap(
         over=over,
         question=number,
@@ -254,7 +270,7 @@ def yield_map(
         **{name: counts[name].reshape(size) for name in _COUNTS},
         samples=samples,
         seed=seed,
-        used=used,
+        used=ROOM if over == "temperature" else used,
         window=window,
         open=open_,
         attractors=nominal.spent,

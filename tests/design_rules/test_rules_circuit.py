@@ -32,7 +32,16 @@ from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit, exact_values
 from tests.shared.oracles import linear_matrix
-from tests.shared.rule_cases import PAIRS, TEXT, base, bent, subject_of, with_circuit, with_part
+from tests.shared.rule_cases import (
+    PAIRS,
+    TEXT,
+    base,
+    bent,
+    subject_of,
+    warm,
+    with_circuit,
+    with_part,
+)
 from tests.shared.stages import bought, model, one_sided, rectifier, stage
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -58,6 +67,24 @@ def test_the_design_that_pairs_start_from_keeps_every_rule() -> None:
     left = {o.rule.id for o in found if o.status != PASS}
     assert left == {"far-slope"}, "no law of the paper falls"
     assert [o.rule.id for o in found] == list(run_rules.LOOKS)
+
+
+@pytest.mark.parametrize("id_", ["swing", "slew", "gain-bandwidth", "offset-force", "bias-force"])
+def test_rules_on_op_amps_hold_at_the_extremes_of_temperature(id_: str) -> None:
+    """Their limits and errors are those of the data sheet moved to the worse end."""
+    cool, hot = (run_rules.look(id_, subject) for subject in (base(), warm(70.0)))
+    rises = {
+        "offset-force": (10e-3 + 45.0 * 54e-6) / 10e-3,
+        "bias-force": 2.0**4.5,
+        "slew": 1.0 / (1.0 - 45e-3),
+    }
+    if id_ in rises:
+        assert hot.value == pytest.approx(cool.value * rises[id_], rel=1e-6)
+        assert "from 25 to 70 °C" in hot.found
+    elif id_ == "gain-bandwidth":
+        assert hot.limit == pytest.approx(cool.limit * (1.0 - 0.09), rel=1e-9)
+    else:  # the swing of a warm TL074C is no smaller
+        assert hot.limit == pytest.approx(cool.limit)
 
 
 ANY = TEXT.replace('expect = "1-1-1"\n', "").replace('dead_zone = "rectifier"\n', "")

@@ -101,6 +101,13 @@ def with_components(change: Callable[[Component], Component]) -> RuleSubject:
     return changed
 
 
+def warm(celsius: float) -> RuleSubject:
+    """The same design on boards from 25 °C to this temperature."""
+    made = base().synthesis
+    catalog = made.catalog.at((25.0, celsius))
+    return RuleSubject(replace(made, catalog=catalog), base().circuit, base().components)
+
+
 def with_figure(name: str, **bounds: float | None) -> RuleSubject:
     """The same design with another figure of the op-amp."""
     circuit = base().circuit
@@ -388,6 +395,10 @@ PAIRS: dict[str, tuple[Look, Look]] = {
     "reference-current": (
         lambda: look("reference-current", _needing(1.001 * value("reference-current"))),
         lambda: look("reference-current", _needing(0.999 * value("reference-current"))),
+    ),
+    "temperature": (
+        lambda: look("temperature", warm(70.02)),
+        lambda: look("temperature", warm(70.0)),
     ),
     "slew": (
         lambda: look("slew", with_figure("slew", min=8e6 * value("slew") / 0.201)),

@@ -19,9 +19,10 @@ from designer.dynamics.attractors import settle, starts
 from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
+from designer.model.distributions import Normal
 from designer.model.response_table import Response
 from designer.plots.map_plots import map_chart, map_files
-from designer.spread.spread import Spread, draw
+from designer.spread.spread import OpAmpDrift, Spread, draw
 from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
 from designer.yields import yield_maps
 from designer.yields.yield_maps import SEED_SHIFT, Axis, YieldMap, yield_map
@@ -181,6 +182,26 @@ def test_over_the_grade_the_same_numbers_are_drawn() -> None:
     both = yield_map(study, 0, "omega-grade", B, values=[0.85], grades=(1e-6, 0.01), samples=6)
     assert both.ok.shape == (1, 2)
     assert (both.ok[0] == found.ok).all()
+
+
+def test_over_the_temperature_the_same_boards_get_warm() -> None:
+    """Point by point what a plan of boards at that temperature says, with the same numbers; warm
+    boards of a limit that falls steeply lose the response, and nothing is recommended."""
+    study = plan()
+    falling = OpAmpDrift(offset=Normal(1e-5, 3e-5), bias_doubling=10.0, limit=-0.05)
+    warm = replace(study.spread, temperature=(25.0, 25.0), opamps=falling)
+    points = (25.0, 60.0, 150.0)
+    found = yield_map(study, 0, "temperature", B, temperatures=points, warmed=warm, samples=6)
+    assert found.axes == (Axis("temperature", points),)
+    assert found.used == 25.0
+    assert found.recommended is None
+    for i, celsius in enumerate(points):
+        here = replace(study, spread=replace(warm, temperature=(celsius, celsius)))
+        same = yield_map(here, 0, "omega", B, values=[study.questions[0].spec.omega], samples=6)  # type: ignore[list-item]
+        assert found.at(i) == same.at(0)
+    assert found.ok[0] > found.ok[2]
+    figure = map_chart("ω = 0.85", found)
+    assert figure.axes[0].get_xlabel() == "temperature of the boards [°C]"
 
 
 def test_the_recommended_setting_is_the_one_in_use_unless_another_is_better() -> None:
