@@ -16,6 +16,7 @@ import json
 import math
 import stat
 import struct
+import tokenize
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,6 +40,7 @@ UNREADABLE = (
     zlib.error,
     struct.error,
     csv.Error,
+    tokenize.TokenError,  # of NumPy, on the header of an array
 )
 """What Python and its libraries raise on files that are not what they ought to be."""
 MOST_DIGITS = 300
@@ -167,7 +169,7 @@ def reason(error: BaseException) -> str:
         return "a size that does not fit into memory"
     if isinstance(error, KeyError):
         return f"no {error.args[0]!r}" if error.args else "a name that is missing"
-    text = str(error)
+    text = "" if isinstance(error, tokenize.TokenError) else str(error)
     if "integer string conversion" in text:
         return "a number of too many digits"
     return text or type(error).__name__

@@ -24,7 +24,8 @@ _PREFIX_OF = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: 
 _MICRO = str.maketrans({"µ": "u", "μ": "u"})
 _OHM = "Ω"
 _OHMS = ("Ω", "\N{OHM SIGN}", "ohms", "ohm", "Ohms", "Ohm", "R")
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+# Digits are not given back: of a long text that is no number each part would be tried again.
+_NUMBER = r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d{1,3})?"
 _PREFIXED = re.compile(rf"({_NUMBER})\s*([fpnumkKMGT]?)", re.ASCII)
 _INFIX = re.compile(r"([+-]?\d+)([fpnumkKMGTR])(\d+)", re.ASCII)
 ACCELERATIONS = {"g": 9.80665, "m/s²": 1.0}

@@ -23,7 +23,8 @@ lists and 20,000 words; each takes up to 400 bytes here."""
 LARGEST = 1e9
 """Size of a number: KiCad's own lengths are below 2147 mm. Squares and products stay finite."""
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# Digits are not given back: of a long word that is no number each part would be tried again.
+_NUMBER = re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?", re.ASCII)
 _TOKEN = re.compile(
     r'^[^\S\n]*\#[^\n]*|\s*\n|[^\S\n]+|(\()|(\))|"((?:[^"\\]++|\\.)*+)"|([^\s()"]+)|(")',
     re.DOTALL | re.MULTILINE,

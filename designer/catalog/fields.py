@@ -141,7 +141,8 @@ def per_kelvin() -> Accepts:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError
         if isinstance(value, str):
-            stated = pattern.fullmatch(value.strip())
+            # One space for many: the pattern would try each of them in three places.
+            stated = pattern.fullmatch(" ".join(value.split()))
             if stated is None:
                 raise ValueError
             value = stated[1] + ("u" if stated[2] else "")

@@ -159,8 +159,13 @@ def _check_gap(gap: Gap) -> None:
         _refuse(f"{field}.upper", text, f"upper + lower > 0; {more}")
     if gap.preload_over is not None and not gap.preload:
         _refuse(f"{field}.preload_over", gap.preload_over, "none without a preload, which rises")
+    _check_stiffness(gap, field)
     if gap.restitution is not None:
         _check_restitution(gap, f"{field}.restitution")
+
+
+def _check_stiffness(gap: Gap, field: str) -> None:
+    """What its stops are made of: stiffnesses, or a constant and a depth."""
     if gap.law == "hertz":
         for key in ("constant", "depth"):
             if getattr(gap, key) is None:
@@ -352,7 +357,8 @@ def check_damped(state_matrix: Array) -> None:
     InputError : a mode has no damping.
     """
     rates = np.linalg.eigvals(state_matrix)
-    slowest = rates[np.argmax(rates.real / np.abs(rates))]
+    sizes = np.abs(rates)  # one that is lost in the rounding of a far larger one is 0
+    slowest = rates[np.argmax(np.divide(rates.real, sizes, out=0.0 * sizes, where=sizes > 0.0))]
     if not -slowest.real > UNDAMPED * abs(slowest):
         text = f"none that slows the motion at {abs(slowest.imag):.4g} rad per unit of time"
         expected = "a [[damper]] for it: without one no steady response is reached"

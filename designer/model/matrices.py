@@ -8,6 +8,7 @@ then says everything.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +18,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.guarded_reading import inside, reason
+from designer.base.guarded_reading import UNREADABLE, inside, reason
 from designer.base.schema import Accepts, FileTable
+from designer.base.units import parse_quantity
 from designer.model.element_keys import NAME
 
 Rows = tuple[tuple[float, ...], ...]
@@ -51,6 +53,8 @@ def _rows(*, diagonal: bool = False) -> Accepts:
     def check(value: object) -> Rows:
         if not isinstance(value, list) or not value:
             raise ValueError
+        if len(value) > LARGEST:  # before a diagonal is filled up
+            raise ValueError(f"at most {LARGEST} rows")
         flat = diagonal and not any(isinstance(row, list) for row in value)
         size = range(len(value))
         rows = (
@@ -61,9 +65,7 @@ def _rows(*, diagonal: bool = False) -> Accepts:
         for entry in (entry for row in rows for entry in row):
             if isinstance(entry, bool) or not isinstance(entry, int | float):
                 raise ValueError("numbers, in the file's own units")
-            if not np.isfinite(entry):
-                raise ValueError
-        return tuple(tuple(float(entry) for entry in row) for row in rows)
+        return tuple(tuple(parse_quantity(entry, "") for entry in row) for row in rows)
 
     row = {"type": "array", "items": {"type": "number"}}
     items = {"anyOf": [row, {"type": "number"}]} if diagonal else row
@@ -177,12 +179,15 @@ def _read(folder: Path, name: str, field: str) -> Array:
     expected = f"a NumPy file (.npy) of a matrix of numbers, at most {LARGEST} by {LARGEST}"
     path = inside(folder, name, field)
     try:
-        # Mapped, so that a file with a huge array is not read before its shape is seen.
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        with warnings.catch_warnings():  # of headers that Python 2 wrote, or damage made
+            warnings.simplefilter("ignore")
+            # Mapped, so that a file with a huge array is not read before its shape is seen.
+            array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except UNREADABLE as error:
         raise InputError(None, field, f"{name}, {reason(error)}", expected) from None
     shape = getattr(array, "shape", ())
     if not 1 <= len(shape) <= 2 or max(shape, default=0) > LARGEST or array.dtype.kind not in "fiu":
         what = f"{name} with an array of shape {shape}" if shape else f"{name} without a matrix"
         raise InputError(None, field, what, expected)
-    return np.array(array, dtype=float)
+    with np.errstate(all="ignore"):  # what is no finite number then is refused as an entry
+        return np.array(array, dtype=float)

@@ -114,6 +114,8 @@ def _shape(header: dict[str, Any]) -> tuple[int, ...]:
 def _dtype(descr: Any) -> np.dtype[Any]:
     """Of numbers, or of named fields that are numbers."""
     fields = [("", descr)] if isinstance(descr, str) else [(name, kind) for name, kind in descr]
+    if not fields:
+        raise ValueError("values without fields")
     for name, kind in fields:
         if not isinstance(name, str) or not isinstance(kind, str) or not KIND.fullmatch(kind):
             raise ValueError(f"values of type {kind!r}")

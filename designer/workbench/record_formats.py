@@ -22,6 +22,8 @@ FEWEST_SAMPLES, MOST_SAMPLES = 100, 1 << 21
 """Fewer show no motion; more tell nothing that these do not."""
 MOST_CHANNELS = 16
 """Of an oscilloscope."""
+LONGEST_NAME = 200
+"""Characters of a column's name in a text; the rest is left out."""
 MOST_VOLTS, MOST_SECONDS = 1e6, 1e9
 """What a probe is put to, and how long one waits for a record."""
 STEPS = (1e-12, 1e3)
@@ -196,7 +198,7 @@ def _words(columns: TextColumns) -> tuple[list[str], list[str]]:
     width = len(columns.places)
     names, units = [""] * width, [""] * width
     for cells in columns.header:
-        row = [cells[k] if k < len(cells) else "" for k in columns.places]
+        row = [cells[k][:LONGEST_NAME] if k < len(cells) else "" for k in columns.places]
         if not all(row) or any(NUMBER.fullmatch(cell) for cell in row[:1]):
             continue
         if _bare(row[0]) in UNITS:
@@ -205,7 +207,8 @@ def _words(columns: TextColumns) -> tuple[list[str], list[str]]:
             names = row
     source = next((c[1:] for c in columns.header if c[:1] and c[0].lower() == "source"), ())
     if source and (not any(names) or names[0].lower() == "source"):
-        channels = [cell for cell in source if cell and not NUMBER.fullmatch(cell)]
+        named = (cell[:LONGEST_NAME] for cell in source)
+        channels = [cell for cell in named if cell and not NUMBER.fullmatch(cell)]
         names = ["", *channels, *([""] * width)][:width]
     return names, units
 

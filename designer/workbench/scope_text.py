@@ -46,7 +46,8 @@ MIDDLE = 1 << 13
 FEWEST_LINES = 5
 """Lines of numbers that follow each other where a header has ended."""
 EXPECTED = "a record of an oscilloscope: a column of times and columns of volts"
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+# Digits are not given back: of a long cell that is no number each part would be tried again.
+NUMBER = re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)(e[+-]?\d++)?", re.IGNORECASE | re.ASCII)
 COMMAS = str.maketrans({",": ".", ".": ","})
 """Turns decimal commas into points, so that a point there makes no number."""
 OVERRANGE = re.compile(r"[+-]?(∞|inf(inity)?)", re.IGNORECASE)
