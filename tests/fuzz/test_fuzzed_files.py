@@ -1,0 +1,395 @@
+"""Every reader of files on many damaged ones: each is read, or refused by name in plain words.
+
+``tests/folders/test_readers.py`` has a few accidents of bytes for each reader. Here values, keys,
+rows and words are swapped too, and what once went wrong stands by itself.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import tomllib
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
+
+from designer.base.errors import InputError
+from designer.base.manifest import MANIFEST, read_manifest
+from designer.base.printed import printable
+from designer.board.bom_layouts import layouts
+from designer.board.kicad_reader import read_board
+from designer.board.sexpr import read
+from designer.catalog.fab import fabs
+from designer.catalog.read import FABS, LAYOUTS, read_catalog_file
+from designer.catalog.stock_list import stock_rows
+from designer.catalog.vendor_model import read_vendor_model
+from designer.jobs.template import SECOND, TEXT
+from designer.model.measured_values import read_measured
+from designer.model.model_file import read_model_file
+from designer.routing.board_copper import read_copper
+from designer.routing.specctra import with_session
+from designer.workbench.record_formats import read_record
+from tests.catalog.test_catalog import CSV
+from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
+from tests.folders.test_readers import BOARD, MANIFEST_TEXT, MEASURED
+from tests.shared.damaged import cells_swapped, damaged, json_of, lists_swapped, swapped, toml_of
+
+ROOT = Path(__file__).resolve().parents[2]
+CATALOGS = ROOT / "catalogs"
+Make = Callable[[Random], bytes]
+EASY = list(HealthCheck)
+
+MATRICES = """format = 2
+[matrices]
+names = ["middle", "tip"]
+mass = [1.0, 0.5]
+stiffness = [[16.0, -5.0], [-5.0, 2.0]]
+damping = [[0.16, -0.05], [-0.05, 0.02]]
+[[clearance]]
+name = "A"
+of = { tip = 1.0, middle = -0.4 }
+upper = 0.2
+lower = 0.2
+stiffness = 20.0
+[[force]]
+on = "tip"
+amplitude = 1.0
+harmonics = [[2, 0.3, 0.1]]
+[spread]
+resistors = { law = "binned", inner = 0.002 }
+temperature = [0, 50]
+[rules.offset-force]
+limit = 0.5
+reason = "why"
+"""
+NAMED = MATRICES.replace("mass = [1.0, 0.5]", 'mass = "it.npy"')
+SESSION = """(session board (base_design board) (placement (resolution um 10)) (was_is)
+  (routes (resolution um 10) (parser) (network_out
+    (net "/v1" (wire (path F.Cu 2500 0 0 10000 -5000 20000 0)) (via "Via" 10000 -5000)))))
+"""
+STOCK = """part_number,kind,value,case,grade,distributor,number,price_eur,from_pieces,date,source
+RC0603FR-0722K1L,,,,,LCSC,C1,0.001,100,2025-01-31,a page
+,resistor,22.1k,0603,0.01,LCSC,C2,,,2025-01-31,a page
+,capacitor,100n,0603,0.05,LCSC,C3,0.01,,2025-01-31,a page
+"""
+TIMES = np.arange(150) * 1e-4
+WAVE = np.sin(TIMES * 600.0)
+
+
+def scope_text(between: str = ",") -> str:
+    rows = (f"{t:.6f}{between}{v:.4f}" for t, v in zip(TIMES, WAVE, strict=True))
+    return "\n".join([f"Time(s){between}CH1(V)", *rows, ""])
+
+
+SCOPE = scope_text()
+
+
+def npy(values: Any) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, values)
+    return stream.getvalue()
+
+
+def npz(**arrays: Any) -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    return stream.getvalue()
+
+
+def headed(header: str, data: bytes = b"\0" * 64) -> bytes:
+    """An ``.npy`` with any header."""
+    return b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + data
+
+
+def small_tables() -> list[dict[str, Any]]:
+    """A table of each kind in the catalogue, each as a file of its own."""
+    files = (tomllib.loads(p.read_text("utf-8")) for p in sorted(CATALOGS.glob("*.toml")))
+    named = ((key, value) for data in files for key, value in data.items())
+    return [{"format": 1, key: value[:1]} for key, value in named if isinstance(value, list)]
+
+
+def parsed(folder: str) -> list[dict[str, Any]]:
+    return [tomllib.loads(p.read_text("utf-8")) for p in sorted(CATALOGS.glob(f"{folder}/*.toml"))]
+
+
+MODELS = [p.read_text("utf-8") for p in sorted((ROOT / "examples").glob("*.toml"))]
+MODELS += [TEXT, SECOND, MATRICES]
+TREES = read(BOARD), read(SESSION)
+
+
+def of_toml(tables: list[dict[str, Any]]) -> Make:
+    return lambda dice: encoded(toml_of(swapped(dice.choice(tables), dice, moments=True)))
+
+
+def of_bytes(*contents: str | bytes) -> Make:
+    raw = [c if isinstance(c, bytes) else encoded(c) for c in contents]
+    return lambda dice: damaged(dice.choice(raw), dice)
+
+
+def of_cells(text: str, between: str = ",") -> Make:
+    return lambda dice: encoded(cells_swapped(text, dice, between))
+
+
+def encoded(text: str) -> bytes:
+    return text.encode("utf-8", "surrogatepass")
+
+
+def model(path: Path) -> object:
+    return read_model_file(path).model.second_order()
+
+
+def matrix_file(path: Path) -> object:
+    (path.parent / "model.toml").write_text(NAMED)
+    return model(path.parent / "model.toml")
+
+
+def fab(path: Path) -> object:
+    return fabs([path.stem], [path.parent.parent])
+
+
+def layout(path: Path) -> object:
+    return layouts([path.stem], [path.parent.parent])
+
+
+def vendor(path: Path) -> object:
+    return read_vendor_model(path.name, "part", ORDER, path.parent)
+
+
+def board(path: Path) -> object:
+    return read_copper(read(read_board(path).text, path))
+
+
+def session(path: Path) -> object:
+    return read_copper(read(with_session(BOARD, path)))
+
+
+@dataclass(frozen=True)
+class Fuzzed:
+    """A reader, and what makes the files that it is given."""
+
+    file: str
+    """Name of the file, below the folder of a test."""
+    read: Callable[[Path], object]
+    make: Make
+    slow: int = 5000
+    """Files of the long test; the short one has a hundredth."""
+
+
+FUZZED: Mapping[str, Fuzzed] = {
+    "model file, bytes": Fuzzed("it.toml", model, of_bytes(*MODELS), 8000),
+    "model file, values": Fuzzed("it.toml", model, of_toml([*map(tomllib.loads, MODELS)]), 8000),
+    "matrix": Fuzzed("it.npy", matrix_file, of_bytes(npy([1.0, 0.5]), npy(np.eye(2)))),
+    "catalogue, bytes": Fuzzed(
+        "it.toml", read_catalog_file, of_bytes(*map(toml_of, small_tables()))
+    ),
+    "catalogue, values": Fuzzed("it.toml", read_catalog_file, of_toml(small_tables()), 9000),
+    "catalogue, cells": Fuzzed("it.csv", read_catalog_file, of_cells(CSV)),
+    "stock list, bytes": Fuzzed("it.csv", stock_rows, of_bytes(STOCK)),
+    "stock list, cells": Fuzzed("it.csv", stock_rows, of_cells(STOCK)),
+    "fab": Fuzzed(f"{FABS}/it.toml", fab, of_toml(parsed(FABS)), 3000),
+    "layout": Fuzzed(f"{LAYOUTS}/it.toml", layout, of_toml(parsed(LAYOUTS)), 3000),
+    "vendor model, bytes": Fuzzed("it.lib", vendor, of_bytes(VENDOR.encode("latin-1"))),
+    "vendor model, words": Fuzzed("it.lib", vendor, of_cells(VENDOR, " ")),
+    "measured values, bytes": Fuzzed("it.csv", read_measured, of_bytes(MEASURED)),
+    "measured values, cells": Fuzzed("it.csv", read_measured, of_cells(MEASURED)),
+    "board, bytes": Fuzzed("it.kicad_pcb", board, of_bytes(BOARD)),
+    "board, lists": Fuzzed(
+        "it.kicad_pcb", board, lambda dice: encoded(lists_swapped(TREES[0], dice))
+    ),
+    "session, bytes": Fuzzed("it.ses", session, of_bytes(SESSION), 2000),
+    "session, lists": Fuzzed(
+        "it.ses", session, lambda dice: encoded(lists_swapped(TREES[1], dice)), 2000
+    ),
+    "manifest": Fuzzed(
+        MANIFEST,
+        lambda path: read_manifest(path.parent),
+        lambda dice: json_of(swapped(json.loads(MANIFEST_TEXT), dice)),
+    ),
+    "record, bytes": Fuzzed("it.csv", read_record, of_bytes(SCOPE, scope_text(";")), 1500),
+    "record, cells": Fuzzed("it.csv", read_record, of_cells(SCOPE), 1500),
+    "record, array": Fuzzed(
+        "it.npy", read_record, of_bytes(npy(np.column_stack([TIMES, WAVE]))), 1000
+    ),
+    "record, archive": Fuzzed("it.npz", read_record, of_bytes(npz(time=TIMES, v1=WAVE)), 1000),
+}
+
+
+def met(reader: Callable[[Path], object], path: Path) -> InputError | None:
+    """How a file is refused; None where it is read. Anything else that is raised is a defect."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            reader(path)
+    except InputError as error:
+        refused = error
+    else:
+        return None
+    text = str(refused)
+    assert refused.field
+    assert refused.expected
+    assert text == printable(text)
+    assert len(text) < 20_000
+    return refused
+
+
+def fuzz(name: str, folder: Path, count: int) -> None:
+    fuzzed = FUZZED[name]
+    path = folder / fuzzed.file
+    path.parent.mkdir(exist_ok=True)
+
+    @settings(max_examples=count, suppress_health_check=EASY, database=None)
+    @given(st.integers(0, 2**40))
+    def check(number: int) -> None:
+        path.write_bytes(fuzzed.make(Random(number)))
+        met(fuzzed.read, path)
+
+    check()
+
+
+@pytest.mark.parametrize("name", FUZZED)
+def test_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    fuzz(name, tmp_path, max(FUZZED[name].slow // 100, 10))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FUZZED)
+def test_many_damaged_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    """100,000 files in all."""
+    fuzz(name, tmp_path, FUZZED[name].slow)
+
+
+def test_the_long_test_has_a_hundred_thousand_files() -> None:
+    assert sum(each.slow for each in FUZZED.values()) == 100_000
+
+
+# ---------------------------------------------------------------------------------------------
+# What once went wrong
+
+ONE_MASS = """format = 2
+[[mass]]
+name = "a"
+mass = 1.0
+[[spring]]
+between = ["a", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["a", "ground"]
+damping = 0.1
+[[force]]
+on = "a"
+amplitude = 1.0
+"""
+SEAT = """[[clearance]]
+name = "A"
+between = ["a", "ground"]
+lower = 1.0
+restitution = 0.7
+"""
+DIGITS = "9" * 40_000 + "x"
+LONG_AMPLITUDE = ONE_MASS.replace("amplitude = 1.0", f'amplitude = "{DIGITS}"')
+RESISTOR = tomllib.loads((CATALOGS / "resistors.toml").read_text("utf-8"))["family"][0]
+BLANKS = {**RESISTOR, "temperature_coefficient": "x" + " " * 5000 + "y"}
+REFUSED: dict[str, tuple[str, Callable[[Path], object], str | bytes, str]] = {
+    "a restitution without a stiffness": (
+        "it.toml",
+        model,
+        ONE_MASS + SEAT,
+        "clearance A.stiffness",
+    ),
+    "a rate that is lost in the rounding": (
+        "it.toml",
+        model,
+        ONE_MASS + '[[friction]]\nbetween = ["a", "ground"]\nforce = 1e9\nvelocity = 0.04\n',
+        "damper.between",
+    ),
+    "a whole number that is no float, in a matrix": (
+        "it.toml", model, MATRICES.replace("0.02]]", f"1{'0' * 400}]]"), "matrices.damping"
+    ),
+    "a whole number of 65 bits, in a matrix": (
+        "it.toml", model, MATRICES.replace("0.02]]", f"{2**64 * 10**30}]]"), "damper.between"
+    ),
+    "a diagonal of ten thousand masses": (
+        "it.toml", model, MATRICES.replace("[1.0, 0.5]", f"[{'1.0,' * 10_000}]"), "matrices.mass"
+    ),
+    "digits and a letter, as an amplitude": (
+        "it.toml", model, LONG_AMPLITUDE, "amplitude"
+    ),
+    "digits and a letter, as a phase": (
+        "it.toml", model, f'{ONE_MASS}phase = "{DIGITS}"\n', "phase"
+    ),
+    "digits and a letter, on a board": (
+        "it.kicad_pcb", board, BOARD.replace("(at 10.5 20 90)", f"(at {DIGITS} 20 90)"), "line 3"
+    ),
+    "blanks in a coefficient": (
+        "it.toml",
+        read_catalog_file,
+        toml_of({"format": 1, "family": [BLANKS]}),
+        "temperature_coefficient",
+    ),
+    "a header without end": (
+        "it.npy", matrix_file, headed("{'descr': '<f8', 'shape': (2"), "matrices.mass"
+    ),
+    "a header with two kinds of keys": (
+        "it.npy", matrix_file, headed("{False: 1, 'descr': 2}"), "matrices.mass"
+    ),
+    "a header that is no literal": (
+        "it.npy", matrix_file, headed("{'descr': lambda:, 'shape': (2L,)}"), "matrices.mass"
+    ),
+    "a type without an entry": (
+        "it.npy",
+        matrix_file,
+        headed("{'descr': (), 'fortran_order': False, 'shape': (2,)}"),
+        "matrices.mass",
+    ),
+    "a record without fields": (
+        "it.npy",
+        read_record,
+        headed("{'descr': [], 'fortran_order': False, 'shape': (2,)}"),
+        "the file",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("name", REFUSED)
+def test_it_is_refused_at_its_place(name: str, tmp_path: Path) -> None:
+    file, reader, content, field = REFUSED[name]
+    path = tmp_path / file
+    path.write_bytes(content if isinstance(content, bytes) else encoded(content))
+    error = met(reader, path)
+    assert error is not None
+    assert field in error.field
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("name", ["a" + " " * 50_000 + "b", "(" * 50_000])
+def test_a_long_name_of_a_channel_is_cut(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "it.csv"
+    rows = "\n".join(f"{k * 1e-3},{k % 7}" for k in range(20_000))
+    path.write_text(f"Time(s),{name}\n{rows}\n")
+    (channel,) = read_record(path).signals
+    assert len(channel) <= 200
+
+
+@pytest.mark.timeout(20)
+def test_a_long_cell_of_digits_is_refused_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "it.csv"
+    rows = "\n".join(f"{k * 1e-3},{k % 7}" for k in range(20_000))
+    path.write_text(f"Time(s),CH1(V)\n{rows}\n20.0,{DIGITS}\n")
+    error = met(read_record, path)
+    assert error is not None
+    assert error.field == "line 20002"
+
+
+def test_an_array_of_python_2_is_read_in_silence(tmp_path: Path) -> None:
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (2L,), }"
+    (tmp_path / "it.npy").write_bytes(headed(header, np.array([1.0, 0.5]).tobytes()))
+    assert met(matrix_file, tmp_path / "it.npy") is None
