@@ -340,8 +340,11 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str | bytes, str]] = {
     "a header with two kinds of keys": (
         "it.npy", matrix_file, headed("{False: 1, 'descr': 2}"), "matrices.mass"
     ),
-    "a header that is no literal": (
-        "it.npy", matrix_file, headed("{'descr': lambda:, 'shape': (2L,)}"), "matrices.mass"
+    "a type of a comma": (
+        "it.npy",
+        matrix_file,
+        headed("{'descr': ',', 'fortran_order': False, 'shape': (2,)}"),
+        "matrices.mass",
     ),
     "a type without an entry": (
         "it.npy",
