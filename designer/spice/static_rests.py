@@ -128,8 +128,10 @@ class _Statics:
             out.append(met[0] if met and zone.quantity == "displacement" else 0)
         return tuple(out)
 
-    def clipped(self, sides: tuple[int, ...], force: float) -> bool:
-        """Whether an output would have to pass its limit."""
+    def leaves(self, sides: tuple[int, ...], force: float) -> bool:
+        """Whether the circuit cannot rest in these contacts: an output would have to pass its
+        limit, or a diode would turn, as that of a stage's other half does far past its clearance.
+        """
         circuit, volts = self.design.circuit, -force * self.design.amplitude()
         reduction = Reduction(circuit, nominal_board(circuit, ideal=True))
         key = circuit.in_contact(sides)
@@ -138,6 +140,9 @@ class _Statics:
         except ArithmeticError:  # a floating net: ngspice shall say it
             return False
         x = np.linalg.solve(mode.A, -(mode.B * volts + mode.d))
+        by_state, by_drive, constant = mode.guard_rows
+        if (by_state @ x + by_drive * volts + constant > 0.0).any():
+            return True
         limits = circuit.output_limits()
         known, voltage = np.concatenate([x, [volts, 1.0]]), reduction.solution(key).voltage
         tops = [
@@ -149,7 +154,7 @@ class _Statics:
 
     def open(self) -> StaticRest | None:
         """All dead zones open: up to near the force that closes the first one, either way, as far
-        as no output clips."""
+        as the circuit rests there."""
         sides = (0,) * len(self.model.dead_zones)
         ends = []
         for k, zone in enumerate(self.model.dead_zones):
@@ -163,7 +168,7 @@ class _Statics:
         high = min((end for turn, end in ends if turn > 0.0), default=None)
         low = max((end for turn, end in ends if turn < 0.0), default=None)
         if low is None and high is None:  # no constant force of the drive moves any displacement
-            rests = self.holds(sides, 0.0) == sides and not self.clipped(sides, 0.0)
+            rests = self.holds(sides, 0.0) == sides and not self.leaves(sides, 0.0)
             return StaticRest(sides, None, 0.0, 0.0) if rests else None
         if low is None:
             low = -high if high > 0.0 else 2.0 * high  # type: ignore[operator]
@@ -174,13 +179,13 @@ class _Statics:
             return None
         near, far = middle - INSIDE * half, middle + INSIDE * half
         least = float(np.clip(0.0, near, far))
-        near, far = (self._unclipped(sides, least, end) for end in (near, far))
+        near, far = (self._resting(sides, least, end) for end in (near, far))
         return StaticRest(sides, None, near, far)
 
-    def _unclipped(self, sides: tuple[int, ...], least: float, force: float) -> float:
-        """A force on the way from the least one to this at which no output clips."""
+    def _resting(self, sides: tuple[int, ...], least: float, force: float) -> float:
+        """A force on the way from the least one to this at which the circuit rests."""
         for _ in range(ROUNDS):
-            if not self.clipped(sides, force):
+            if not self.leaves(sides, force):
                 break
             force = least + 0.5 * (force - least)
         return force
@@ -199,13 +204,13 @@ class _Statics:
             depth = self._held_back(sides, zone, side, wanted)
             near, far = (self.force(sides, zone, side, d) for d in (NEAR * depth, depth))
             ends = {self.holds(sides, near), self.holds(sides, far)}
-            if ends == {sides} and not self.clipped(sides, far):
+            if ends == {sides} and not self.leaves(sides, far):
                 return StaticRest(sides, zone, near, far)
             sides = self.holds(sides, far)
             if sides[zone] != side:
                 return None
             if len(ends) > 1 or ends == {sides}:
-                wanted = 0.5 * depth  # on the way another contact changes, or an output clips
+                wanted = 0.5 * depth  # on the way another contact changes, or the circuit leaves
         return None
 
     def _held_back(self, sides: tuple[int, ...], zone: int, side: int, depth: float) -> float:

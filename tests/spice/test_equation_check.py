@@ -242,6 +242,16 @@ def test_a_diode_that_ngspice_finds_better_alone(pool: SpicePool, values: dict[s
     assert result.passed, [str(f) for f in result.findings]
 
 
+def test_a_contact_is_looked_at_as_far_as_the_other_half_stays_blocked(pool: SpicePool) -> None:
+    """The idle half holds its output at 10 V and a diode; past that the two halves work against
+    each other, at currents that no op-amp gives. Half a clearance deep fv would be 11.8 V."""
+    steep = {name: 4.75 * rectifier()[name] for name in ("R202", "R205", "R50")}
+    circuit = stage("rectifier", "both", rectifier() | steep)
+    result = check(around(circuit, stage_model("both")), (), pool)
+    assert set(by_name(result)) == ALL
+    assert result.passed, [str(f) for f in result.findings]
+
+
 def test_a_check_without_an_answer_is_open_and_a_wrong_one_is_not() -> None:
     right, wrong = EquationFinding("slope", 0.1, 0.2), EquationFinding("slope", 0.3, 0.2)
     silent = EquationFinding("slope", float("nan"), 0.2, "no answer")
