@@ -72,7 +72,7 @@ class Question:
         return judge(orbit, self.spec, self.start, self.excitation.seconds(self.omega))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BoardRow:
     """What every layer of a study says about one sample and one response."""
 
@@ -88,7 +88,7 @@ class BoardRow:
     """Why it is not ok, or ""."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Answer(BoardRow):
     """A board as built. The margins are those of the exact circuit."""
 

@@ -88,12 +88,18 @@ def lagging_plan(
     return plan, left, why
 
 
-MOST_UNTIL = 100_000
-"""Samples at which a study that grows until its intervals are narrow gives up."""
+GROWTH = 0.05
+"""By what share of its samples a study grows until its intervals are narrow, at least by a block:
+each time all its rows are counted anew."""
 MOST_NOMINAL = 1000
 """Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
 MORE_NOMINAL = 50
 """By how many their number grows."""
+
+
+IN_VAIN = 0.1
+"""The exact samples' interval over the wanted width below which more samples change nothing: it is
+ngspice that keeps the whole interval wide."""
 
 
 class Stores:
@@ -314,13 +320,13 @@ class StudyWork:
                 break
             # Exact samples narrow the first part of an interval, boards in ngspice the second.
             exact = _widest(replace(study, cross_checks=()))
-            if exact >= 0.7 * until and samples < MOST_UNTIL:
-                samples = min(samples + BLOCK, MOST_UNTIL)
+            if exact >= 0.7 * until:
+                samples = _more(samples)
                 study = self._with_samples(study, samples)
             elif both_engines and nominal < min(MOST_NOMINAL, samples):
                 nominal += MORE_NOMINAL
-            elif samples < MOST_UNTIL and (exact >= until or nominal < MOST_NOMINAL):
-                samples = min(samples + BLOCK, MOST_UNTIL)
+            elif nominal < MOST_NOMINAL and exact >= IN_VAIN * until:
+                samples = _more(samples)
                 study = self._with_samples(study, samples)
             else:
                 break
@@ -337,8 +343,8 @@ class StudyWork:
             )
         if not _widest(study) < until:
             self.progress.note(
-                f"the intervals are still wider than {until:g}: a study grows to "
-                f"{MOST_UNTIL} samples at most, and to {MOST_NOMINAL} boards in ngspice"
+                f"the intervals are still wider than {until:g}, by what ngspice says: it is asked "
+                f"about {MOST_NOMINAL} boards of a response at most"
             )
         return not silent and _widest(study) < until
 
@@ -501,6 +507,11 @@ class StudyWork:
 
 def _no_step() -> None:
     pass
+
+
+def _more(samples: int) -> int:
+    """The samples of the next step, at the edge of a block."""
+    return samples + BLOCK * max(1, round(GROWTH * samples / BLOCK))
 
 
 def _decided(study: Study) -> list[bool]:

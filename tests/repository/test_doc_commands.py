@@ -41,6 +41,10 @@ SMALLER = {
     "--steps 241": "--steps 5",
     "--steps 111": "--steps 5",
     "--samples 100 --out out/rig": "--samples 4 --out out/rig",
+    **{
+        f"--out out/{name}": f"--out out/{name} --samples 4 --no-blame"
+        for name in ("double-well-board", "chaos", "gears", "two-shakers", "restitution")
+    },
 }
 FILLED = {
     # what a page leaves open, by the command: what a reader would write
@@ -79,6 +83,7 @@ LONG = (
     "docs/paper-case.md",
     "docs/bifurcations.md",
     "docs/compare.md",
+    "docs/examples.md",
     "docs/tolerance.md",
     "docs/tutorial.md",
 )
