@@ -154,7 +154,7 @@ def _summing_nodes(circuit: Circuit, components: Sequence[Component]) -> list[st
 
 
 def _protection(synthesis: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
-    opamp = synthesis.catalog.opamp(circuit.opamp)
+    opamp = synthesis.catalog.opamp(circuit.opamp).over(synthesis.catalog.temperatures)
     most = None if opamp.input_current is None else opamp.input_current.max
     lines = []
     for node in driven_nodes(circuit):

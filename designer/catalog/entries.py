@@ -246,8 +246,9 @@ class OpAmp(CatalogEntry):
     def over(self, temperatures: tuple[float, float] | None) -> OpAmp:
         """The same op-amp with bounds that hold from one temperature [°C] to another.
 
-        What is typical stays: it is that of ``ROOM``. None: at ``ROOM`` alone. A figure of which
-        the catalogue has no change with temperature stays as it is.
+        What is typical stays: it is that of ``ROOM``, which the range always holds. None: at
+        ``ROOM`` alone. Of a change with temperature the worst that is given counts. A figure of
+        which the catalogue has no change stays as it is.
         """
         if temperatures is None:
             return self
@@ -255,13 +256,13 @@ class OpAmp(CatalogEntry):
         drift = 0.0 if self.offset_drift is None else self.offset_drift.about_zero[1]
         offset = drift * max(map(abs, warmer))
         doubling = self.bias_doubling
-        doublings = 0.0 if doubling is None else max(warmer) / doubling.nominal
+        doublings = 0.0 if doubling is None else max(warmer) / doubling.given[0]
         bias = 2.0 ** min(doublings, MOST_DOUBLINGS)
 
         def lowest(figure: Figure, drift: Figure | None, *, relative: bool) -> Figure:
-            slope = 0.0 if drift is None else drift.nominal
+            slopes = (0.0,) if drift is None else drift.given
             low = figure.nominal if figure.min is None else figure.min
-            moved = min((low if relative else 1.0) * slope * dt for dt in warmer)
+            moved = min((low if relative else 1.0) * s * dt for s in slopes for dt in warmer)
             return replace(figure, min=max(low + moved, LEAST_LEFT * low)) if moved else figure
 
         def reach(figure: Figure) -> Figure:
@@ -276,6 +277,14 @@ class OpAmp(CatalogEntry):
             slew=lowest(self.slew, self.slew_drift, relative=True),
             swing=reach(self.swing),
             swing_2k=None if self.swing_2k is None else reach(self.swing_2k),
+        )
+
+    def offset_spread(self, temperatures: tuple[float, float] | None) -> float:
+        """Standard deviation of the offset [V] where it is largest between two temperatures [°C];
+        None: at ``ROOM``."""
+        drift = 0.0 if self.offset_drift is None else self.offset_drift.about_zero[0]
+        return math.hypot(
+            self.offset_sigma, drift * max((abs(t - ROOM) for t in temperatures or ()), default=0.0)
         )
 
     def saturation_at(self, supply: float) -> float:
@@ -326,7 +335,8 @@ class ReferenceEntry(BoardEntry):
     impedance: Annotated[Figure | None, fields.figure("Ω")] = None
     """Dynamic impedance [Ω]; None where it is not known."""
     drift: Annotated[float | None, fraction("120e-6 is 120 ppm", zero=True)] = None
-    """Most that the voltage changes over 1000 h, ± as a fraction; None where not known."""
+    """Size of the voltage's change over 1000 h, as a fraction, typical: taken as a standard
+    deviation, none beyond three of it. None where not known."""
     pins: Annotated[Mapping[str, str], fields.pins("cathode", "anode")] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )

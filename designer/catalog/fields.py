@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from designer.base.errors import MISSING, InputError
@@ -57,10 +58,17 @@ class Figure:
     @property
     def nominal(self) -> float:
         """The typical value; where none is given, the bound that is."""
-        for value in (self.typ, self.max, self.min):
-            if value is not None:
-                return value
-        raise AssertionError("a figure has at least one value")
+        return next(v for v in (self.typ, self.max, self.min) if v is not None)
+
+    @property
+    def given(self) -> tuple[float, ...]:
+        """What the sheet gives of it, ascending."""
+        return tuple(v for v in (self.min, self.typ, self.max) if v is not None)
+
+    @property
+    def usual(self) -> float:
+        """The typical value; where none is given, the middle of what is."""
+        return sum(self.given) / len(self.given) if self.typ is None else self.typ
 
     @property
     def about_zero(self) -> tuple[float, float]:
@@ -80,6 +88,7 @@ def figure(unit: str, *, signed: bool = False) -> Accepts:
     """A table of min, typ, max, source and assumed; numbers above 0 unless ``signed``."""
     measured = ("" if signed else " > 0") + f" in {unit}"
     bound = number(unit, f"a number{measured}", lambda value: signed or value > 0.0)
+    by_kelvin = _READ_BY_KELVIN.get(unit)
 
     def check(value: object) -> Figure:
         if not isinstance(value, dict):
@@ -88,7 +97,9 @@ def figure(unit: str, *, signed: bool = False) -> Accepts:
         numbers: dict[str, float] = {}
         for key in (key for key in _BOUNDS if key in value):
             try:
-                numbers[key] = bound.read(value[key])
+                numbers[key] = bound.read(
+                    value[key] if by_kelvin is None else by_kelvin(value[key])
+                )
             except ValueError as error:
                 problems.append(InputError(None, key, literal(value[key]), str(error)))
         ascending = list(numbers.values())
@@ -133,23 +144,44 @@ def _without_source(value: dict[str, object]) -> list[InputError]:
     return problems
 
 
+_PER_KELVIN = re.compile(r"(.*?)\s*(ppm|%)?\s*1?/\s*(?:K|°C)")
+_SHARES = {"ppm": 1e-6, "%": 1e-2, None: 1.0}
+
+
+def _share_per_kelvin(value: object) -> object:
+    """Of text that ends in /K, ppm/K or %/K the number; anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    # One space for many: the pattern would try each of them in three places.
+    stated = _PER_KELVIN.fullmatch(" ".join(value.split()))
+    if stated is None:
+        return value
+    return _SHARES[stated[2]] * parse_quantity(stated[1], "")
+
+
+def _of_kelvins(value: object) -> object:
+    """Text in which a difference of temperatures, or one per degree, is in kelvins."""
+    return value.replace("°C", "K") if isinstance(value, str) else value
+
+
+_READ_BY_KELVIN: dict[str, Callable[[object], object]] = {
+    "1/K": _share_per_kelvin,
+    "V/K": _of_kelvins,
+    "K": _of_kelvins,
+}
+"""How a figure's text is read before its number, by the unit."""
+
+
 def per_kelvin() -> Accepts:
-    """A magnitude per kelvin: a number, or text that ends in /K or ppm/K."""
-    pattern = re.compile(r"(.*?)\s*(ppm)?\s*1?/\s*(?:K|°C)")
+    """A magnitude per kelvin: a number, or text that ends in /K, ppm/K or %/K."""
 
     def check(value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
+        magnitude = _share_per_kelvin(value)
+        if isinstance(magnitude, bool) or not isinstance(magnitude, int | float):
             raise ValueError
-        if isinstance(value, str):
-            # One space for many: the pattern would try each of them in three places.
-            stated = pattern.fullmatch(" ".join(value.split()))
-            if stated is None:
-                raise ValueError
-            value = stated[1] + ("u" if stated[2] else "")
-        magnitude = parse_quantity(value, "")
-        if magnitude < 0.0:
+        if not 0.0 <= magnitude < math.inf:
             raise ValueError
-        return magnitude
+        return float(magnitude)
 
     return Accepts('a number >= 0, per kelvin: 100e-6, or text such as "100 ppm/K"', check)
 

@@ -62,13 +62,15 @@ class Refused:
 
 
 def better_opamps(now: OpAmp, supply: float, catalog: Catalog) -> tuple[OpAmp, ...]:
-    """Op-amps with as many sections, for these rails [V], whose offsets spread less."""
+    """Op-amps with as many sections, for these rails [V], whose offsets spread less at the boards'
+    temperatures."""
+    spread = now.offset_spread(catalog.temperatures)
     return tuple(
         other
         for other in catalog.opamps
         if other.sections == now.sections
         and (other.supply.min or 0.0) <= supply <= (other.supply.max or float("inf"))
-        and other.offset_sigma < now.offset_sigma
+        and other.offset_spread(catalog.temperatures) < spread
     )
 
 

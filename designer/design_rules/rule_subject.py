@@ -14,7 +14,7 @@ from designer.base.units import parse_quantity
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
 from designer.catalog.design_rule import NotRun
-from designer.catalog.entries import OpAmp
+from designer.catalog.entries import ROOM, OpAmp
 from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
@@ -80,7 +80,7 @@ class RuleSubject:
         """Temperatures that bounds hold at, as a part of a sentence; "" where none are stated."""
         if self.catalog.temperatures is None:
             return ""
-        low, high = self.catalog.temperatures
+        low, high = (f(*self.catalog.temperatures, ROOM) for f in (min, max))
         return f", from {low:g} to {high:g} °C"
 
     @cached_property

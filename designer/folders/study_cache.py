@@ -26,10 +26,12 @@ from designer.base.parquet_entry import MOST_BYTES
 from designer.base.record_check import checked_record
 from designer.base.seal import BLANK
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.distributions import Normal
 from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
+from designer.spread.spread import OpAmpDrift
 from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
@@ -47,8 +49,8 @@ _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
         Axis, BlamedPart, Blame, Corner, Crossing, EquationCheck, EquationFinding, GateResult,
-        Index, Limit, LossRegion, NearLimit, Orbit, Prediction, RareLosses, Read, ResponseBlame,
-        SolverSettings, ToleranceMargin, YieldMap,
+        Index, Limit, LossRegion, NearLimit, Normal, OpAmpDrift, Orbit, Prediction, RareLosses,
+        Read, ResponseBlame, SolverSettings, ToleranceMargin, YieldMap,
     )
 }  # fmt: skip
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}

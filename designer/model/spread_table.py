@@ -223,7 +223,9 @@ class SpreadSpec(FileTable):
     temperature: Annotated[
         tuple[float, float] | None,
         span(
-            "", "a range [low, high] in °C, such as [0, 50]", lambda t: ABSOLUTE_ZERO < t <= HOTTEST
+            "",
+            f"a range [low, high] in °C, from {ABSOLUTE_ZERO:g} to {HOTTEST:g}, such as [0, 50]",
+            lambda t: ABSOLUTE_ZERO < t <= HOTTEST,
         ),
     ] = None
     """Lowest and highest temperature of the board [°C]."""

@@ -89,6 +89,7 @@ def map_chart(label: str, one: YieldMap, *, angular: bool = False) -> Figure:
 def _marks(axes: Axes, one: YieldMap, scale: float) -> None:
     if one.over == "temperature":
         axes.axvline(one.used, color=INK, lw=0.9, ls="--", label="where figures of parts hold")
+        _shade_outside(axes, one)
         return
     word = "coarsest of the best" if one.over == "grade" else "recommended"
     best = None if one.recommended is None else scale * one.recommended[0]
@@ -110,6 +111,17 @@ def _marks(axes: Axes, one: YieldMap, scale: float) -> None:
         axes.plot([], [], color=MUTED, lw=0.9, ls=":", label="edge of the nominal window")
     if (~one.there).any():
         axes.plot([], [], "x", color=MUTED, label="not there nominally")
+
+
+def _shade_outside(axes: Axes, one: YieldMap) -> None:
+    """Temperatures for which the op-amp is not specified."""
+    ends = axes.get_xlim()
+    label = "op-amp not specified"
+    for low, high in ((ends[0], one.specified[0]), (one.specified[1], ends[1])):
+        if low is not None and high is not None and low < high:
+            axes.axvspan(low, high, color=GRID, lw=0.0, zorder=0, label=label)
+            label = "_"
+    axes.set_xlim(ends)
 
 
 def _scale(one: YieldMap, angular: bool) -> float:

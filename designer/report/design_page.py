@@ -117,7 +117,11 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         ),
         PageSection(
             "Warm and cold boards",
-            [tolerance_tables.over_temperature(data), *(pictures[name] for name in warm)],
+            [
+                tolerance_tables.what_temperature_moves(data),
+                tolerance_tables.over_temperature(data),
+                *(pictures[name] for name in warm),
+            ],
             "temperature",
         ),
         _scales(data),

@@ -6,7 +6,7 @@ from designer.base.natural_sort import natural_key
 from designer.circuit.netlist import Circuit
 from designer.model.distributions import Binned, Distribution, Normal, Split, Uniform
 from designer.report.words import quantity
-from designer.spread.spread import NO_BANDWIDTH, Spread
+from designer.spread.spread import NO_BANDWIDTH, OpAmpDrift, Spread
 
 
 def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> str:
@@ -38,9 +38,8 @@ def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> st
     if spread.temperature is not None:
         low, high = spread.temperature
         within = f"uniform from {low:g} to {high:g} °C" if low < high else f"of {low:g} °C"
-        parts.append(
-            f"temperature {within}, which moves parts and, of the op-amps, {_warm(spread)}"
-        )
+        moved = warm_words(spread.opamps, bandwidth=bandwidth)
+        parts.append(f"temperature {within}, which moves parts and, of the op-amps, {moved}")
     if spread.ageing:
         parts.append(f"ageing of {_ageing(spread)}")
     if spread.opamps.ageing is not None:
@@ -62,17 +61,21 @@ def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> st
     return "; ".join(parts)
 
 
-def _warm(spread: Spread) -> str:
-    """What temperature does to the op-amps."""
-    drift, changes = spread.opamps, []
+def warm_words(drift: OpAmpDrift, *, bandwidth: bool = False) -> str:
+    """What temperature does to op-amps: part of a sentence. bandwidth : as of ``words_of``."""
+    changes = []
     if drift.offset is not None:
         changes.append(f"offsets by a slope {_about_zero(drift.offset, 'V/K')}")
     if drift.bias_doubling is not None:
         changes.append(f"bias currents by a doubling every {quantity(drift.bias_doubling, 'K')}")
     if drift.limit:
         changes.append(f"output limits by {quantity(drift.limit, 'V/K')}")
-    for name, slope in (("gain-bandwidth", drift.gain_bandwidth), ("slew rate", drift.slew)):
-        changes += [f"{name} by {_percent(slope)}/K"] if slope else []
+    for name, slope, enters in (
+        ("gain-bandwidth", drift.gain_bandwidth, bandwidth),
+        ("slew rate", drift.slew, False),
+    ):
+        more = "" if enters else " (which does not enter the yield)"
+        changes += [f"{name} by {_percent(slope)}/K{more}"] if slope else []
     return ", ".join(changes) or "nothing that the catalogue knows"
 
 
@@ -86,8 +89,7 @@ def _ageing(spread: Spread) -> str:
     kinds = {"R": "resistors", "C": "capacitors", "V": "references"}
     by: dict[tuple[str, str], list[str]] = {}
     for part, law in sorted(spread.ageing.items(), key=lambda item: natural_key(item[0])):
-        low, high = (f"{100 * end:.4g}" for end in _ends(law))
-        by.setdefault((kinds.get(part[0], part), f"from {low} to {high} %"), []).append(part)
+        by.setdefault((kinds.get(part[0], part), _change(law)), []).append(part)
     of = [kind for kind, _ in by]
     return ", ".join(
         f"{kind if of.count(kind) == 1 else ' '.join(parts)} {within}"
@@ -114,6 +116,13 @@ def _ends(law: Distribution) -> tuple[float, float]:
     if isinstance(law, Uniform | Split):
         return law.low, law.high
     raise TypeError(law)
+
+
+def _change(law: Distribution) -> str:
+    if isinstance(law, Normal):
+        return f"normal with σ = {_percent(law.sigma)}, cut at {_percent(law.limit)}"
+    low, high = (f"{100 * end:.4g}" for end in _ends(law))
+    return f"from {low} to {high} %"
 
 
 def _percent(value: float) -> str:

@@ -15,6 +15,7 @@ from designer.report import words
 from designer.report.data import ReportData
 from designer.report.measured_table import table as measured_boards
 from designer.report.response_tables import STARTED
+from designer.report.spread_words import warm_words
 from designer.verdicts.verdict import BoardRow
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
@@ -287,10 +288,31 @@ def over_temperature(data: ReportData) -> Table | None:
         "response": lambda one: words.name(data.checked[data.study.response_indices[one.question]])
     }
     columns |= {
-        f"{celsius:g} °C".replace("-", "−"): share(index)
+        f"{_celsius(celsius)}{'*' * rows[0].outside(celsius)}": share(index)
         for index, celsius in enumerate(rows[0].axes[0].values)
     }
     return table_of(rows, columns)
+
+
+def _celsius(value: float) -> str:
+    return f"{value:g} °C".replace("-", "−")
+
+
+def what_temperature_moves(data: ReportData) -> str:
+    """The sentences above that table; "" where there is none."""
+    rows = [one for one in data.study.maps if one.over == "temperature"]
+    if not rows or rows[0].drift is None:
+        return ""
+    said = [
+        "The same boards at each temperature. It moves parts by their temperature coefficients "
+        f"and, of the op-amps, {warm_words(rows[0].drift, bandwidth=data.study.plan.bandwidth)}."
+    ]
+    if any(rows[0].outside(celsius) for celsius in rows[0].axes[0].values):
+        low, high = rows[0].specified
+        ends = [] if low is None else [f"from {_celsius(low)}"]
+        ends += [] if high is None else [f"up to {_celsius(high)}"]
+        said.append(f"* The op-amp is specified {' '.join(ends)}, not here.")
+    return " ".join(said)
 
 
 def _window(one: YieldMap, shown: Callable[[float, str], str]) -> str:

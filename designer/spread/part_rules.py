@@ -223,7 +223,7 @@ class _Rules:
         return OpAmpDrift(
             offset=_about_zero(opamp.offset_drift),
             ageing=old,
-            bias_doubling=None if doubling is None else doubling.nominal,
+            bias_doubling=None if doubling is None else doubling.usual,
             gain_bandwidth=_slope(opamp.gbw_drift),
             slew=_slope(opamp.slew_drift),
             limit=_slope(opamp.saturation_drift),
@@ -407,7 +407,7 @@ class _Rules:
             elif isinstance(part, Reference):
                 drift = self.catalog.reference(part.model).drift
                 if self.rules.ageing == "catalogue" and drift is not None:
-                    laws[name] = Uniform(-drift, drift)
+                    laws[name] = Normal(drift, 3.0 * drift)
             elif self.rules.ageing is None:
                 continue
             elif self.rules.ageing == "catalogue":
@@ -475,7 +475,7 @@ def _about_zero(figure: Figure | None) -> Distribution | None:
 
 
 def _slope(figure: Figure | None) -> float:
-    return 0.0 if figure is None else figure.nominal
+    return 0.0 if figure is None else figure.usual
 
 
 def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Distribution | None:

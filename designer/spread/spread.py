@@ -182,6 +182,12 @@ class Spread:
         temperature coefficients (``part_rules.warmed``)."""
         return replace(self, temperature=(celsius, celsius))
 
+    @property
+    def as_built(self) -> Spread:
+        """The same spread of boards that are new and at ``ROOM``, as they are at a bench; what is
+        drawn of both is the same."""
+        return replace(self, temperature=None, ageing={}, opamps=replace(self.opamps, ageing=None))
+
     def coordinates(self, circuit: Circuit) -> tuple[str, ...]:
         """Names of what is drawn for a board of this circuit, in the order of a cube's columns.
 

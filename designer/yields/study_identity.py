@@ -19,7 +19,7 @@ RULES = {
     "ngspice": 4,
     "tuned": 3,
     "reached": 3,
-    "trimmed": 1,
+    "trimmed": 2,
     "blame": 2,
     "maps": 1,
     "rare": 1,

@@ -122,9 +122,13 @@ def dc_trim(synthesis: Synthesis) -> DcTrim | None:
 
 
 def trimmed_boards(trim: DcTrim, plan: StudyPlan, indices: range) -> tuple[Boards, Array]:
-    """The boards of these samples with their trimmers set, and the settings (N,)."""
+    """The boards of these samples with their trimmers set, and the settings (N,).
+
+    A trimmer is set once, on the new board at room temperature; the board gets warm and old after.
+    """
+    built = draw_many(trim.circuit, plan.spread.as_built, plan.seed, indices)
+    position = settings(trim, built, plan.seed, indices)
     boards = draw_many(trim.circuit, plan.spread, plan.seed, indices)
-    position = settings(trim, boards, plan.seed, indices)
     return trim.at(boards, position), position
 
 

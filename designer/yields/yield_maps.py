@@ -27,7 +27,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
-from designer.spread.spread import Spread, draw_many
+from designer.spread.spread import OpAmpDrift, Spread, draw_many
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.yield_count import Yield
 
@@ -105,6 +105,10 @@ class YieldMap:
     """Wall time [s]."""
     frequency: float | None = None
     """Frequency of the generator at the setting of the plan [Hz]."""
+    drift: OpAmpDrift | None = None
+    """Over the temperature: what it does to the op-amps of these boards."""
+    specified: tuple[float | None, float | None] = (None, None)
+    """Over the temperature: ends of the op-amp's range [°C]; None for one that is not known."""
 
     def at(self, *index: int) -> Yield:
         """The yield at one point."""
@@ -173,8 +177,18 @@ class YieldMap:
             "window": None if self.window is None else list(self.window),
             "open": list(self.open),
             "recommended": None if self.recommended is None else list(self.recommended),
+            **({} if self.drift is None else self._temperature()),
             "cost": {"attractors": self.attractors, "seconds": self.seconds},
         }
+
+    def outside(self, celsius: float) -> bool:
+        """Whether the op-amp is not specified for a temperature [°C]."""
+        low, high = self.specified
+        return (low is not None and celsius < low) or (high is not None and celsius > high)
+
+    def _temperature(self) -> dict[str, Any]:
+        assert self.drift is not None
+        return {"op_amps": self.drift.as_dict(), "specified": list(self.specified)}
 
     def _each(self, value: Callable[[Yield], float]) -> Array:
         out = np.zeros(self.there.shape)
@@ -276,7 +290,16 @@ def yield_map(
         attractors=nominal.spent,
         seconds=time.perf_counter() - began,
         frequency=question.excitation.frequency,
+        drift=warmed.opamps if over == "temperature" and warmed is not None else None,
+        specified=_specified(plan) if over == "temperature" else (None, None),
     )
+
+
+def _specified(plan: StudyPlan) -> tuple[float | None, float | None]:
+    """The range of temperatures [°C] of the plan's op-amp, as far as the catalogue knows."""
+    figures = plan.circuit.figures
+    stands = None if figures is None else figures.temperature
+    return (None, None) if stands is None else (stands.min, stands.max)
 
 
 class _Task(NamedTuple):

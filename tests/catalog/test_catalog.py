@@ -708,11 +708,18 @@ def test_figures_may_carry_any_prefix_of_their_unit(tmp_path: Path) -> None:
         ("noise", '"0.02 µV/√Hz"', "typ", 2e-8),
         ("gbw", '"5.25 MHz"', "typ", 5.25e6),
         ("phase_margin", '"60 °"', "typ", 60.0),
+        ("offset_drift", '"18 µV/°C"', "typ", 18e-6),
+        ("bias_doubling", '"10 °C"', "typ", 10.0),
+        ("gbw_drift", '"-2000 ppm/K"', "typ", -2e-3),
+        ("gbw_drift", '"-0.2 %/K"', "typ", -2e-3),
+        ("slew_drift", '"-2e-3/°C"', "typ", -2e-3),
+        ("saturation_drift", '"-1 mV/K"', "typ", -1e-3),
     ):
         line = f'{key} = {{ {bound} = {written}, source = "a sheet" }}\n'
         kept = [each for each in text.splitlines() if not each.startswith(f"{key} =")]
         place = kept.index(next(each for each in kept if each.startswith("price =")))
-        mine = folder(tmp_path / key, "\n".join([*kept[:place], line, *kept[place:]]))
+        place_of = tmp_path / key / written.strip('"').partition(" ")[0]
+        mine = folder(place_of, "\n".join([*kept[:place], line, *kept[place:]]))
         read = load_catalog(mine).opamp("TL074C")
         assert getattr(read, key).nominal == value
         assert read.offset == plain.offset

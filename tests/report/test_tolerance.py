@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from designer.base.page import Table
+from designer.model.distributions import Normal
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.design_tables import condition_table
@@ -21,9 +22,12 @@ from designer.report.tolerance_tables import (
     kinds,
     limits,
     maps,
+    over_temperature,
     recipes,
+    what_temperature_moves,
 )
 from designer.report.write import render_html, render_markdown
+from designer.spread.spread import OpAmpDrift
 from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
@@ -109,6 +113,26 @@ def mapped(question: int) -> YieldMap:
         "omega", question, (Axis("omega", (0.8, 0.85, 0.9)),), np.array([False, True, True]), ok,
         np.array([0, 20, 0]), nothing, nothing, 100, 1, 0.85, (0.82, 0.9), (False, True), 30, 0.1,
     )  # fmt: skip
+
+
+def test_the_map_over_temperature_says_what_moves_its_boards_and_where_no_sheet_holds(
+    plain: ReportData,
+) -> None:
+    drift = OpAmpDrift(offset=Normal(18e-6, 54e-6), bias_doubling=10.0, gain_bandwidth=-2e-3)
+    warm = replace(
+        mapped(1), over="temperature", axes=(Axis("temperature", (-20.0, 25.0, 85.0)),),
+        used=25.0, window=None, drift=drift, specified=(0.0, None),
+    )  # fmt: skip
+    data = changed(plain, maps=(warm,))
+    table = over_temperature(data)
+    assert table is not None
+    assert list(table.columns)[1:] == ["−20 °C*", "25 °C", "85 °C"]
+    said = what_temperature_moves(data).replace("\N{NO-BREAK SPACE}", " ")
+    assert "normal with σ = 18 µV/K, cut at 54 µV/K" in said
+    assert "a doubling every 10 K" in said
+    assert "gain-bandwidth by -0.2 %/K (which does not enter the yield)" in said
+    assert "* The op-amp is specified from 0 °C, not here." in said
+    assert what_temperature_moves(plain) == ""
 
 
 @pytest.fixture(scope="module")

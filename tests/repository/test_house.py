@@ -67,7 +67,7 @@ LAZY = {
 }
 """Imports inside functions, outside the verbs and the command line, each with its reason."""
 REACH = {
-    "catalog": 5_900,
+    "catalog": 5_950,
     "new": 11_000,
     "simulate": 26_100,
     "bifurcation": 32_500,
@@ -80,7 +80,7 @@ REACH = {
     "synthesise": 63_800,
     "run": 65_800,
     "tolerance": 65_800,
-    "search": 69_000,
+    "search": 69_100,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 

@@ -44,6 +44,21 @@ def test_the_sheets_figures_at_high_temperature_come_out() -> None:
     assert tl.offset.max == pytest.approx(13e-3, abs=1e-3)
 
 
+def test_of_a_change_with_bounds_the_worst_holds_and_the_middle_is_drawn() -> None:
+    """Worked out by hand from 200 pA and 2.5 MHz at 25 °C."""
+    plain = CATALOG.opamp("TL074C")
+    doubling = Figure(8.0, None, 12.0, "a sheet")
+    slope = Figure(-4e-3, None, -1e-3, "a sheet")
+    opamp = replace(plain, bias_doubling=doubling, gbw_drift=slope)
+    warm = opamp.over((-20.0, 85.0))
+    assert warm.bias.max == pytest.approx(200e-12 * 2.0**7.5)
+    assert warm.gbw.min == pytest.approx(2.5e6 * (1.0 - 60.0 * 4e-3))
+    catalog = replace(CATALOG, opamps=(opamp,))
+    drift = spread_of(modelfile("temperature = [-20, 85]"), SOLD, catalog).opamps
+    assert drift.bias_doubling == 10.0
+    assert drift.gain_bandwidth == pytest.approx(-2.5e-3)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_shipped_op_amp_has_what_temperature_and_age_do(name: str) -> None:
     opamp = CATALOG.opamp(name)
@@ -144,7 +159,8 @@ def test_offsets_and_references_age_by_the_catalogue() -> None:
     assert np.abs(change).max() <= 10e-3
     assert np.std(change) == pytest.approx(3e-3, rel=0.05)
     relative = boards.reference["VR1"] / new.reference["VR1"] - 1.0
-    assert np.abs(relative).max() == pytest.approx(120e-6, rel=0.02)
+    assert np.std(relative) == pytest.approx(120e-6, rel=0.05)
+    assert np.abs(relative).max() <= 360e-6
     words = words_of(aged, SOLD).replace("\N{NO-BREAK SPACE}", " ")
     assert "ageing of op-amp offsets normal with σ = 3 mV, cut at 10 mV" in words
 

@@ -24,8 +24,9 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.folders.study_json import study_json
+from designer.model.distributions import Normal
 from designer.model.model_file import parse_model_file
-from designer.spread.spread import Spread, draw, draw_many
+from designer.spread.spread import OpAmpDrift, Spread, draw, draw_many
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import StudyPlan, Verdict, judge
 from designer.yields.adjustment import rest_distances
@@ -127,6 +128,26 @@ def test_the_setting_centres_the_board_as_well_as_the_screen_shows() -> None:
     sigma = step * np.sqrt((1.0 / 3.0 + 1.0 / 12.0) / 4.0 * (0.5 + 1.0 / FINER**2))
     assert np.std(away) == pytest.approx(sigma, rel=0.35)
     assert np.abs(position - 0.5).max() > 0.02
+
+
+def test_a_trimmer_is_set_on_the_new_board_and_drift_comes_after() -> None:
+    """At 85 °C a slope of the offsets moves the rest point by what it moves an untrimmed one."""
+    of = trim(adjustability=0.0)
+    drift = OpAmpDrift(offset=Normal(18e-6, 54e-6))
+    warm = replace(plan(7), spread=replace(ROUGH, temperature=(85.0, 85.0), opamps=drift))
+    new = replace(warm, spread=ROUGH)
+    (set_warm, at_warm), (set_new, at_new) = (
+        trimmed_boards(of, each, range(60)) for each in (warm, new)
+    )
+    assert at_warm == pytest.approx(at_new, abs=1e-12)
+    moved = at_rest(set_warm)[0] - at_rest(set_new)[0]
+    middle = np.full(60, 0.5)
+    plain = [
+        at_rest(of.at(draw_many(of.circuit, each.spread, each.seed, range(60)), middle))[0]
+        for each in (warm, new)
+    ]
+    assert moved == pytest.approx(plain[0] - plain[1], rel=0.02, abs=0.02 * np.abs(moved).max())
+    assert np.std(moved) > 3.0 * np.std(at_rest(set_new)[0])
 
 
 def test_the_setting_is_as_fine_as_the_part() -> None:

@@ -202,6 +202,12 @@ def test_over_the_temperature_the_same_boards_get_warm() -> None:
     assert found.ok[0] > found.ok[2]
     figure = map_chart("ω = 0.85", found)
     assert figure.axes[0].get_xlabel() == "temperature of the boards [°C]"
+    # The TL074C is specified from 0 to 70 °C.
+    assert [found.outside(celsius) for celsius in points] == [False, False, True]
+    assert found.as_dict()["specified"] == [0.0, 70.0]
+    assert found.as_dict()["op_amps"]["bias_doubling"] == 10.0
+    (legend,) = figure.legends
+    assert "op-amp not specified" in {text.get_text() for text in legend.get_texts()}
 
 
 def test_the_recommended_setting_is_the_one_in_use_unless_another_is_better() -> None:
