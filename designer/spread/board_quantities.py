@@ -16,6 +16,8 @@ from designer.circuit.netlist import Circuit
 _GROUPS = ("values", "offset", "low", "high", "bias", "reference", "supply")
 """Of ``Boards``: what the exact rung depends on and a spread may draw. The drop of a diode and the
 gain are the same on every board; the bandwidth is for ngspice's models alone."""
+ROUNDING = 1e-12
+"""Of a nominal value: what is no difference from it."""
 _NAMES = {"values": "", "reference": "", "supply": ""}
 
 
@@ -30,7 +32,8 @@ class Quantity:
     nominal: float
     """Value on the nominal board, in ohm, farad, volt or ampere."""
     sigma: float
-    """Standard deviation over the spread, in the same unit."""
+    """Standard deviation over the spread, in the same unit; where all boards are off by the same,
+    as bias currents are at one temperature, by how much."""
 
     @property
     def name(self) -> str:
@@ -39,7 +42,7 @@ class Quantity:
 
 
 def quantities(circuit: Circuit, boards: Boards) -> tuple[Quantity, ...]:
-    """What differs between these boards, in the circuit's order.
+    """What differs between these boards, or from the nominal one, in the circuit's order.
 
     The limits of sections that are not meant to reach them are left out: while nothing clips they
     do nothing.
@@ -52,9 +55,10 @@ def quantities(circuit: Circuit, boards: Boards) -> tuple[Quantity, ...]:
         for part, values in columns.items():
             if group in ("low", "high") and part not in limiting:
                 continue
-            sigma = float(np.std(values))
             exact = _nominal(nominal, group, part)
-            if sigma > 1e-12 * abs(exact):
+            sigmas = float(np.std(values)), abs(float(np.mean(values)) - exact)
+            sigma = next((s for s in sigmas if s > ROUNDING * abs(exact)), 0.0)
+            if sigma:
                 varying.append(Quantity(part, group, exact, sigma))
     return tuple(varying)
 

@@ -19,6 +19,7 @@ from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.worker import open_simulator
 from designer.spread import random_streams
+from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of, warmed
 from designer.spread.spread import OpAmpDrift, Spread, draw, draw_many, part_of
 from tests.shared.stages import bought, rectifier, stage
@@ -42,6 +43,16 @@ def test_the_sheets_figures_at_high_temperature_come_out() -> None:
     assert mcp.bias.max == pytest.approx(19e-12, rel=0.05)
     tl = CATALOG.opamp("TL074C").over((0.0, 70.0))
     assert tl.offset.max == pytest.approx(13e-3, abs=1e-3)
+
+
+def test_bias_currents_that_all_boards_share_when_warm_are_a_quantity() -> None:
+    """They differ from the nominal board's alone: 2 to the 6 times 65 pA at 85 °C."""
+    boards = draw_many(SOLD, at(85.0), 1, range(50))
+    found = {q.name: q for q in quantities(SOLD, boards)}
+    assert found["U1A.bias"].sigma == pytest.approx(63.0 * SOLD.bias)
+    assert found["U1A.bias"].nominal == SOLD.bias
+    new = draw_many(SOLD, spread_of(modelfile(""), SOLD, CATALOG), 1, range(50))
+    assert "U1A.bias" not in {q.name for q in quantities(SOLD, new)}
 
 
 def test_of_a_change_with_bounds_the_worst_holds_and_the_middle_is_drawn() -> None:
