@@ -72,15 +72,10 @@ def run_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:
     unconnected = next(rule for rule in rules if rule["id"] == "unconnected")
     return row | {
         "open": unconnected["value"],
-        "complete": all(rule["status"] != "not run" or _is_idle(rule) for rule in rules),
+        "complete": answer["complete"],
         "rules": {rule["id"]: rule["found"] for rule in rules if rule["status"] == "fail"},
         "advised": all(rule["do"] for rule in rules if rule["status"] == "fail"),
     }
-
-
-def _is_idle(rule: Row) -> bool:
-    """Whether a rule was not looked at since the design has nothing that it is of."""
-    return "nothing that this applies to" in str(rule)
 
 
 def search_row(stranger: Stranger, file: Path, design: Path) -> dict[str, Any]:

@@ -118,6 +118,11 @@ class RuleOutcome:
         }
 
     @property
+    def open(self) -> bool:
+        """Whether it could not be looked at, though the design may have what it is of."""
+        return self.status == NOT_RUN and self.found != IDLE
+
+    @property
     def limit_text(self) -> str:
         """The limit in words; what decides it where nothing was found."""
         if self.limit == self.limit:
@@ -125,6 +130,10 @@ class RuleOutcome:
         if self.rule.limit is not None:
             return self.rule.bound(self.rule.limit)
         return self.rule.limit_is
+
+
+IDLE = "the design has nothing that this applies to"
+"""Why a rule was not run that leaves nothing unknown."""
 
 
 class NotRun(Exception):
@@ -142,7 +151,7 @@ def judged(
     """
     ranked = [(_excess(rule, each, override), each) for each in findings]
     if not ranked:
-        raise NotRun("the design has nothing that this applies to")
+        raise NotRun(IDLE)
     _, worst = max(ranked, key=lambda pair: pair[0])
     usual = usual_limit(rule, worst)
     limit = usual if override is None else override.limit

@@ -158,7 +158,7 @@ def _json(
         "title": synthesis.modelfile.title,
         "board": None if board is None else board.path.name,
         "counts": count,
-        "complete": not count[NOT_RUN],
+        "complete": not any(o.open for o in outcomes),
         "rules": [o.as_dict() for o in outcomes],
         "provenance": origin,
         "cost": {"seconds": seconds},

@@ -19,6 +19,7 @@ from designer.base.errors import InputError
 from designer.base.plain_json import dumps
 from designer.catalog.design_rule import (
     FAIL,
+    IDLE,
     NOT_RUN,
     PASS,
     Finding,
@@ -169,6 +170,12 @@ def test_what_a_model_file_may_not_say(text: str, said: list[str]) -> None:
 # The verb
 
 
+@pytest.mark.parametrize(("why", "open_"), [(IDLE, False), ("no board was given", True)])
+def test_what_a_design_does_not_have_leaves_nothing_open(why: str, open_: bool) -> None:
+    assert RuleOutcome(RULES[0], NOT_RUN, why).open is open_
+    assert not RuleOutcome(RULES[0], FAIL, why).open
+
+
 def test_prints_and_writes_the_same_and_keeps_the_folder_whole(
     design: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,7 +190,10 @@ def test_prints_and_writes_the_same_and_keeps_the_folder_whole(
         assert rule["status"] in (PASS, FAIL, NOT_RUN)
         assert all(isinstance(rule[key], str) for key in ("found", "limit", "source", "do"))
     assert answer["counts"] == {PASS: 26, FAIL: 0, NOT_RUN: 30}
+    # Of the 30 only the law that falls is none of this design's; the board was not given.
     assert answer["complete"] is False
+    (idle,) = (r["id"] for r in answer["rules"] if r["found"] == IDLE)
+    assert idle == "far-slope"
     assert answer["provenance"]["versions"]["designer"]
     after = _tree(design)
     assert set(after) - set(before) == {"rules.json"}
