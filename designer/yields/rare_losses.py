@@ -205,24 +205,32 @@ class _Drawing:
     def boards(self, points: Array) -> Boards:
         return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
 
-    def asked(self, boards: Boards) -> list[tuple[Verdict, str]]:
-        """The verdict of each board and what it shows."""
+    def asked(self, boards: Boards, *, brief: bool = False) -> list[tuple[Verdict, str]]:
+        """The verdict of each board and what it shows. brief : as of ``Ensemble.respond``."""
         q = self.question
         out: list[tuple[Verdict, str]] = []
         for first in range(0, len(boards), BLOCK):
             some = range(first, min(first + BLOCK, len(boards)))
             ensemble = Ensemble(boards.take(np.array(some)), jobs=self.jobs)
             cases: list[Case] = [(i, q, q.excitation, q.start.start) for i in range(len(some))]
-            rows = settled(ensemble, cases, self.jobs, self.progress)
+            rows = settled(ensemble, cases, self.jobs, self.progress, brief=brief)
             out += [(verdict, orbit.response) for orbit, verdict, _ in rows]
         return out
 
-    def sample(self, points: Array, component: Index, wide: float = 1.0) -> _Sample:
-        """These boards asked; wide : by how much more off than they may be."""
+    def scouted(self, points: Array, component: Index, wide: float = 1.0) -> _Sample:
+        """These boards asked briefly, which is enough to find where to draw: one that takes long to
+        settle is lost here. wide : by how much more off than they may be."""
         boards = self.boards(points)
         if wide != 1.0:
             boards = between(boards, np.full(len(points), wide))
-        verdicts = self.asked(boards)
+        verdicts = self.asked(boards, brief=True)
+        lost = np.array([v is not Verdict.OK for v, _ in verdicts], dtype=bool)
+        responses = tuple(response for _, response in verdicts)
+        return _Sample(points, component, lost, np.zeros_like(lost), responses)
+
+    def sample(self, points: Array, component: Index) -> _Sample:
+        """These boards asked."""
+        verdicts = self.asked(self.boards(points))
         failed = np.array([v is Verdict.FAILED for v, _ in verdicts], dtype=bool)
         fine = np.array([v is Verdict.OK for v, _ in verdicts], dtype=bool)
         responses = tuple(response for _, response in verdicts)
@@ -383,7 +391,7 @@ def _regions(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region]
     for _ in range(PILOTS):
         some = regions[:MOST_REGIONS]
         cube = TiltedCube.of([r.tilt for r in some], 0.3, len(drawing.names))
-        sample = drawing.sample(*cube.drawn(PILOT, rng))
+        sample = drawing.scouted(*cube.drawn(PILOT, rng))
         asked += len(sample.points)
         clear += int((sample.component == 0).sum())
         regions = _moved(some, cube, sample, drawing.names) or some
@@ -444,7 +452,7 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     found, kinds = list[_Region](), set[str]()
     for wide in WIDE:
         points, component = cube.drawn(EXPLORED, rng)
-        sample = drawing.sample(points, component, wide)
+        sample = drawing.scouted(points, component, wide)
         asked += len(points)
         if sample.lost.mean() < OFTEN:
             continue
@@ -461,7 +469,7 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     while found and wide > 1.0:
         wide = max(NARROWED * wide, 1.0)
         cube = TiltedCube.of([r.tilt for r in found[:MOST_REGIONS]], PLAIN, size)
-        sample = drawing.sample(*cube.drawn(STEP_BACK, rng), wide)
+        sample = drawing.scouted(*cube.drawn(STEP_BACK, rng), wide)
         asked += len(sample.points)
         found = _moved(found[:MOST_REGIONS], cube, sample, drawing.names)
     return found, asked

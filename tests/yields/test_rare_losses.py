@@ -86,7 +86,7 @@ def estimated(
     """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
     is fine. No linear limit is known."""
 
-    def asked(_: object, boards: _Boards) -> list[tuple[Verdict, str]]:
+    def asked(_: object, boards: _Boards, *, brief: bool = False) -> list[tuple[Verdict, str]]:
         return [(Verdict.LOST if r else Verdict.OK, r) for r in lost(boards.points)]
 
     def wider(boards: _Boards, share: Array) -> _Boards:
