@@ -14,13 +14,33 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import Folder, is_design_folder
-from designer.base.manifest import StageName
+from designer.base.errors import InputError
+from designer.base.manifest import MANIFEST, StageName
+from designer.base.schema import literal
 from designer.jobs.options import Options
 from designer.jobs.study_layers import blame_budget, blamed
 from designer.model.model_file import ModelFile
 
 RUNG = "rung"
 """Input of a study's stage: "bandwidth", or not there."""
+
+
+_WHOLE = (int, "a whole number")
+_NUMBER = (int | float, "a number")
+_WORDS = (list, "a list of words")
+KINDS: Mapping[str, tuple[Any, str]] = {
+    "samples": _WHOLE,
+    "boards": _WHOLE,
+    "seed": _WHOLE,
+    "until": _NUMBER,
+    "yield": _NUMBER,
+    "budget": _NUMBER,
+    "layers": _WORDS,
+    "without": _WORDS,
+    "truth": (str, "a word"),
+    RUNG: (str, "a word"),
+}
+"""Of what kind each of these inputs is, and that in words."""
 
 
 def rung_input(options: Options) -> dict[str, str]:
@@ -37,11 +57,26 @@ def stage_numbers(
     names : numbers that the stage always has. limits : inputs that may be None or empty, which
     means that there is no limit; one without a limit is left out. Empty where there is no such
     stage.
+
+    Raises
+    ------
+    InputError : an input is not of the kind that the tool writes.
     """
     stages = {} if folder.manifest is None else folder.manifest.stages
     inputs = stages[stage].inputs if stage in stages else {}
     numbers = {name: inputs[name] for name in names if name in inputs}
-    return numbers | {name: inputs[name] for name in limits if inputs.get(name) not in (None, [])}
+    numbers |= {name: inputs[name] for name in limits if inputs.get(name) not in (None, [])}
+    for name, value in numbers.items():
+        kind, expected = KINDS[name]
+        words = value if isinstance(value, list) else []
+        if (
+            not isinstance(value, kind)
+            or isinstance(value, bool)
+            or not all(isinstance(word, str) for word in words)
+        ):
+            field = f"stages.{stage}.inputs.{name}"
+            raise InputError(folder / MANIFEST, field, literal(value), expected)
+    return numbers
 
 
 def goes_on(model: Path | ModelFile, out: Path, resume: bool) -> bool:
