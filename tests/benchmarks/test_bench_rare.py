@@ -49,6 +49,7 @@ def rare(_case: Case, time: int) -> dict[str, Any]:
 @pytest.fixture
 def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench_rare, "CASES", TWO)
+    monkeypatch.setattr(bench_rare, "FEW", 10)
     monkeypatch.setattr(bench_rare, "plain_row", plain)
     monkeypatch.setattr(bench_rare, "rare_row", rare)
 
@@ -88,7 +89,8 @@ def test_intervals_that_hold_the_plain_share_are_counted(tmp_path: Path) -> None
     said = figures(found)
     assert (said["estimates"], said["hold"], said["share_held"]) == (16, 12, 0.75)
     text = report(found, FEW, 8)
-    assert "12 of 16 intervals of 95 % hold the plain share (75 %)" in text
+    assert "12 of 16 intervals of 95 % meet that of the plain share." in text
+    assert "12 of 16 hold the plain share itself (75 %)" in " ".join(text.split())
     assert "6 of 8" in text
     assert json.loads(json.dumps(said)) == said
 
