@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
-from benchmarks.bench_strangers import filled
+from benchmarks.bench_strangers import filled, whole_lines
 from designer.base.defaults import cores
 from designer.base.proportion import mid_p
 from designer.check.synthesis_result import synthesise
@@ -173,11 +173,7 @@ def missing(rows: Sequence[Row], boards: int, times: int) -> Iterator[tuple[Case
 def measured(path: Path, boards: int, times: int, minutes: float) -> list[Row]:
     """All rows of the file, with what is missing of so many boards and repetitions, as far as the
     time goes."""
-    rows: list[Row] = []
-    if path.exists():
-        whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
-        rows = [json.loads(line) for line in whole.splitlines()]
-        path.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
+    rows = whole_lines(path)
     for case in CASES:
         if any(row["case"] == case.name and row["width"] != case.width for row in rows):
             raise SystemExit(f"{path}: {case.name} of another width; take another --out")
@@ -312,17 +308,18 @@ def _cells(s: Summary) -> list[str]:
 def report(found: Sequence[Summary], boards: int, times: int) -> str:
     """README.md."""
     f = figures(found)
+    commits = dict.fromkeys(row["commit"] for s in found for row in (*s.plain, *s.rare))
     held = "–" if f["share_held"] is None else f"{100 * f['share_held']:.0f} %"
     lines = [
         "# Boards of a million: estimates against plain boards",
         "",
         filled(
             f"Made by `python -m benchmarks rare --boards {boards} --times {times}`. Lines of "
-            f"`{ROWS}` are taken as they are, each with its commit; more boards and more times add "
-            "to them."
+            f"`{ROWS}` are taken as they are, each with its commit; to measure anew, take them "
+            "away. A run with `--minutes` ends before all is measured, and the next one goes on."
         ),
         "",
-        f"- Commit: {commit()}",
+        f"- Commit of the rows: {', '.join(commits)}",
         f"- Machine: {machine()}",
         "",
         filled(

@@ -31,6 +31,7 @@ from benchmarks.bench_strangers import (
     filled,
     last_line,
     printed_json,
+    whole_lines,
 )
 from benchmarks.stranger_systems import FAMILIES, Family, Stranger, draw
 
@@ -119,11 +120,7 @@ def population(
     work: Path,
 ) -> list[Row]:
     """A row for each number, of the file where it is there; each is written as it is done."""
-    rows = {}
-    if path.exists():
-        whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
-        rows = {row["number"]: row for row in map(json.loads, whole.splitlines())}
-        path.write_text("".join(f"{json.dumps(row)}\n" for row in rows.values()), encoding="utf-8")
+    rows = {row["number"]: row for row in whole_lines(path)}
     if any((row["seed"], family_of(row)) != (seed, family) for row in rows.values()):
         raise SystemExit(f"{path}: systems of another seed or family; take another --out")
     with path.open("a", encoding="utf-8") as file:

@@ -247,16 +247,21 @@ def population(
     return [rows[number] for number in numbers if number in rows]
 
 
-def _read(path: Path, seed: int, seconds: float, family: Family) -> Iterator[Row]:
-    """Rows that are there; a line that was cut off is none."""
+def whole_lines(path: Path) -> list[Row]:
+    """Rows of a file that an interrupted run left; a line that was cut off is none, and is taken
+    away."""
     if not path.exists():
-        return
+        return []
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     if whole != text:
         path.write_text(whole, encoding="utf-8")
-    for line in whole.splitlines():
-        row = json.loads(line)
+    return [json.loads(line) for line in whole.splitlines()]
+
+
+def _read(path: Path, seed: int, seconds: float, family: Family) -> Iterator[Row]:
+    """Rows of this population that are there."""
+    for row in whole_lines(path):
         if (row["seed"], row["limit"], family_of(row)) != (seed, seconds, family):
             found = f"systems of seed {row['seed']} with a limit of {row['limit']:g} s"
             found += f" and of the family {family_of(row)}"

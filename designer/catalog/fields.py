@@ -145,7 +145,7 @@ def _without_source(value: dict[str, object]) -> list[InputError]:
 
 
 _PER_KELVIN = re.compile(r"(.*?)\s*(ppm|%)?\s*1?/\s*(?:K|°C)")
-_SHARES = {"ppm": 1e-6, "%": 1e-2, None: 1.0}
+_PARTS = {"ppm": 1e6, "%": 1e2, None: 1.0}
 
 
 def _share_per_kelvin(value: object) -> object:
@@ -156,7 +156,7 @@ def _share_per_kelvin(value: object) -> object:
     stated = _PER_KELVIN.fullmatch(" ".join(value.split()))
     if stated is None:
         return value
-    return _SHARES[stated[2]] * parse_quantity(stated[1], "")
+    return parse_quantity(stated[1], "") / _PARTS[stated[2]]
 
 
 def _of_kelvins(value: object) -> object:
@@ -176,12 +176,13 @@ def per_kelvin() -> Accepts:
     """A magnitude per kelvin: a number, or text that ends in /K, ppm/K or %/K."""
 
     def check(value: object) -> float:
-        magnitude = _share_per_kelvin(value)
-        if isinstance(magnitude, bool) or not isinstance(magnitude, int | float):
+        share = _share_per_kelvin(value)
+        if isinstance(share, bool) or not isinstance(share, int | float):
             raise ValueError
-        if not 0.0 <= magnitude < math.inf:
+        magnitude = parse_quantity(share, "")
+        if magnitude < 0.0:
             raise ValueError
-        return float(magnitude)
+        return magnitude
 
     return Accepts('a number >= 0, per kelvin: 100e-6, or text such as "100 ppm/K"', check)
 

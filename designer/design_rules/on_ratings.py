@@ -155,7 +155,7 @@ def temperature(s: RuleSubject) -> Iterator[Finding]:
     NotRun : the catalogue has no end of the range.
     """
     stands = s.opamp.temperature
-    if stands is None or stands.min is stands.max is None:
+    if stands is None or (stands.min is None and stands.max is None):
         raise NotRun(f"the catalogue has no range of temperatures of {s.opamp.name}")
     low, high = s.catalog.temperatures or (ROOM, ROOM)
     for end, room in (

@@ -97,7 +97,8 @@ def test_intervals_that_hold_the_plain_share_are_counted(tmp_path: Path) -> None
 
 def test_cases_with_too_few_lost_boards_are_left_out() -> None:
     case = TWO[0]
-    few = Summary(case, [plain(case, 0) | {"lost": 2}], [rare(case, 0)])
+    made = {"commit": "abc"}
+    few = Summary(case, [plain(case, 0) | {"lost": 2} | made], [rare(case, 0) | made])
     assert figures([few])["share_held"] is None
     assert "too few lost" in report([few], BLOCK, 1)
 

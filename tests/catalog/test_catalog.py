@@ -16,6 +16,7 @@ from hypothesis import given, strategies as st
 from designer.base.errors import InputError, InputErrors, Unreachable
 from designer.base.eseries import SERIES, eseries, series_values
 from designer.base.units import decode_value
+from designer.catalog import fields
 from designer.catalog.entries import OpAmp
 from designer.catalog.fields import PRICE_CLASSES, Figure
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -735,6 +736,14 @@ def test_one_series_and_a_coefficient_in_ppm(tmp_path: Path) -> None:
         assert family.series == ("E6",)
         assert family.values == tuple(series_values(["E6"], 1e-9, 1e-6).tolist())
         assert family.temperature_coefficient == 300e-6
+
+
+def test_a_coefficient_in_ppm_is_the_number_itself_and_a_long_one_is_refused() -> None:
+    read = fields.per_kelvin().read
+    for count in range(1, 1000):
+        assert read(f"{count} ppm/K") == float(f"{count}e-6")
+    with pytest.raises(ValueError, match="per kelvin"):
+        read(10**400)
 
 
 def test_one_name_twice_in_a_folder(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from random import Random
 import pytest
 
 from designer.cli import entry
-from tests.jobs.test_damaged_folder import EXACT, MODEL
+from tests.jobs.test_damaged_folder import BLOCK, EXACT, MODEL
 from tests.shared.damaged import cells_swapped, damaged, json_of, swapped
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.quick_folders import quick_folder
@@ -21,7 +21,6 @@ from tests.shared.stopped_work import work_stopped
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
-BLOCK = "samples.parquet/block-000000.parquet"
 FILES = (
     "manifest.json", "manifest.json", "design.json", "design.json", "design.json",
     "tolerance.json", "kept.npz", BLOCK, "model.toml", "setup.csv", "bom.csv",
