@@ -309,7 +309,12 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
     """README.md."""
     f = figures(found)
     commits = dict.fromkeys(row["commit"] for s in found for row in (*s.plain, *s.rare))
-    held = "–" if f["share_held"] is None else f"{100 * f['share_held']:.0f} %"
+    held = f"In no case were {FEW} plain boards lost, of which a share is known well enough."
+    if f["share_held"] is not None:
+        held = (
+            f"Of the cases in which {FEW} plain boards or more were lost, {f['hold']} of "
+            f"{f['estimates']} hold the plain share itself ({100 * f['share_held']:.0f} %)."
+        )
     lines = [
         "# Boards of a million: estimates against plain boards",
         "",
@@ -324,8 +329,7 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
         "",
         filled(
             f"{f['meet']} of {f['of_all_cases']} intervals of 95 % meet that of the plain share. "
-            f"Of the cases in which {FEW} plain boards or more were lost, {f['hold']} of "
-            f"{f['estimates']} hold the plain share itself ({held}). Aimed at: "
+            f"{held} Aimed at: "
             f"{100 * WANTED:.0f} % of {TIMES} of each case, against a million plain boards."
         ),
         "",
@@ -366,7 +370,7 @@ def picture(found: Sequence[Summary]) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel("share of boards that lose the response")
     axes.set_title(
-        "grey: plain boards, share and 95 %; blue: intervals that hold the share; red: that do not",
+        f"grey: plain boards, share and 95 %; lines: estimates, red where they miss a share of {FEW} lost",
         fontsize="small",
     )
     return figure
