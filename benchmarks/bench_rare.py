@@ -370,7 +370,8 @@ def picture(found: Sequence[Summary]) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel("share of boards that lose the response")
     axes.set_title(
-        f"grey: plain boards, share and 95 %; lines: estimates, red where they miss a share of {FEW} lost",
+        "grey: plain boards, share and 95 %; lines: estimates, "
+        f"red where they miss a share of {FEW} lost",
         fontsize="small",
     )
     return figure
