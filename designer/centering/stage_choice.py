@@ -142,7 +142,7 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
     if stated is None or len(able) < 2:
         return ""
     kept = boards_that_keep(synthesis, jobs)
-    if kept is None or kept == BOARDS:
+    if kept is None or not _differ(kept, BOARDS):
         return ""
     (kind,) = (each for each in able if each != stated)
     with part(f"with the {kind} stage"):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -63,6 +64,7 @@ class Ensemble:
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
         self._entered: dict[int, working.BoardModes] = {}
+        self._entering = Lock()
         fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
         fits = fits and not (boards.bandwidth and swinging_sections(boards.circuit))  # jumps
         self._modes = _reduced(boards, jobs) if fast and fits else None
@@ -194,18 +196,24 @@ class Ensemble:
         return list(parallel(one, range(len(which)), jobs))
 
     def swept(
-        self, board: int, stages: Sequence[tuple[Drive, int]], starts: Array
+        self,
+        board: int,
+        stages: Sequence[tuple[Drive, int]],
+        starts: Array,
+        beside: Sequence[int] = (),
     ) -> tuple[Array, Mask]:
         """(E, n) the states of a board after each drive for its whole periods, phase-continuous,
         from ``starts`` (E, n) at drive phase 0, and (E,) where the compiled way knows them: there
-        the board kept to its working modes, in which nothing clips that ought to be linear."""
+        the board kept to its working modes, in which nothing clips that ought to be linear.
+
+        beside : boards that are asked about the same drives. Modes that this one enters are solved
+        for them too; no state depends on it.
+        """
         ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
         sines = all(drive.is_sine for drive, _ in stages)
         if self._modes is None or not self._modes.good[board] or not len(ends) or not sines:
             return ends, np.zeros(len(ends), dtype=bool)
-        # A copy, for another thread may ask about this board too.
-        known, row = self._entered.get(board), np.array([0])
-        modes = self._modes.take(np.array([board])) if known is None else known.take(row)
+        modes = self._modes_of(board)
         missing, closely = np.zeros(2, dtype=np.int64), False
         drives = np.array([working_modes.drive_of(drive, MAX_EVENTS) for drive, _ in stages])
         periods = np.array([count for _, count in stages], dtype=np.int64)
@@ -228,13 +236,46 @@ class Ensemble:
                 codes,
                 missing,
             )
+            before = len(modes.targets.keys)
             if missing[0] >= 0:
-                modes.enter([modes.targets.beyond(int(missing[0]), int(missing[1]))])
+                target = modes.targets.beyond(int(missing[0]), int(missing[1]))
+                modes = self._further(board, [target], beside)
             elif not (codes == LEFT).any() or closely:
-                self._entered[board] = modes
                 return ends, np.asarray(codes == DONE)
             else:  # all modes first: a proof step by step takes longer
-                closely = not modes.enter_all()
+                modes = self._further(board, None, beside)
+                closely = len(modes.targets.keys) == before
+
+    def _modes_of(self, board: int) -> working.BoardModes:
+        """A board's own modes: a copy, for another thread may ask about this board too."""
+        assert self._modes is not None
+        known = self._entered.get(board)
+        modes, row = (self._modes, board) if known is None else (known, 0)
+        return modes.take(np.array([row]))
+
+    def _further(
+        self, board: int, keys: Sequence[ModeKey] | None, beside: Sequence[int]
+    ) -> working.BoardModes:
+        """A board's own modes with these working modes too, all where None; and those of the boards
+        beside it that have had the same ones so far: a mode of many boards takes little longer."""
+        with self._entering:
+            modes = self._modes_of(board)
+            if all(key in modes.targets.numbers for key in keys or self.boards.circuit.working):
+                return modes  # nothing is left, or another thread has been here
+            boards, parts = [board], [modes]
+            for other in beside:
+                own = self._modes_of(other)
+                if other != board and own.targets.keys == modes.targets.keys:
+                    boards.append(other)
+                    parts.append(own)
+            joined = working.BoardModes.joined(self.boards.take(np.array(boards)), parts)
+            if keys is None:
+                joined.enter_all()
+            else:
+                joined.enter(keys)
+            for row, each in enumerate(boards):
+                self._entered[each] = joined.take(np.array([row]))
+            return self._modes_of(board)
 
     def _alone(self, board: int, drive: Drive, start: Array, *, brief: bool) -> SettledBoard:
         """One question, in Python."""

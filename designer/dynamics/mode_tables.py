@@ -12,7 +12,7 @@ from designer.base.arrays import Array
 from designer.dynamics.drive_shape import Shape
 from designer.dynamics.piecewise_linear import Drive, Mode
 from designer.kernels import kernel_general as kernel
-from designer.kernels.kernel_algebra import exponential_terms, rows_of_terms
+from designer.kernels.kernel_algebra import all_rows_of_terms, exponential_terms, rows_of_terms
 
 STEP = 0.5
 """‖A h‖ of one step, after balancing."""
@@ -123,8 +123,7 @@ def fill(
         ahead = np.column_stack([C, np.outer(D, drive_row(drive, orders))])
         ahead[:, C.shape[1] + 2] += e  # as of ``augmented_row``
         ahead[:, C.shape[1] :] += np.outer(mode.guards_beside, second_row(drive, orders))
-        for g in range(count):
-            rows_of_terms(ahead[g], powers, taylors[g])
+        all_rows_of_terms(ahead, powers, taylors)
         chords = np.einsum("k,gkj->gj", CHORD, np.abs(taylors[:count]))
         tables.chord[i, :count] = chords * (1.0 + 1e-9)
         tables.target[i, :count] = -1

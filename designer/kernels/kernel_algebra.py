@@ -120,6 +120,13 @@ def rows_of_terms(row: Float, terms: Float, out: Float) -> None:
 
 
 @compiled
+def all_rows_of_terms(rows: Float, terms: Float, out: Float) -> None:
+    """out (rows, orders, N) ← each of the rows (rows, N) as ``rows_of_terms``."""
+    for r in range(len(rows)):
+        rows_of_terms(rows[r], terms, out[r])
+
+
+@compiled
 def motion_terms(row: Float, M: Float, h: float, z: Float, out: Float) -> None:
     """out (orders, k) ← row · (M h)^j/j! z, j = 0, 1, …, for columns z (N, k): the Taylor terms
     over h of a linear function along z' = M z."""

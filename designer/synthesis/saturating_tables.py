@@ -22,19 +22,18 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.base.arrays import Array, Index, distinct_indices
+from designer.base.arrays import Array, Index
 from designer.synthesis.dead_zone_target import DeadZoneTarget, outside
 from designer.synthesis.equal_parts import EqualParts
 from designer.synthesis.value_tables import (
-    DIGITS,
     ValueTable,
     between,
     combinations,
     distance,
     distinct,
+    fewest_of_each,
     how_many_between,
     inside,
-    new_values,
 )
 
 MOST_SHIFT = 0.9
@@ -269,7 +268,7 @@ def tables(
     right = combinations(("R210", "R50"), lists, equal.group)
     right = right.take(inside(right["R50"], box.stop))
     least_noise = -right["R210"] if noisy else None
-    right = _fewest_of_each(right, np.log(right["R210"] / right["R50"]), free, least_noise)
+    right = fewest_of_each(right, np.log(right["R210"] / right["R50"]), free, least_noise)
     first = combinations(("R200", "R201"), lists, equal.group)
     ratio = first["R201"] / first["R200"]
     first = first.take((ratio >= box.first) & (1.0 + ratio <= box.noise_gain))
@@ -284,14 +283,14 @@ def tables(
         low, high = box.shift
         shift = shift.take((ratio * box.steep[1] >= low) & (ratio * box.steep[0] <= high))
     else:  # with a shift R200 stands in the bias too: equal ratios are not the same
-        first = _fewest_of_each(first, np.log(first["R201"] / first["R200"]), free)
+        first = fewest_of_each(first, np.log(first["R201"] / first["R200"]), free)
     t = SaturatingTables(
         target,
         box,
         _left(target, lists, equal, box, free, right, level),
         right,
         first,
-        _fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
+        fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
         combinations(("R204", "R205", "R208"), lists, equal.group),
         shift,
     )
@@ -299,8 +298,8 @@ def tables(
     light = source_resistance(t.divider.columns) if noisy else None
     return replace(
         t,
-        left=_fewest_of_each(t.left, t.left_logs, free, loud),
-        divider=_fewest_of_each(t.divider, t.divider_logs, free, light),
+        left=fewest_of_each(t.left, t.left_logs, free, loud),
+        divider=fewest_of_each(t.divider, t.divider_logs, free, light),
     )
 
 
@@ -319,7 +318,7 @@ def _left(
     pairs = pairs.take(inside(ratio, box.linear) & (1.0 + ratio <= box.noise_gain))
     tied = [name for name in ("R206", "R207") if equal.of(name) == equal.of("R209")]
     if not tied:
-        pairs = _fewest_of_each(pairs, np.log(pairs["R207"] / pairs["R206"]), free)
+        pairs = fewest_of_each(pairs, np.log(pairs["R207"] / pairs["R206"]), free)
     low, high = np.log(target.slope)
     q = np.log(right["R210"] / right["R50"])
     by_value = [ValueTable(("R206", "R207", "R209"), np.zeros((0, 3)))]
@@ -331,19 +330,3 @@ def _left(
         rows = rows.take(distance(q, low - u, high - u) <= level)
         by_value.append(rows.with_column("R209", np.full(len(rows), value)))
     return ValueTable.stacked(by_value)
-
-
-def _fewest_of_each(
-    table: ValueTable, logs: Array, free: frozenset[float], largest: Array | None = None
-) -> ValueTable:
-    """One row for each different logarithm, ascending: that with the fewest values that are not
-    free, and with ``largest`` also the one where that is largest."""
-    if len(table) == 0:
-        return table
-    ranks = [new_values(table.values, free), *([] if largest is None else [-largest])]
-    first = []
-    for rank in ranks:
-        order = np.argsort(rank, kind="stable")
-        first.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
-    both = distinct_indices(np.concatenate(first))
-    return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])

@@ -119,6 +119,28 @@ def new_values(values: Array, free: frozenset[float]) -> Index:
     return np.asarray(kinds - known.any(axis=-1))
 
 
+def fewest_of_each(
+    table: ValueTable, logs: Array, free: frozenset[float], largest: Array | None = None
+) -> ValueTable:
+    """One row for each different logarithm (rows,), ascending: that with the fewest values that are
+    not free, and with ``largest`` (rows,) also the one where that is largest; of equals the first.
+    """
+    if len(table) == 0:
+        return table
+    keys = np.round(logs, DIGITS)
+    order = np.argsort(keys, kind="stable")
+    begins = np.append(True, keys[order[1:]] != keys[order[:-1]])
+    kept = begins & np.append(begins[1:], True)
+    # Of large tables most rows are alone: only the others are ranked.
+    rest = np.flatnonzero(~kept)
+    rows, group = order[rest], np.cumsum(begins)[rest]
+    first = begins[rest]
+    kinds = new_values(table.values[rows], free)
+    for rank in (kinds, *([] if largest is None else [-largest[rows]])):
+        kept[rest[np.lexsort((rank, group))[first]]] = True
+    return table.take(order[kept])
+
+
 def inside(values: Array, limits: tuple[float, float]) -> Mask:
     """Which values lie in a range, its ends included."""
     return np.asarray((values >= limits[0] * (1.0 - 1e-9)) & (values <= limits[1] * (1.0 + 1e-9)))

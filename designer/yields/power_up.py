@@ -32,6 +32,8 @@ WATCHED = 20
 NEAR = 0.01
 """Of each state's peak: a board that has come as near to an orbit that is known to attract, and is
 nearer after one more of its periods, has arrived."""
+BESIDE = 24
+"""Boards whose modes are solved together, where one of them enters these."""
 WAITS = (8, 8, 4)
 """Of the last drive's periods, the parts after which a start may have come to its orbit."""
 STILL = 1e-3
@@ -248,11 +250,15 @@ def _arrivals(
         for k in range(min(parts, len(members)))
     ]
 
+    boards = list(dict.fromkeys(board for board, _ in groups))
+    beside = {b: boards[k - k % BESIDE :][:BESIDE] for k, b in enumerate(boards)}
+
     def arrive(task: tuple[tuple[int, Recipe], list[int]]) -> list[Arrival | str]:
         (board, recipe), members = task
         try:
             system = ensemble.reduction(board).system()
-            swept, phases = partial(ensemble.swept, board), [starts[k][3] for k in members]
+            swept = partial(ensemble.swept, board, beside=beside[board])
+            phases = [starts[k][3] for k in members]
             orbit = known[members[0]] if known else None
             if orbit is None:
                 arrivals = follow(system, recipe.drives, phases, swept)

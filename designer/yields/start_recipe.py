@@ -90,6 +90,11 @@ class Recipe:
         return [(excitation.drive, periods) for excitation, periods in self.stages()]
 
     @property
+    def sweep_periods(self) -> int:
+        """Drive periods of the sweep."""
+        return self.steps * self.hold
+
+    @property
     def sweep_seconds(self) -> float:
         return sum(p / e.frequency for e, p in list(self.stages())[:-1])
 

@@ -32,7 +32,13 @@ BOARDS = 24
 STARTS = 3
 """Phases from which each of them is switched on."""
 FEW_BOARDS = 8
-"""Of the able ones, those that are asked what a person may do otherwise."""
+"""Of the able ones, those that are asked what a person may do otherwise; so many starts on boards
+are tried however long the sweep."""
+BOARD_PERIODS = 20_000
+"""Drive periods of sweeps on boards after which no further start is tried."""
+HAND_PERIODS, LEAST_BY_HAND = 16_000, 4
+"""Drive periods of all sweeps that are tried as a person may do otherwise; where they hold fewer
+sweeps than the second, none is tried."""
 TRIAL = "recipe:"
 """Stream of those boards."""
 STEP = 0.01
@@ -42,10 +48,11 @@ HOLD = 20
 SETTLE = 40
 """Drive periods of the last wait, beside those that shrink a deviation to ``REMAINDER``."""
 REMAINDER = 1e-3
+LONG_SWEEP, GOOD = 1000, 0.75
+"""Drive periods of a sweep beyond which it is tried only where no shorter one is good: works from
+all phases on the nominal circuit, and at this share of the starts on boards."""
 LONGEST_WAIT = 4000
 """Drive periods of the last wait at most."""
-LONGEST_SWEEP = 20_000
-"""Drive periods of a slower sweep up to which it is tried: one from far away takes minutes."""
 ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
@@ -145,24 +152,36 @@ def highest_resonance(system: PiecewiseLinearSystem) -> float:
 
 @dataclass(frozen=True)
 class _Trials:
-    """A recipe with what became of its starts: on the nominal circuit, and on each able board."""
+    """A recipe with what became of its starts. boards : by the able board and the place of its
+    phase."""
 
     recipe: Recipe
     nominal: tuple[bool, ...] = ()
-    boards: tuple[bool, ...] = ()
+    boards: Mapping[tuple[int, int], bool] = field(default_factory=dict)
 
     @property
     def certain(self) -> bool:
-        return all(self.nominal) and all(self.boards)
+        return all(self.nominal) and all(self.boards.values())
 
     @property
-    def starts(self) -> tuple[bool, ...]:
-        return (*self.nominal, *self.boards)
+    def good(self) -> bool:
+        boards = self.boards.values()
+        return all(self.nominal) and sum(boards) >= GOOD * max(len(boards), 1)
+
+    @property
+    def share(self) -> float:
+        """Of all starts, those that lead to the response."""
+        starts = (*self.nominal, *self.boards.values())
+        return sum(starts) / len(starts)
 
     def beaten_by(self, other: _Trials) -> bool:
         """Whether the other one works more often, by a standard error of the difference or more:
-        of the starts that one of the two fails at and the other does not, in √ of their number."""
-        pairs = list(zip(self.starts, other.starts, strict=True))
+        of the starts that one of the two fails at and the other does not, in √ of their number.
+        Starts on boards that only one of them was tried at do not count."""
+        pairs = [
+            *zip(self.nominal, other.nominal, strict=True),
+            *((yes, other.boards[at]) for at, yes in self.boards.items() if at in other.boards),
+        ]
         worse, better = pairs.count((False, True)), pairs.count((True, False))
         return worse > better and worse - better >= math.sqrt(worse + better)
 
@@ -172,7 +191,7 @@ class _Trials:
             self.recipe,
             reached=sum(self.nominal),
             trials=len(self.nominal),
-            board_reached=sum(self.boards),
+            board_reached=sum(self.boards.values()),
             board_trials=len(self.boards),
         )
 
@@ -210,14 +229,20 @@ class _Bench:
         return replace(trials, nominal=(*trials.nominal, *self._shared(False, starts)))
 
     def on_boards(self, trials: _Trials, boards: int = BOARDS, each: int = STARTS) -> _Trials:
-        """On the first ``boards`` able ones, from the first ``each`` phases of each."""
-        able, periodic = list(self.able.items())[:boards], self.question.periodic
-        starts = [
-            _Trial(i, trials.recipe, phase(STARTS * i + k), orbit if periodic else None)
-            for k in range(each)
+        """On the first ``boards`` able ones, from the first ``each`` phases of each, without those
+        that were tried before; from fewer phases, and on fewer boards, where the sweep is long."""
+        most = max(BOARD_PERIODS // max(trials.recipe.sweep_periods, 1), FEW_BOARDS)
+        each = min(each, max(most // FEW_BOARDS, 1))
+        able = list(self.able.items())[: min(boards, most // each)]
+        periodic = self.question.periodic
+        starts = {
+            (i, k): _Trial(i, trials.recipe, phase(STARTS * i + k), orbit if periodic else None)
             for i, orbit in able
-        ]
-        return replace(trials, boards=tuple(self._shared(True, starts)))
+            for k in range(each)
+            if (i, k) not in trials.boards
+        }
+        found = self._shared(True, list(starts.values()))
+        return replace(trials, boards={**trials.boards, **dict(zip(starts, found, strict=True))})
 
     def _shared(self, are_samples: bool, trials: Sequence[_Trial]) -> list[bool]:
         """``worked``, half of it elsewhere: by boards, for the starts of one share its tables."""
@@ -248,21 +273,21 @@ class _Bench:
 
 
 def _find(bench: _Bench) -> Recipe:
-    question, sample = bench.question, bench.sample
-    start = question.start.start
-    cases: list[Case] = [(i, question, question.excitation, start) for i in range(BOARDS)]
-    as_built = enumerate(settled(sample, cases, bench.jobs, brief=True))
-    able = {i: orbit for i, (orbit, verdict, _) in as_built if verdict is Verdict.OK}
+    drawn, able = _able(bench)
     bench = replace(bench, able=able)
     every: list[_Trials] = []
-    for option in candidates(question, bench.nominal.reduction(0).system()):
+    for option in candidates(bench.question, bench.nominal.reduction(0).system()):
+        if option.sweep_periods > LONG_SWEEP and any(trials.good for trials in every):
+            break
         doing(str(option.way))
-        trials = _Trials(replace(option, boards=BOARDS, able=len(able)))
+        trials = _Trials(replace(option, boards=drawn, able=len(able)))
         trials = bench.on_nominal(trials, FEW_TRIALS)
         if any(trials.nominal):
             trials = bench.on_nominal(trials)
         if all(trials.nominal):
-            trials = bench.on_boards(trials)
+            trials = bench.on_boards(trials, FEW_BOARDS)
+            if trials.certain:
+                trials = bench.on_boards(trials)
             if trials.certain:
                 return _by_hand(trials, bench)
         every.append(trials)
@@ -271,37 +296,59 @@ def _find(bench: _Bench) -> Recipe:
     return _best(every, bench)
 
 
+def _able(bench: _Bench) -> tuple[int, Mapping[int, Orbit]]:
+    """How many boards were asked, and those that show the response as built, with their orbits.
+    Where none of the first half does, the others are not asked."""
+    question, able = bench.question, dict[int, Orbit]()
+    for asked in (range(BOARDS // 2), range(BOARDS // 2, BOARDS)):
+        cases: list[Case] = [
+            (i, question, question.excitation, question.start.start) for i in asked
+        ]
+        ends = settled(bench.sample, cases, bench.jobs, brief=True)
+        able |= {
+            i: orbit
+            for i, (orbit, verdict, _) in zip(asked, ends, strict=True)
+            if verdict is Verdict.OK
+        }
+        if not able:
+            return asked.stop, able
+    return BOARDS, able
+
+
 def _best(every: Sequence[_Trials], bench: _Bench) -> Recipe:
     """The first recipe that no other one plainly beats, of those that worked at all."""
     working = [t for t in every if any(t.nominal)]
     if not working:
         return every[0].counted
     first = max(working, key=lambda t: sum(t.nominal))
-    hopeful = [t for t in working if not replace(t, boards=()).beaten_by(replace(first, boards=()))]
-    complete = [t if t.boards else bench.on_boards(t) for t in hopeful]
-    best = max(complete, key=lambda t: sum(t.starts))
+    hopeful = [t for t in working if not replace(t, boards={}).beaten_by(replace(first, boards={}))]
+    complete = [bench.on_boards(t) for t in hopeful]
+    best = max(complete, key=lambda t: t.share)
     return _by_hand(next(t for t in complete if not t.beaten_by(best)), bench)
 
 
 def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
     """The recipe with how freely its sweep may be done: without steps, and slower. These are tried
-    from a few phases, and from one phase of a few boards."""
+    from a few phases, and from one phase of a few boards, the fewer the longer the sweep is."""
     recipe = trials.counted
     if recipe.way is RecipeKind.DIRECT:
         return recipe
-    few = min(FEW_BOARDS, len(bench.able))
-    nominal, boards = sum(trials.nominal[:FEW_TRIALS]), sum(trials.boards[:few])
 
     def as_well(other: Recipe) -> bool:
-        tried = bench.on_nominal(_Trials(other), FEW_TRIALS)
-        if sum(tried.nominal) < nominal:
+        starts = HAND_PERIODS // other.sweep_periods
+        if starts < LEAST_BY_HAND:
             return False
-        return sum(bench.on_boards(tried, few, 1).boards) >= boards
+        phases = min(starts // 3 + 1, FEW_TRIALS)
+        few = min(starts - phases, FEW_BOARDS, len(bench.able))
+        tried = bench.on_nominal(_Trials(other), phases)
+        if sum(tried.nominal) < sum(trials.nominal[:phases]):
+            return False
+        boards = bench.on_boards(tried, few, 1).boards
+        return sum(boards.values()) >= sum(trials.boards[at] for at in boards)
 
     smooth = as_well(recipe.refined())
     slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)
-    short = slow.steps * slow.hold <= LONGEST_SWEEP
-    return replace(recipe, smooth=smooth, slower=short and as_well(slow))
+    return replace(recipe, smooth=smooth, slower=as_well(slow))
 
 
 def phase(number: int) -> float:

@@ -111,3 +111,8 @@ def test_boards_whose_states_move_together_are_served() -> None:
         assert np.abs((ends[0] - x) / np.abs(x).max()).max() < 1e-8
         again, _ = fast.swept(board, stages, rest)
         np.testing.assert_array_equal(again, ends)
+    # Modes that are solved for several boards at once are those of each.
+    both = Ensemble(boards)
+    for board in range(COUNT):
+        beside = both.swept(board, stages, rest, range(COUNT))
+        np.testing.assert_array_equal(beside[0], fast.swept(board, stages, rest)[0])

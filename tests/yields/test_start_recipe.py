@@ -294,7 +294,8 @@ def test_one_recipe_beats_another_by_more_than_chance() -> None:
     """McNemar: only starts at which one of the two failed say anything about the difference."""
 
     def trials(*worked: int) -> _Trials:
-        return _Trials(recipes(1)[RecipeKind.DIRECT], (True,) * 12, tuple(map(bool, worked)))
+        boards = {(i, 0): bool(yes) for i, yes in enumerate(worked)}
+        return _Trials(recipes(1)[RecipeKind.DIRECT], (True,) * 12, boards)
 
     always, once_off = trials(1, 1, 1, 1, 1, 1), trials(1, 1, 0, 1, 1, 1)
     assert always.certain
@@ -304,6 +305,51 @@ def test_one_recipe_beats_another_by_more_than_chance() -> None:
     assert not always.beaten_by(always)
     assert not trials(0, 0, 1, 1, 1, 1).beaten_by(trials(1, 1, 1, 1, 0, 1))  # 2 against 1
     assert trials(0, 0, 0, 1, 1, 1).beaten_by(trials(1, 1, 1, 1, 0, 1))  # 3 against 1
+    assert not trials(0, 1, 1).beaten_by(trials(0, 1, 1, 1, 1, 1))  # of the same starts
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_a_long_sweep_is_tried_where_no_shorter_one_is_good(
+    monkeypatch: pytest.MonkeyPatch, share: float
+) -> None:
+    """It takes minutes on the bench and most of the search's time; it is tried on fewer starts."""
+    seen = set[tuple[RecipeKind, int, float]]()
+
+    class Ended:
+        def __init__(self, ok: bool) -> None:
+            self.verdict = Verdict.OK if ok else Verdict.LOST
+
+    def ends(
+        ensemble_: Ensemble,
+        starts: list[tuple[int, Question, Recipe, float]],
+        *_: object,
+        **__: object,
+    ) -> list[Ended]:
+        alone = len(ensemble_.boards.values["R1"]) == 1
+        if not alone:
+            seen.update((recipe.way, board, begun) for board, _, recipe, begun in starts)
+        return [
+            Ended(recipe.way is RecipeKind.FROM_FAR or alone or board % 10 >= 10.0 * (1.0 - share))
+            for board, _, recipe, _ in starts
+        ]
+
+    monkeypatch.setattr(start_recipe_search, "switched_on", ends)
+    assert recipes(2)[RecipeKind.FROM_FAR].sweep_periods > start_recipe_search.LONG_SWEEP
+    (found,) = find_recipes(plan(2))
+    short = RecipeKind.AMPLITUDE
+    far = [start for start in seen if start[0] is RecipeKind.FROM_FAR]
+    if share > start_recipe_search.GOOD:
+        assert found.way is not RecipeKind.FROM_FAR
+        assert not far
+    else:
+        assert found.way is RecipeKind.FROM_FAR
+        assert found.board_reached == found.board_trials == len(far)
+        periods = len(far) * found.sweep_periods
+        assert periods <= start_recipe_search.BOARD_PERIODS
+        assert not found.slower  # ten times as slow would be too long to try
+    assert recipes(2)[short].sweep_periods > start_recipe_search.LONG_SWEEP
+    shortest = [start for start in seen if start[0] is RecipeKind.FROM_ABOVE]
+    assert len(shortest) >= 3 * start_recipe_search.FEW_BOARDS
 
 
 def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
