@@ -23,6 +23,7 @@ from designer.check import coexistence, trust
 from designer.check.absolute_motion import absolute_extremes
 from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, spice_trace
 from designer.check.coexistence import Coexistence
+from designer.check.cubic_range import BeyondRange, beyond_ranges
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
@@ -98,6 +99,9 @@ class Simulated:
     absolute: tuple[Array, ...] = ()
     """Of the orbit and of each of ``others``, (states, 2): least and greatest absolute displacement
     of each mass in the place of its state, refined; (0, 2) where it is not known."""
+    beyond: tuple[tuple[BeyondRange, ...], ...] = ()
+    """Of the orbit and of each of ``others``, the cubic springs that it draws beyond their ranges;
+    () where the engine was not asked (ngspice)."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()
@@ -118,11 +122,17 @@ class Simulated:
     def rows(self) -> list[dict[str, Any]]:
         """A row for each orbit, which ``orbit`` says: "wanted" or "reached", "twin", "other"."""
         first = "reached" if self.expected is None else "wanted"
-        orbits = [(first, self.orbit)]
-        orbits += [("twin", self.twin)] if self.twin is not None else []
-        orbits += [("other", orbit) for orbit in self.others]
+        every = (self.orbit, *self.others)
+        spans = self.absolute or tuple(orbit.extremes for orbit in every)
+        orbits = [(first, self.orbit, spans[0])]
+        if self.twin is not None:
+            # The base's motion has the mirror of the rest.
+            mirrored = -spans[0][:, ::-1] if self.base else self.twin.extremes
+            orbits.append(("twin", self.twin, mirrored))
+        others = zip(self.others, spans[1:], strict=True)
+        orbits += [("other", orbit, span) for orbit, span in others]
         head = {"omega": self.omega, "expected": self.expected, "found": self.found}
-        return [{**head, "orbit": kind, **_figures(orbit)} for kind, orbit in orbits]
+        return [{**head, "orbit": kind, **_figures(orbit, span)} for kind, orbit, span in orbits]
 
     def _repr_html_(self) -> str:
         return table_html(f"ω = {self.omega:g}", self.rows())
@@ -216,9 +226,12 @@ def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
 # ---------------------------------------------------------------------------------------------
 
 
-def _figures(orbit: Orbit) -> dict[str, Any]:
-    """What a table says of an orbit; NaN where it has no extremes."""
-    low, high = orbit.extremes[0] if len(orbit.extremes) else (np.nan, np.nan)
+def _figures(orbit: Orbit, extremes: Array) -> dict[str, Any]:
+    """What a table says of an orbit; NaN where it has no extremes.
+
+    extremes : (states, 2) or (0, 2) of absolute displacements.
+    """
+    low, high = extremes[0] if len(extremes) else (np.nan, np.nan)
     return {
         "response": orbit.response,
         "status": str(orbit.status),
@@ -270,6 +283,7 @@ def _on_model(
         trust=trust.of_orbit(flow, orbits[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
+        beyond=tuple(beyond_ranges(model, flow, o, units) for o in orbits),
         **_of_system(model, r.omega),
     )
 
@@ -380,6 +394,7 @@ def _on_circuit(
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
+        beyond=tuple(beyond_ranges(model, flow, measured[i], volts) for i in rows),
         **_of_system(model, r.omega),
     )
 

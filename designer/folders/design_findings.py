@@ -9,14 +9,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from designer.base.errors import InputError
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
+from designer.check.cubic_range import beyond_ranges
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.design_rules import run_rules
 from designer.design_rules.rule_subject import RuleSubject
+from designer.model.driven import model_flow
 from designer.report import words
 from designer.report.design_tables import spring_of
 from designer.synthesis.parts_choice import ways_to_less_error
@@ -41,7 +45,7 @@ def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[st
     A design without responses, or one that no board can be made of, has no rule that fails for
     want of something to look at; the latter is a warning.
     """
-    warnings = [*error_warnings(synthesis), *_responses(synthesis)]
+    warnings = [*error_warnings(synthesis), *_responses(synthesis), *_ranges(synthesis)]
     failed: list[RuleOutcome] = []
     if isinstance(subject, InputError):
         warnings.append(f"The design rules were not looked at: {subject}")
@@ -85,6 +89,17 @@ def _responses(synthesis: Synthesis) -> Iterator[str]:
             name = wanted.expected or wanted.orbit.response
             at, shown = file.drive_text(wanted.omega), words.orbit(checked.circuit)
             yield f"The nominal circuit does not show {name} at {at}: it shows {shown}."
+
+
+def _ranges(synthesis: Synthesis) -> Iterator[str]:
+    """Cubic springs that a response of the model draws beyond their ranges."""
+    file = synthesis.modelfile
+    for r in synthesis.model_responses:
+        model = file.model.at(r.b)
+        flow = model_flow(model, r.omega)
+        for spring in beyond_ranges(model, flow, r.orbit, np.ones(flow.system.size)):
+            told = spring.told(r.orbit.response, in_si=file.si is not None)
+            yield f"At {file.drive_text(r.omega)} the response {told}."
 
 
 def _rules(ids: Sequence[str]) -> str:

@@ -173,6 +173,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x_max": high,
         "x_min": low,
         **_from_base(simulated, orbit),
+        **_beyond_range(simulated, number),
         "twin": twin,
     }
     for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
@@ -187,6 +188,12 @@ def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
     z = orbit.extremes[0::2] if len(orbit.extremes) else None
     low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
     return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
+
+
+def _beyond_range(simulated: Simulated, number: int) -> dict[str, Any]:
+    """Cubic springs that an orbit draws beyond their ranges; nothing where it draws none."""
+    beyond = simulated.beyond[number] if simulated.beyond else ()
+    return {"beyond_range": [each.as_dict() for each in beyond]} if beyond else {}
 
 
 def _by_state(values: Array) -> dict[str, Any]:

@@ -197,6 +197,8 @@ def _several(name: str, given: object, example: str) -> list[float | str]:
 
 def tables(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
+    from designer.check.cubic_range import BeyondRange
+
     head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
     rows = answer["responses"]
     masses = answer.get("masses", ())
@@ -226,6 +228,9 @@ def tables(answer: Mapping[str, Any]) -> None:
             say(f"{place}: {coexisting(r['starts'], masses, in_si=in_si)}")
         if r["reason"]:
             say(f"{place}: {r['response']}: {r['reason']}")
+        for each in (r, *r["others"]):
+            for spring in each.get("beyond_range", ()):
+                say(f"{place}: {BeyondRange(**spring).told(each['response'], in_si=in_si)}")
         if r["frequencies"] is not None:
             say(f"{place}: {frequencies(r)}")
         for other in r["others"]:

@@ -108,6 +108,20 @@ def test_simulate(model: Path) -> None:
     assert wanted.x1_max.to_numpy() == pytest.approx([0.401043, 0.388356], abs=1e-6)  # README.md
 
 
+def test_a_table_and_an_answer_name_the_same_displacements() -> None:
+    """Absolute ones, where the base moves and the equations count from it."""
+    file = Path(__file__).parents[2] / "examples" / "hammer-base.toml"
+    found = designer.simulate(file, frequency="54 Hz", starts=4)
+    (row,), table = found.answer["responses"], found.table()
+    assert row["base_amplitude"] > 0.0
+    both = [row, *row["others"]]
+    for kind in ("min", "max"):
+        expected = [each[f"x1_{kind}"] for each in both]
+        shown = table[table.orbit != "twin"][f"x1_{kind}"]
+        assert list(shown) == pytest.approx(expected, rel=1e-12)
+        assert expected[0] != pytest.approx(row["extremes"]["x1"][kind == "max"], rel=0.01)
+
+
 def test_a_frequency_may_be_one_value_or_several() -> None:
     """54 Hz and 2π · 54 rad/s are one place, however they are given; what is none says what is."""
     file = Path(__file__).parents[2] / "examples" / "hammer-base.toml"
