@@ -25,11 +25,11 @@ CHOSEN: Final[Mapping[str, float]] = {"responses of the model, parts": 12.0}
 """Of the choice of parts by the match."""
 OTHER_STAGE: Final[Mapping[str, float]] = {"the other stage of the clearance": 4.0}
 """Of a look at the stage that the file does not state."""
-WRITTEN: Final[Mapping[str, float]] = {
-    "files of the design": 5.0,
-    "KiCad project": 4.0,
-    "start recipes": 6.0,
-}
+FILES: Final[Mapping[str, float]] = {"files of the design": 5.0, "KiCad project": 4.0}
+"""Of the files of a design that are known as soon as its parts are chosen."""
+LAST: Final[Mapping[str, float]] = {"start recipes": 6.0}
+"""Of the others."""
+WRITTEN: Final[Mapping[str, float]] = {**FILES, **LAST}
 """Of the files of a design."""
 
 
@@ -66,4 +66,4 @@ def of_design(modelfile: ModelFile) -> dict[str, float]:
     if modelfile.circuit.objective == "yield":
         return {**SEARCHED, **WRITTEN}
     other = OTHER_STAGE if modelfile.circuit.dead_zone is not None else {}
-    return {**CHOSEN, **other, **WRITTEN}
+    return {**CHOSEN, **FILES, **other, **LAST}
