@@ -164,22 +164,53 @@ stiffness = "540 kN/m"          # or upper_stiffness and lower_stiffness
 # constant = 3e10               # N/m^1.5
 # depth = "0.3 mm"              # down to which it holds
 # pieces = 4
+# of = { hammer = 1.0, casing = -0.5 } # in the place of between: of a sum of displacements
+
+# A force that is straight from point to point, [x, force] by rising x; above 0 it pulls back.
+# [[law]]
+# name = "bumper"
+# between = ["hammer", "casing"] # or of = {...}
+# points = [["-2 mm", "-300 N"], ["-1 mm", "-60 N"], ["1 mm", "60 N"], ["2 mm", "300 N"]]
+# quantity = "displacement"     # or "velocity", in m/s
+
+# The force k1 x + k3 x^3, in straight pieces up to its range.
+# [[cubic_spring]]
+# between = ["casing", "ground"]
+# k1 = "2 kN/m"                 # below 0: two wells
+# k3 = 2e9                      # N/m^3
+# range = "2 mm"
+# error = 0.01                  # of the largest force in the range; or points = 8
+
+# Dry friction: the force rises in proportion up to this velocity, then it slides.
+# [[friction]]
+# between = ["casing", "ground"]
+# force = "2 N"
+# velocity = "2 mm/s"
+# static = "3 N"                # larger until it slides,
+# stribeck = "20 mm/s"          # and down to force at this velocity
+# speed = "0.1 m/s"             # of a belt on which it slides
+
+# Masses, springs and dampers may be given as matrices in their place ([matrices]).
 
 # amplitude * sin(omega t) + constant
 [[force]]
 on = "hammer"
 amplitude = "80 N"              # negative: in antiphase
 # constant = "-19.6 N"          # a weight or a preload
+# phase = "90 deg"              # ahead of the other forces
+# waveform = "square"           # or "triangle", "sawtooth": of its first harmonics
+# terms = 5
+# harmonics = [[2, "10 N", "0 deg"]] # 10 N sin(2 omega t) beside it
 
 # The ground moves by amplitude * sin(omega t).
 # [base]
-# amplitude = "0.1 mm"          # or its acceleration: "0.5 g", "5 m/s²"
+# amplitude = "0.1 mm"          # or its acceleration: "0.5 g", "5 m/s²"; phase, waveform as above
 # stops = "base"                # stops to ground move with it; "fixed": they stay
 
 # The responses that the board shall show: n-p-q, with n periods of the force, p impacts on the
-# upper stop and q on the lower one in that time; of two clearances "1-2-2;0-1". Leave `expect` out
-# to take what comes. The frequency: frequency = "54 Hz", Omega = 340 (rad/s), or omega in the
-# file's own units.
+# upper stop and q on the lower one in that time; of two clearances "1-2-2;0-1". "aperiodic" and
+# "quasi-periodic" can be wanted too. Leave `expect` out to take what comes. The frequency:
+# frequency = "54 Hz", Omega = 340 (rad/s), or omega in the file's own units.
 [[response]]
 frequency = "54 Hz"
 expect = "1-1-1"

@@ -13,6 +13,7 @@ from designer.cli import entry
 from designer.jobs.second_format import second_format
 from designer.jobs.template import SECOND, TEXT
 from designer.model.driven import model_flow
+from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Mechanical
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.verbs.new import new
@@ -97,6 +98,21 @@ def test_si_values_keep_their_texts() -> None:
     assert other.model.second_order().mass.tolist() == [old.mechanical.M1, old.mechanical.M2]
     assert 'stiffness = "60 kN/m"' in written
     assert second_format(other) == written
+
+
+def test_what_the_template_offers_is_accepted() -> None:
+    """Its tables of laws, and the shapes of its force, with the marks of comments taken away."""
+    lines, taken = [], False
+    for line in SECOND.splitlines():
+        stripped = line.removeprefix("# ")
+        taken = stripped != line and (taken or stripped.startswith(("[[", "phase")))
+        lines.append(stripped if taken else line)
+    found = parse_model_file("\n".join(lines)).model
+    assert isinstance(found, LumpedSystem)
+    assert list(found.nonlinear) == ["bumper", "casing-ground.cubic", "casing-ground.friction"]
+    (force,) = found.forces
+    assert (force.waveform, force.terms, len(force.harmonics or ())) == ("square", 5, 1)
+    assert force.phase == pytest.approx(np.pi / 2)
 
 
 def test_from_the_command_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
