@@ -59,7 +59,7 @@ def beyond_ranges(
     model : at the orbit's clearance. units : (n,) of each state of the flow per unit of the
     model's.
     """
-    springs = _springs(model)
+    springs = cubic_springs(model)
     if not springs or orbit.status not in ANSWERS:
         return ()
     with flow.within(Budget(step_budget.SETTLING)):
@@ -78,7 +78,7 @@ def beyond_ranges(
     return tuple(out)
 
 
-def _springs(model: MechanicalModel) -> Mapping[str, BeyondRange]:
+def cubic_springs(model: MechanicalModel) -> Mapping[str, BeyondRange]:
     """The cubic springs by the names of their laws, with nothing reached yet."""
     if not isinstance(model, LumpedSystem):
         return {}

@@ -126,7 +126,7 @@ class Simulated:
         spans = self.absolute or tuple(orbit.extremes for orbit in every)
         orbits = [(first, self.orbit, spans[0])]
         if self.twin is not None:
-            # The base's motion has the mirror of the rest.
+            # The base moves alike in either half period, so that what is absolute is mirrored too.
             mirrored = -spans[0][:, ::-1] if self.base else self.twin.extremes
             orbits.append(("twin", self.twin, mirrored))
         others = zip(self.others, spans[1:], strict=True)

@@ -84,16 +84,12 @@ def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> Non
         folder.write(MEASURED, synthesis.modelfile.measured.content)
 
 
-Drawing = Callable[[], Mapping[str, str | bytes]]
-"""Waits for a drawing, and gives its files by name."""
-
-
 def write_last(
     folder: Folder,
     synthesis: Synthesis,
     jobs: int,
     other: Ask,
-    drawing: Drawing,
+    drawing: Callable[[], Mapping[str, str | bytes]],
 ) -> None:
     """Write the rest of the stage: the drawing, how to start each response, and ``design.json``.
     other : as of ``find_recipes``. drawing : waits for it."""

@@ -15,7 +15,7 @@ from designer.base.errors import InputError
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
-from designer.check.cubic_range import beyond_ranges
+from designer.check.cubic_range import beyond_ranges, cubic_springs
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.design_rules import run_rules
@@ -94,6 +94,8 @@ def _responses(synthesis: Synthesis) -> Iterator[str]:
 def _ranges(synthesis: Synthesis) -> Iterator[str]:
     """Cubic springs that a response of the model draws beyond their ranges."""
     file = synthesis.modelfile
+    if not cubic_springs(file.model):
+        return
     for r in synthesis.model_responses:
         model = file.model.at(r.b)
         flow = model_flow(model, r.omega)

@@ -7,6 +7,7 @@ last; what is interrupted in between can be resumed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -102,20 +103,29 @@ class StageRunner:
                 synthesis = stage_choice.synthesise(self.modelfile, self.catalog, jobs=jobs)
                 self.shown(plain(design_files.chosen(synthesis)))
                 compiled()
-                drawing = write_first(
-                    self.folder, synthesis, stages, self.options, self.progress, other
+                synthesis = write_design(
+                    self.folder,
+                    synthesis,
+                    stages,
+                    self.options,
+                    self.progress,
+                    other,
+                    self._with_other_stage,
                 )
-                if self.modelfile.circuit.dead_zone is not None:
-                    self.progress.stage("the other stage of the clearance")
-                    better = stage_choice.better_stage(self.modelfile, synthesis, jobs)
-                    synthesis = replace(synthesis, better_stage=better)
-                write_last(self.folder, synthesis, self.options, self.progress, other, drawing)
         else:
             synthesis = design_files.load(self.folder, self.modelfile, self.catalog)
             self.shown(design_answer(self.folder))
             if stages:
                 self.folder.begin(stages, design_files.design_provenance(synthesis))
         return synthesis
+
+    def _with_other_stage(self, synthesis: Synthesis) -> Synthesis:
+        """With what is said of the stage that the model file does not state."""
+        if self.modelfile.circuit.dead_zone is None:
+            return synthesis
+        self.progress.stage("the other stage of the clearance")
+        better = stage_choice.better_stage(self.modelfile, synthesis, self.options.workers)
+        return replace(synthesis, better_stage=better)
 
 
 def write_design(
@@ -125,24 +135,15 @@ def write_design(
     options: Options,
     progress: Progress,
     other: Ask,
-) -> None:
-    """Write a design and its KiCad project. stages : that begin now, the design among them. other :
-    as of ``write_first`` and ``write_last``."""
-    drawing = write_first(folder, synthesis, stages, options, progress, other)
-    write_last(folder, synthesis, options, progress, other, drawing)
+    looked_at: Callable[[Synthesis], Synthesis] = lambda synthesis: synthesis,
+) -> Synthesis:
+    """Write a design and its KiCad project, what takes longest at the end: parts can be looked at
+    while the rest is sought. The design as it was looked at is returned.
 
-
-def write_first(
-    folder: Folder,
-    synthesis: Synthesis,
-    stages: Stages,
-    options: Options,
-    progress: Progress,
-    other: Ask,
-) -> design_files.Drawing:
-    """Write what is known as soon as the parts are chosen, and the KiCad project: they can be
-    looked at while what takes longer is sought. other : draws beside this process, which holds the
-    interpreter; what is returned waits for the drawing."""
+    stages : that begin now, the design among them. other : draws beside this process, which holds
+    the interpreter, and takes half of the recipes. looked_at : what more is to be said of the
+    design, asked once its project is written.
+    """
     progress.stage("files of the design")
     with errors_in(synthesis.modelfile):
         files = design_files.texts(synthesis)
@@ -153,19 +154,8 @@ def write_first(
     design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
-    return drawing
-
-
-def write_last(
-    folder: Folder,
-    synthesis: Synthesis,
-    options: Options,
-    progress: Progress,
-    other: Ask,
-    drawing: design_files.Drawing,
-) -> None:
-    """Write the rest of a design. other : takes half of the recipes. drawing : of
-    ``write_first``."""
+    synthesis = looked_at(synthesis)
     progress.stage("start recipes, design rules of the circuit")
     design_files.write_last(folder, synthesis, options.workers, other, drawing)
     folder.finish("design")
+    return synthesis

@@ -278,7 +278,7 @@ def _find(bench: _Bench) -> Recipe:
     every: list[_Trials] = []
     for option in candidates(bench.question, bench.nominal.reduction(0).system()):
         if option.sweep_periods > LONG_SWEEP and any(trials.good for trials in every):
-            break
+            continue
         doing(str(option.way))
         trials = _Trials(replace(option, boards=drawn, able=len(able)))
         trials = bench.on_nominal(trials, FEW_TRIALS)

@@ -51,6 +51,13 @@ def nominal(p: int) -> Ensemble:
     return ensemble([subject(p).board], p)
 
 
+class Ended:
+    """What became of a start."""
+
+    def __init__(self, ok: bool) -> None:
+        self.verdict = Verdict.OK if ok else Verdict.LOST
+
+
 # What a recipe is.
 
 
@@ -166,10 +173,6 @@ def test_only_a_recipe_that_worked_on_the_nominal_board_is_taken(
 ) -> None:
     """Sample boards that all start directly are no reason to offer that, if the nominal one does
     not; and nothing is, where no recipe works on it."""
-
-    class Ended:
-        def __init__(self, ok: bool) -> None:
-            self.verdict = Verdict.OK if ok else Verdict.LOST
 
     def ends(
         ensemble_: Ensemble,
@@ -315,10 +318,6 @@ def test_a_long_sweep_is_tried_where_no_shorter_one_is_good(
     """It takes minutes on the bench and most of the search's time; it is tried on fewer starts."""
     seen = set[tuple[RecipeKind, int, float]]()
 
-    class Ended:
-        def __init__(self, ok: bool) -> None:
-            self.verdict = Verdict.OK if ok else Verdict.LOST
-
     def ends(
         ensemble_: Ensemble,
         starts: list[tuple[int, Question, Recipe, float]],
@@ -336,7 +335,6 @@ def test_a_long_sweep_is_tried_where_no_shorter_one_is_good(
     monkeypatch.setattr(start_recipe_search, "switched_on", ends)
     assert recipes(2)[RecipeKind.FROM_FAR].sweep_periods > start_recipe_search.LONG_SWEEP
     (found,) = find_recipes(plan(2))
-    short = RecipeKind.AMPLITUDE
     far = [start for start in seen if start[0] is RecipeKind.FROM_FAR]
     if share > start_recipe_search.GOOD:
         assert found.way is not RecipeKind.FROM_FAR
@@ -347,9 +345,33 @@ def test_a_long_sweep_is_tried_where_no_shorter_one_is_good(
         periods = len(far) * found.sweep_periods
         assert periods <= start_recipe_search.BOARD_PERIODS
         assert not found.slower  # ten times as slow would be too long to try
-    assert recipes(2)[short].sweep_periods > start_recipe_search.LONG_SWEEP
-    shortest = [start for start in seen if start[0] is RecipeKind.FROM_ABOVE]
-    assert len(shortest) >= 3 * start_recipe_search.FEW_BOARDS
+    assert recipes(2)[RecipeKind.AMPLITUDE].sweep_periods > start_recipe_search.LONG_SWEEP
+    short = [start for start in seen if start[0] is RecipeKind.FROM_ABOVE]
+    assert len(short) >= 3 * start_recipe_search.FEW_BOARDS
+
+
+def test_a_short_sweep_from_afar_is_tried_though_the_amplitude_s_is_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A good recipe leaves out the long sweeps alone, not every one after them."""
+
+    def ends(
+        ensemble_: Ensemble,
+        starts: list[tuple[int, Question, Recipe, float]],
+        *_: object,
+        **__: object,
+    ) -> list[Ended]:
+        alone = len(ensemble_.boards.values["R1"]) == 1
+        return [
+            Ended(recipe.way is RecipeKind.FROM_FAR or alone or board % 10 > 0)
+            for board, _, recipe, _ in starts
+        ]
+
+    monkeypatch.setattr(start_recipe_search, "switched_on", ends)
+    far, amplitude = (recipes(1)[way] for way in (RecipeKind.FROM_FAR, RecipeKind.AMPLITUDE))
+    assert far.sweep_periods < start_recipe_search.LONG_SWEEP < amplitude.sweep_periods
+    (found,) = find_recipes(plan(1))
+    assert found.way is RecipeKind.FROM_FAR
 
 
 def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
