@@ -20,6 +20,8 @@ import platformdirs
 from numba.core.event import Listener, install_listener, register
 from numba.core.types.misc import unliteral
 
+from designer.base import numba_shortcuts
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -65,6 +67,7 @@ def _digest() -> str:
 # place of compiled code among them, which it unpickles.
 numba.core.config._config_fname = os.devnull
 numba.core.config.reload_config()
+numba_shortcuts.install()
 CACHE = cache_folder()
 if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)
@@ -76,6 +79,17 @@ def nothing_compiled() -> bool:
     numba makes folders inside as soon as a kernel's module is imported: files decide.
     """
     return CACHE is not None and not any(path.is_file() for path in CACHE.rglob("*"))
+
+
+def stored_whole(what: str) -> bool:
+    """Whether ``note_stored`` was called for this, by any process; True where nothing is stored."""
+    return CACHE is None or (CACHE / f"{what}.whole").exists()
+
+
+def note_stored(what: str) -> None:
+    """Note that the compiled code for this is stored."""
+    if CACHE is not None:
+        (CACHE / f"{what}.whole").touch()
 
 
 class _CompileWatch(Listener):  # type: ignore[misc]
@@ -139,15 +153,6 @@ def compiled(function: Function) -> Function:
     return numba.njit(cache=CACHE is not None, **OPTIONS)(function)  # type: ignore[no-any-return]
 
 
-def inlined(function: Function) -> Function:
-    """Compile with numba a function that is written into its compiled callers.
-
-    For what calls the flow and is called once: with ``callee`` the flow would be optimised again in
-    each layer above it.
-    """
-    return numba.njit(inline="always", **OPTIONS)(function)  # type: ignore[no-any-return]
-
-
 def callee(function: Function) -> Function:
     """Compile with numba a function that only compiled functions call.
 
@@ -164,10 +169,7 @@ def leaf(function: Function) -> Function:
 
 
 def embedded(function: Function) -> Function:
-    """``leaf`` whose machine code stands in that of its callers: the innermost parts of a kernel.
-
-    With ``inlined`` the caller would count references.
-    """
+    """``leaf`` whose machine code stands in that of its callers: innermost parts of a kernel."""
     return _callee(function, {"_nrt": False, "forceinline": True})
 
 

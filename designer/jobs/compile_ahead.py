@@ -1,13 +1,16 @@
-"""The exact engine's part for circuits, compiled by a process of its own on a first run.
+"""The exact engine's part for circuits, compiled by a process of its own where none is stored yet.
 
 After an installation or an update the compiler takes longer than the choice of the parts, on one
-core. The part for circuits is needed last: another process compiles it while this one compiles what
-comes first, and stores it where `base.jit` finds it.
+core, and once more for each number of masses. The part for circuits is needed last: another process
+compiles it while this one compiles what comes first, and stores it where `base.jit` finds it. What
+carries a circuit also carries a model that no faster way fits: that it compiles before all else,
+and this process waits for it rather than compile the same.
 """
 
 from __future__ import annotations
 
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -23,27 +26,57 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
-from designer.model.model import Dimensionless
+from designer.model.mechanics import SecondOrderSystem
+from designer.model.model_file import parse_model_file
 from designer.synthesis.part_checks import unit_circuit
 
-CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits()"
+CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits({masses})"
+STORED = "circuits-{masses}"
+MASS = """
+[[mass]]
+name = "m{k}"
+mass = 1
+
+[[spring]]
+between = ["m{k}", "ground"]
+stiffness = 1
+
+[[damper]]
+between = ["m{k}", "ground"]
+damping = 0.5
+"""
+MODEL = """format = 2
+title = "compiled"
+{masses}
+[[clearance]]
+name = "A"
+between = ["m1", "ground"]
+upper = 0.5
+lower = 0.5
+stiffness = 5
+
+[[force]]
+on = "m1"
+amplitude = 0.1
+"""
 
 
 @contextmanager
-def compiling_ahead(jobs: int) -> Iterator[Callable[[], None]]:
-    """The other process works, where nothing is compiled yet and there is a core for it; it ends
-    with the block at the latest.
+def compiling_ahead(jobs: int, system: SecondOrderSystem) -> Iterator[Callable[[], None]]:
+    """The other process works, where the part for circuits of as many masses as the system has is
+    not stored yet and there is a core for it; it ends with the block at the latest.
 
     Yields what waits for its end: to be called before a circuit moves. Whoever does not wait
     compiles the same once more, beside a process that is ahead with it.
     """
-    if jobs < 2 or not jit.nothing_compiled():
+    masses = system.size
+    if jobs < 2 or jit.stored_whole(STORED.format(masses=masses)):
         yield lambda: None
         return
     process = subprocess.Popen(
-        python_command("-c", CALL),
+        python_command("-c", CALL.format(masses=masses)),
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,  # what goes wrong here goes wrong again where it is needed
         start_new_session=True,  # Ctrl-C is for the run, which ends this one
     )
@@ -53,22 +86,28 @@ def compiling_ahead(jobs: int) -> Iterator[Callable[[], None]]:
         process.wait()
 
     try:
+        if Flow(system.piecewise_linear(1.0), Drive(1.0)).kernel == "tabulated":
+            doing("compiling the exact engine's part for motion between the stops")
+            assert process.stdout is not None
+            process.stdout.readline()
         yield wait
     finally:
         process.kill()
-        process.wait()
+        process.communicate()
 
 
-def compile_circuits() -> None:
-    """Compile it by using it once: one board with every value 1."""
-    model, spec, catalog = (
-        Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25),
-        CircuitSpec(),
-        load_catalog(),
-    )
-    circuit = unit_circuit(model, spec, catalog)
+def compile_circuits(masses: int) -> None:
+    """Compile it by using it once: a model of so many masses, after which a line is printed, and
+    one board of its circuit with every value 1."""
+    text = MODEL.format(masses="".join(MASS.format(k=k + 1) for k in range(masses)))
+    model = parse_model_file(text).model
+    drive, rest = Drive(1.0), np.zeros(2 * masses)
+    Flow(model.second_order().piecewise_linear(), drive).run(rest, 1)
+    sys.stdout.write("motion\n")
+    sys.stdout.flush()
+    circuit = unit_circuit(model, CircuitSpec(), load_catalog())
     boards = Ensemble(Boards.of(circuit, [nominal_board(circuit)]))
-    drive, rest = Drive(1.0), np.zeros(len(circuit.states))
-    Flow(boards.reduction(0).system(), drive).run(rest, 1)
     boards.settle([0], [drive], rest[None])
     boards.swept(0, [(drive, 1)], rest[None])
+    Flow(boards.reduction(0).system(), drive).run(rest, 1)
+    jit.note_stored(STORED.format(masses=masses))

@@ -97,7 +97,9 @@ class StageRunner:
             self.progress.stage("responses of the model, parts")
             jobs = self.options.workers
             with (
-                compiling_ahead(self.options.jobs or cores()) as compiled,
+                compiling_ahead(
+                    self.options.jobs or cores(), self.modelfile.model.second_order()
+                ) as compiled,
                 other_process(jobs, *WRITING) as other,
             ):
                 synthesis = stage_choice.synthesise(self.modelfile, self.catalog, jobs=jobs)

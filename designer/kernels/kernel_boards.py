@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import compiled, inlined
+from designer.base.jit import callee, compiled
 from designer.kernels.kernel_mode_tables import FILLED, DrivenModes, Modes, Unit
 from designer.kernels.kernel_orbit import (
     CURSOR,
@@ -98,7 +98,7 @@ class DrivenBoard(NamedTuple):
     """(2,) mode and guard beyond which a mode has not been built; -1 for none."""
 
 
-@inlined
+@callee
 def _run(
     board: DrivenBoard, x: Float, cursor: Int, phi: Float, anchor: Float, strobes: Float,
     impacts: Int,
@@ -112,7 +112,7 @@ def _run(
     return code
 
 
-@inlined
+@callee
 def _lap(
     board: DrivenBoard, x: Float, cursor: Int, phi: Float, strobes: Float, impacts: Int
 ) -> int:
@@ -120,7 +120,7 @@ def _lap(
     return _run(board, x, cursor, phi, board.anchors.one, strobes, impacts)
 
 
-@inlined
+@callee
 def _trace(board: DrivenBoard, x: Float, mode: int, anchor: Float, strobes: Float) -> int:
     """A run over the stretches of ``strobes``, each a part of a period."""
     cursor = np.zeros(CURSOR, dtype=np.int64)
@@ -129,7 +129,7 @@ def _trace(board: DrivenBoard, x: Float, mode: int, anchor: Float, strobes: Floa
     return _run(board, x, cursor, np.zeros((0, 0)), anchor, strobes, impacts)
 
 
-@inlined
+@callee
 def _peaks(board: DrivenBoard, x: Float, mode: int, peak: Float) -> bool:
     """``attractors.peaks_near``; False where the run does not come to its end."""
     strobes = np.zeros((33, len(x)))
@@ -149,7 +149,7 @@ def _peaks(board: DrivenBoard, x: Float, mode: int, peak: Float) -> bool:
 _polish = polisher(_lap)
 
 
-@inlined
+@callee
 def _respond(board: DrivenBoard, x: Float, stages: int, e: int, answers: Answers) -> int:
     """``attractors.settle`` from x (n,) as long as the way is the usual one: FOUND, ASK or
     NOWHERE."""
@@ -179,7 +179,7 @@ def _respond(board: DrivenBoard, x: Float, stages: int, e: int, answers: Answers
     return ASK
 
 
-@inlined
+@callee
 def _describe(board: DrivenBoard, x: Float, e: int, answers: Answers) -> bool:
     """``attractors.describe`` of the orbit through x, written as answer e; False if it drifts."""
     cursor, nothing, peak = np.zeros(CURSOR, dtype=np.int64), np.zeros((0, 0)), np.zeros(len(x))
@@ -222,7 +222,7 @@ def _describe(board: DrivenBoard, x: Float, e: int, answers: Answers) -> bool:
     return _draw(board, x, n, peak, facts, answers.trace[e])
 
 
-@inlined
+@callee
 def _draw(board: DrivenBoard, x: Float, n: int, peak: Float, facts: Float, trace: Float) -> bool:
     """trace ← the state that moves most in the first clearance; the asymmetry is a fact."""
     length, j = n * POINTS, 0

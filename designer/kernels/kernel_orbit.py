@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, inlined, leaf
+from designer.base.jit import callee, leaf
 from designer.kernels.kernel_algebra import factor, spectral_radius, substitute
 
 Float = NDArray[np.float64]
@@ -125,7 +125,7 @@ def polisher(lap: Lap) -> Callable[..., int]:
             last = error
         return NONE
 
-    @inlined
+    @callee
     def least_period(
         system: Any, x: Float, n: int, peak: Float, columns: int
     ) -> int:  # fmt: skip
@@ -142,7 +142,7 @@ def polisher(lap: Lap) -> Callable[..., int]:
                 return d
         return n
 
-    @inlined
+    @callee
     def after_periods(
         system: Any, end: Float, mode: int, periods: int, x: Float, peak: Float, columns: int
     ) -> float:  # fmt: skip
@@ -158,7 +158,7 @@ def polisher(lap: Lap) -> Callable[..., int]:
             return -1.0 if code in (LEFT, UNKNOWN_MODE) else np.inf
         return float(distance(strobes[periods], x, peak))
 
-    @inlined
+    @callee
     def polish(
         system: Any, strobes: Float, mode: int, peak: Float, x: Float, monodromy: Float,
         counted: Int,

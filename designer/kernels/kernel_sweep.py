@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import compiled, inlined
+from designer.base.jit import callee, compiled
 from designer.kernels.kernel_algebra import spectral_radius
 from designer.kernels.kernel_modal import (
     STATE,
@@ -60,7 +60,7 @@ class DrivenModel(NamedTuple):
     """Most mode changes in a drive period."""
 
 
-@inlined
+@callee
 def _lap(
     model: DrivenModel, x: Float, cursor: Int, phi: Float, strobes: Float, impacts: Int
 ) -> int:
@@ -147,7 +147,7 @@ def travel(
     return growth
 
 
-@inlined
+@callee
 def _describe(
     model: DrivenModel, x: Float, n: int, peak: Float, facts: Float, counted: Int
 ) -> bool:
@@ -177,7 +177,7 @@ def _describe(
 _polish = polisher(_lap)
 
 
-@inlined
+@callee
 def _periodic(
     model: DrivenModel, strobes: Float, peak: Float, orbit: Float, facts: Float, counted: Int
 ) -> bool:

@@ -105,6 +105,15 @@ def _stack(k: int, s: int) -> _Stack:
 
 
 @callee
+def _copy(source: Array, out: Array) -> None:
+    """out ← source, two of one shape. Element by element: the assignment of a whole array would
+    bring its error message, which takes long to compile."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            out[i, j] = source[i, j]
+
+
+@callee
 def _nearer(apart: Array, a: int, b: int, low: float, high: float, out: Array) -> bool:
     """The limits with low <= p_b - p_a <= high too, in ``out``; false where none are left."""
     if high < -apart[a, b] - TINY or low > apart[b, a] + TINY:
@@ -189,7 +198,7 @@ def _place(
         after[0], after[1] = max(before[0], total - level), min(before[1], total + level)
         if after[0] > after[1] + TINY:
             return False
-        at.apart[term + 1] = at.apart[term]
+        _copy(at.apart[term], at.apart[term + 1])
     else:
         low, high = total - level - before[1], total + level - before[0]
         if not _nearer(at.apart[term], a, b, low, high, at.apart[term + 1]):
@@ -204,7 +213,8 @@ def _probe(
 ) -> tuple[bool, int]:
     """Whether the terms of a probe have parts where ``at`` stands; and the steps."""
     now, begin, end = rules.probes[which]
-    other.apart[begin], other.time[begin] = at.apart[now], at.time[now]
+    _copy(at.apart[now], other.apart[begin])
+    other.time[begin, 0], other.time[begin, 1] = at.time[now, 0], at.time[now, 1]
     for i in range(len(at.parts)):
         other.parts[i] = at.parts[i]
     for i in range(now, len(rules.target)):  # what is not chosen yet
@@ -307,7 +317,7 @@ def choices(
     k, count, steps = len(rules.target), 0, 0
     wide = _width(rules, level)
     at, other = _stack(k, len(rules.apart)), _stack(k, len(rules.apart))
-    at.apart[0] = rules.apart
+    _copy(rules.apart, at.apart[0])
     t = _next_cell(rules, max(start, rules.seconds[0]), level)
     while t <= rules.seconds[1]:
         at.time[0, 0], at.time[0, 1] = t, min(t + wide, rules.seconds[1])
@@ -336,7 +346,7 @@ def dives(
     """
     k, steps, wide = len(rules.target), 0, _width(rules, level)
     at, other = _stack(k, len(rules.apart)), _stack(k, len(rules.apart))
-    at.apart[0] = rules.apart
+    _copy(rules.apart, at.apart[0])
     for number in range(len(cells)):
         t = _next_cell(rules, max(cells[number], rules.seconds[0]), level)
         if t > rules.seconds[1]:

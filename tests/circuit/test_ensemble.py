@@ -94,8 +94,12 @@ def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
         respond(kind, p, indices), respond(kind, p, indices, fast=False), strict=True
     ):
         a, b = got.orbit, want.orbit
-        if b.status is OrbitStatus.APERIODIC or b.n > 4:
-            # The way there is long or chaotic: rounding decides at which strobe it is met.
+        if b.status is not OrbitStatus.PERIODIC:
+            # Rounding decides how long chaos is watched before it is called so, or not settled.
+            assert a.status is not OrbitStatus.PERIODIC
+            continue
+        if b.n > 4:
+            # The way there is long: rounding decides at which strobe it is met.
             assert (a.status, a.n, {a.p, a.q}) == (b.status, b.n, {b.p, b.q})
             continue
         assert (a.status, a.n, a.p, a.q, a.mode) == (b.status, b.n, b.p, b.q, b.mode)

@@ -13,6 +13,13 @@ from designer.circuit import kernel_nodal
 from designer.jobs import compile_ahead
 from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
 from designer.kernels import kernel_boards, kernel_propagators
+from designer.model.model_file import parse_model_file
+from tests.shared.stages import PAPER
+
+MODEL = compile_ahead.MODEL.format(
+    masses="".join(compile_ahead.MASS.format(k=k) for k in (1, 2, 3))
+)
+SYSTEM = parse_model_file(MODEL).model.second_order()
 
 
 class Process:
@@ -20,6 +27,13 @@ class Process:
 
     def __init__(self, said: list[str]) -> None:
         self.said = said
+        self.stdout = self
+
+    def readline(self) -> None:
+        self.said.append("motion")
+
+    def communicate(self) -> None:
+        self.said.append("end")
 
     def kill(self) -> None:
         self.said.append("kill")
@@ -31,12 +45,13 @@ class Process:
 @pytest.mark.parametrize(
     ("jobs", "files", "expected"),
     [
-        (2, [], ["start", "work", "wait", "circuit", "kill", "wait"]),
-        (2, ["old"], ["work", "circuit"]),
+        (2, [], ["start", "motion", "work", "wait", "circuit", "kill", "end"]),
+        (2, ["circuits-2.whole"], ["start", "motion", "work", "wait", "circuit", "kill", "end"]),
+        (2, ["circuits-3.whole"], ["work", "circuit"]),
         (1, [], ["work", "circuit"]),
     ],
 )
-def test_a_process_works_beside_a_first_run(
+def test_a_process_works_beside_a_first_run_of_so_many_masses(
     jobs: int,
     files: list[str],
     expected: list[str],
@@ -49,13 +64,11 @@ def test_a_process_works_beside_a_first_run(
         said.append("start")
         return Process(said)
 
-    folder = tmp_path / "dynamics_0123"  # numba makes it when a kernel's module is imported
-    folder.mkdir()
     for name in files:
-        (folder / name).touch()
+        (tmp_path / name).touch()
     monkeypatch.setattr(jit, "CACHE", tmp_path)
     monkeypatch.setattr(subprocess, "Popen", start)
-    with compiling_ahead(jobs) as compiled:
+    with compiling_ahead(jobs, SYSTEM) as compiled:
         said.append("work")
         compiled()
         said.append("circuit")
@@ -77,13 +90,16 @@ def test_no_file_of_the_working_directory_is_run(
         return processes[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    with compiling_ahead(2):
+    with compiling_ahead(2, SYSTEM):
         assert processes[0].wait(timeout=60) == 0
     assert not (tmp_path / "planted").exists()
 
 
-def test_it_compiles_what_a_circuit_needs() -> None:
-    compile_circuits()
+def test_it_compiles_what_a_circuit_of_so_many_masses_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jit, "CACHE", tmp_path)
+    compile_circuits(1)
     kernels: list[Any] = [
         kernel_nodal.solve_all,
         kernel_propagators.advance,
@@ -91,3 +107,17 @@ def test_it_compiles_what_a_circuit_needs() -> None:
         kernel_boards.sweep_all,
     ]
     assert all(kernel.signatures for kernel in kernels)
+    assert 2 in {len(types[-2]) for types in kernels[2].signatures}
+    assert jit.stored_whole("circuits-1")
+    assert not jit.stored_whole("circuits-2")
+
+
+def test_a_model_that_goes_the_modal_way_does_not_wait_for_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(jit, "CACHE", tmp_path)
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: Process(said))
+    with compiling_ahead(2, PAPER.second_order()):
+        said.append("work")
+    assert said == ["work", "kill", "end"]

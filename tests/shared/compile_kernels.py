@@ -23,7 +23,7 @@ def compile_kernels() -> None:
         return
     processes = [
         subprocess.Popen([sys.executable, "-c", call], cwd=ROOT, stdin=subprocess.DEVNULL)
-        for call in (compile_ahead.CALL, MODELS)
+        for call in (compile_ahead.CALL.format(masses=2), MODELS)
     ]
     for process in processes:
         process.wait()

@@ -1,0 +1,130 @@
+"""Two shortcuts through numba, which together halve the time that our kernels take to compile.
+
+**Callees are optimised once, within their callers.** numba optimises each function together with
+all that it calls, and makes machine code of it, whether Python calls it or not; its callers do the
+same again. Here a callee of our kernels is only linked: the function that Python calls is optimised
+with all that it calls, once. Its machine code is that of a kernel from the cache, which brings its
+callees too.
+
+**Flags are told apart by their hash.** numba looks functions up by its compiler's flags, hundreds
+of thousands of times. All flags have one hash there, so that each is compared with many others.
+
+This reaches into numba, so it is done for the releases that it was tested with, and callees are
+linked late only while one of our kernels is compiled. Elsewhere numba goes its usual way, with the
+same results.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakSet
+
+import numba
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.environment import lookup_environment
+from numba.core.event import Listener, register
+from numba.core.targetconfig import TargetConfig
+
+TESTED = ("0.68.",)
+"""Releases of numba."""
+OURS = "designer."
+FOR_PYTHON, ENVIRONMENT = "_ZN7cpython", "_ZN08NumbaEnv"
+"""How numba begins the names of functions that Python calls, and of what a function's exceptions
+are made from."""
+
+_linked: WeakSet[Any] = WeakSet()
+"""Libraries of callees, without machine code of their own."""
+
+
+class _Compiling(Listener):  # type: ignore[misc]
+    """Knows whether the outermost function that is compiled is one of our kernels. numba compiles
+    on one thread at a time."""
+
+    def __init__(self) -> None:
+        self._outermost = ""
+        self._depth = 0
+
+    def on_start(self, event: Any) -> None:
+        if self._depth == 0:
+            self._outermost = str(event.data["dispatcher"].py_func.__module__)
+        self._depth += 1
+
+    def on_end(self, event: object) -> None:
+        self._depth -= 1
+
+    def ours(self) -> bool:
+        return self._depth > 0 and self._outermost.startswith(OURS)
+
+
+def install() -> bool:
+    """Take both; False where numba's release is not a tested one."""
+    if not numba.__version__.startswith(TESTED):
+        return False
+    _link_callees_late()
+    _hash_flags()
+    return True
+
+
+def _hash_flags() -> None:
+    values_of = TargetConfig.values
+
+    def told_apart(flags: Any) -> int:
+        """Equal for equal flags: what is set to its default is as if it were not set."""
+        options = flags.options
+        return hash(frozenset(k for k, v in flags._values.items() if v != options[k].default))
+
+    def equal(flags: Any, other: object) -> Any:
+        if not isinstance(other, TargetConfig):
+            return NotImplemented
+        return flags._values == other._values or values_of(flags) == values_of(other)
+
+    TargetConfig.__hash__ = told_apart
+    TargetConfig.__eq__ = equal
+
+
+def _link_callees_late() -> None:
+    compiling = _Compiling()
+    register("numba:compile", compiling)
+    finalize, pointer = JITCodeLibrary.finalize, JITCodeLibrary.get_pointer_to_function
+    set_environment = JITCPUCodegen.set_env
+
+    def finalize_late(library: Any) -> None:
+        if compiling.ours() and not _called_from_python(library):
+            _link(library)
+            return
+        finalize(library)
+        for variable in library._final_module.global_variables:
+            if variable.name.startswith(ENVIRONMENT):
+                environment = lookup_environment(variable.name)
+                if environment is not None:
+                    set_environment(library._codegen, variable.name, environment)
+
+    def pointer_of(library: Any, name: str) -> Any:
+        library._ensure_finalized()
+        return 0 if library in _linked else pointer(library, name)
+
+    def set_known_environment(generator: Any, name: str, environment: object) -> None:
+        # A callee's stands in the library of its caller, which sets it when it is there.
+        if generator._engine.is_symbol_defined(name):
+            set_environment(generator, name, environment)
+
+    JITCodeLibrary.finalize = finalize_late
+    JITCodeLibrary.get_pointer_to_function = pointer_of
+    JITCPUCodegen.set_env = set_known_environment
+
+
+def _called_from_python(library: Any) -> bool:
+    return any(
+        function.name.startswith(FOR_PYTHON) and not function.is_declaration
+        for function in library._final_module.functions
+    )
+
+
+def _link(library: Any) -> None:
+    """Put what it calls beside a callee, as numba does, and leave the rest to its callers."""
+    library._raise_if_finalized()
+    for other in dict.fromkeys(library._linking_libraries):
+        library._reload_init.update(other._reload_init)
+        library._final_module.link_in(other._get_module_for_linking(), preserve=True)
+    library._finalized = True
+    _linked.add(library)

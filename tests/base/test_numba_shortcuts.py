@@ -1,0 +1,78 @@
+"""Callees are linked within their callers: the same results, and nothing for other packages."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from numba.core.codegen import JITCodeLibrary
+
+from designer.base import numba_shortcuts
+from designer.base.jit import OPTIONS, callee
+
+REFUSAL = "a negative number has no root here"
+
+
+def sum_of_roots(module: str) -> tuple[Callable[..., float], Any]:
+    """A compiled function of a module of that name, and the callee in it, which may raise."""
+
+    def root(x: float) -> float:
+        if x < 0.0:
+            raise ValueError(REFUSAL)
+        return float(np.sqrt(x))
+
+    def total(x: Any) -> float:
+        out = np.zeros(1)
+        for i in range(len(x)):
+            out[0] += compiled_root(x[i])
+        return float(out[0])
+
+    root.__module__ = total.__module__ = module
+    compiled_root = callee(root)
+    return numba.njit(**OPTIONS)(total), compiled_root
+
+
+@pytest.mark.parametrize(("module", "late"), [("designer.kernels.some", True), ("other", False)])
+def test_only_callees_of_our_kernels_wait_for_their_callers(module: str, late: bool) -> None:
+    total, root = sum_of_roots(module)
+    assert total(np.array([1.0, 4.0, 9.0])) == 6.0
+    (overload,) = root.overloads.values()
+    assert (overload.library in numba_shortcuts._linked) == late
+    gc.collect()
+    with pytest.raises(ValueError, match=REFUSAL):
+        total(np.array([-1.0]))
+
+
+def test_two_kernels_have_one_callee() -> None:
+    one, root = sum_of_roots("designer.kernels.some")
+
+    def square(x: float) -> float:
+        return float(root(x)) ** 2
+
+    square.__module__ = "designer.kernels.other"
+    two = numba.njit(**OPTIONS)(square)
+    assert one(np.array([4.0, 16.0])) == 6.0
+    assert two(9.0) == pytest.approx(9.0)
+    assert len(root.overloads) == 1
+    for call in (lambda: two(-1.0), lambda: one(np.array([-1.0]))):
+        with pytest.raises(ValueError, match=REFUSAL):
+            call()
+
+
+def test_a_strangers_callback_has_an_address() -> None:
+    @numba.cfunc("float64(float64)")
+    def half(x: float) -> float:
+        return x / 2
+
+    assert half.ctypes(3.0) == 1.5
+
+
+def test_an_untested_release_of_numba_goes_its_usual_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    finalize = JITCodeLibrary.finalize
+    monkeypatch.setattr(numba, "__version__", "9.9.9")
+    assert not numba_shortcuts.install()
+    assert JITCodeLibrary.finalize is finalize
