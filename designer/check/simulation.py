@@ -23,7 +23,7 @@ from designer.check import coexistence, trust
 from designer.check.absolute_motion import absolute_extremes
 from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, spice_trace
 from designer.check.coexistence import Coexistence
-from designer.check.cubic_range import BeyondRange, beyond_ranges
+from designer.check.curved_laws import LawMisfit, law_misfits
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
@@ -99,8 +99,8 @@ class Simulated:
     absolute: tuple[Array, ...] = ()
     """Of the orbit and of each of ``others``, (states, 2): least and greatest absolute displacement
     of each mass in the place of its state, refined; (0, 2) where it is not known."""
-    beyond: tuple[tuple[BeyondRange, ...], ...] = ()
-    """Of the orbit and of each of ``others``, the cubic springs that it draws beyond their ranges;
+    misfits: tuple[tuple[LawMisfit, ...], ...] = ()
+    """Of the orbit and of each of ``others``, the curved laws whose force is off there;
     () where the engine was not asked (ngspice)."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings of the engine for this response."""
@@ -283,7 +283,7 @@ def _on_model(
         trust=trust.of_orbit(flow, orbits[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
-        beyond=tuple(beyond_ranges(model, flow, o, units) for o in orbits),
+        misfits=tuple(law_misfits(model, flow, o, units) for o in orbits),
         **_of_system(model, r.omega),
     )
 
@@ -394,7 +394,7 @@ def _on_circuit(
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
-        beyond=tuple(beyond_ranges(model, flow, measured[i], volts) for i in rows),
+        misfits=tuple(law_misfits(model, flow, measured[i], volts) for i in rows),
         **_of_system(model, r.omega),
     )
 

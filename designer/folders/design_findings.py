@@ -15,7 +15,7 @@ from designer.base.errors import InputError
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
-from designer.check.cubic_range import beyond_ranges, cubic_springs
+from designer.check.curved_laws import curved_laws, law_misfits
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.design_rules import run_rules
@@ -92,15 +92,15 @@ def _responses(synthesis: Synthesis) -> Iterator[str]:
 
 
 def _ranges(synthesis: Synthesis) -> Iterator[str]:
-    """Cubic springs that a response of the model draws beyond their ranges."""
+    """Curved laws whose force is off where a response of the model draws them."""
     file = synthesis.modelfile
-    if not cubic_springs(file.model):
+    if not curved_laws(file.model):
         return
     for r in synthesis.model_responses:
         model = file.model.at(r.b)
         flow = model_flow(model, r.omega)
-        for spring in beyond_ranges(model, flow, r.orbit, np.ones(flow.system.size)):
-            told = spring.told(r.orbit.response, in_si=file.si is not None)
+        for misfit in law_misfits(model, flow, r.orbit, np.ones(flow.system.size)):
+            told = misfit.told(r.orbit.response, in_si=file.si is not None)
             yield f"At {file.drive_text(r.omega)} the response {told}."
 
 

@@ -173,7 +173,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x_max": high,
         "x_min": low,
         **_from_base(simulated, orbit),
-        **_beyond_range(simulated, number),
+        **_misfits(simulated, number),
         "twin": twin,
     }
     for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
@@ -190,10 +190,12 @@ def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
     return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
 
 
-def _beyond_range(simulated: Simulated, number: int) -> dict[str, Any]:
-    """Cubic springs that an orbit draws beyond their ranges; nothing where it draws none."""
-    beyond = simulated.beyond[number] if simulated.beyond else ()
-    return {"beyond_range": [each.as_dict() for each in beyond]} if beyond else {}
+def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:
+    """Curved laws whose force is off over an orbit, by what they are; nothing without any."""
+    kinds: dict[str, Any] = {}
+    for each in simulated.misfits[number] if simulated.misfits else ():
+        kinds.setdefault(each.kind, []).append(each.as_dict())
+    return kinds
 
 
 def _by_state(values: Array) -> dict[str, Any]:

@@ -197,7 +197,7 @@ def _several(name: str, given: object, example: str) -> list[float | str]:
 
 def tables(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
-    from designer.check.cubic_range import BeyondRange
+    from designer.check.curved_laws import misfits_in
 
     head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
     rows = answer["responses"]
@@ -229,8 +229,8 @@ def tables(answer: Mapping[str, Any]) -> None:
         if r["reason"]:
             say(f"{place}: {r['response']}: {r['reason']}")
         for each in (r, *r["others"]):
-            for spring in each.get("beyond_range", ()):
-                say(f"{place}: {BeyondRange(**spring).told(each['response'], in_si=in_si)}")
+            for misfit in misfits_in(each):
+                say(f"{place}: {misfit.told(each['response'], in_si=in_si)}")
         if r["frequencies"] is not None:
             say(f"{place}: {frequencies(r)}")
         for other in r["others"]:
