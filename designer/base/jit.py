@@ -17,10 +17,11 @@ from typing import Any, TypeVar
 
 import numba
 import platformdirs
-from numba.core.event import Listener, install_listener, register
+from numba.core.event import install_listener, register
 from numba.core.types.misc import unliteral
 
 from designer.base import numba_shortcuts
+from designer.base.compile_watch import CompileWatch
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -73,14 +74,6 @@ if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)
 
 
-def nothing_compiled() -> bool:
-    """Whether there is a folder for compiled code and none in it yet.
-
-    numba makes folders inside as soon as a kernel's module is imported: files decide.
-    """
-    return CACHE is not None and not any(path.is_file() for path in CACHE.rglob("*"))
-
-
 def stored_whole(what: str) -> bool:
     """Whether ``note_stored`` was called for this, by any process; True where nothing is stored."""
     return CACHE is None or (CACHE / f"{what}.whole").exists()
@@ -92,29 +85,11 @@ def note_stored(what: str) -> None:
         (CACHE / f"{what}.whole").touch()
 
 
-class _CompileWatch(Listener):  # type: ignore[misc]
-    """Tells when compilation begins and ends. numba compiles on one thread at a time."""
-
-    def __init__(self, tell: Callable[[str | None], None]) -> None:
-        self._tell = tell
-        self._depth = 0
-
-    def on_start(self, event: Any) -> None:
-        self._depth += 1
-        if self._depth == 1:  # a callee is within its caller
-            self._tell(str(event.data["dispatcher"].py_func.__module__))
-
-    def on_end(self, event: object) -> None:
-        self._depth -= 1
-        if self._depth == 0:
-            self._tell(None)
-
-
 @contextmanager
 def compilation_watched(tell: Callable[[str | None], None]) -> Iterator[None]:
     """Call ``tell`` with the name of a function's module whenever numba begins to compile it, on
     the thread that does, and with None when that is done; not for what is loaded from ``CACHE``."""
-    with install_listener("numba:compile", _CompileWatch(tell)):
+    with install_listener("numba:compile", CompileWatch(tell)):
         yield
 
 
@@ -135,7 +110,7 @@ def _collect_rarely() -> Callable[[str | None], None]:
     return tell
 
 
-register("numba:compile", _CompileWatch(_collect_rarely()))
+register("numba:compile", CompileWatch(_collect_rarely()))
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,

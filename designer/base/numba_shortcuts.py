@@ -22,8 +22,10 @@ from weakref import WeakSet
 import numba
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.environment import lookup_environment
-from numba.core.event import Listener, register
+from numba.core.event import register
 from numba.core.targetconfig import TargetConfig
+
+from designer.base.compile_watch import CompileWatch
 
 TESTED = ("0.68.",)
 """Releases of numba."""
@@ -34,26 +36,6 @@ are made from."""
 
 _linked: WeakSet[Any] = WeakSet()
 """Libraries of callees, without machine code of their own."""
-
-
-class _Compiling(Listener):  # type: ignore[misc]
-    """Knows whether the outermost function that is compiled is one of our kernels. numba compiles
-    on one thread at a time."""
-
-    def __init__(self) -> None:
-        self._outermost = ""
-        self._depth = 0
-
-    def on_start(self, event: Any) -> None:
-        if self._depth == 0:
-            self._outermost = str(event.data["dispatcher"].py_func.__module__)
-        self._depth += 1
-
-    def on_end(self, event: object) -> None:
-        self._depth -= 1
-
-    def ours(self) -> bool:
-        return self._depth > 0 and self._outermost.startswith(OURS)
 
 
 def install() -> bool:
@@ -83,13 +65,20 @@ def _hash_flags() -> None:
 
 
 def _link_callees_late() -> None:
-    compiling = _Compiling()
-    register("numba:compile", compiling)
+    compiling: str | None = None
+    """Module of the outermost function that is compiled now."""
+
+    def tell(module: str | None) -> None:
+        nonlocal compiling
+        compiling = module
+
+    register("numba:compile", CompileWatch(tell))
     finalize, pointer = JITCodeLibrary.finalize, JITCodeLibrary.get_pointer_to_function
     set_environment = JITCPUCodegen.set_env
 
     def finalize_late(library: Any) -> None:
-        if compiling.ours() and not _called_from_python(library):
+        ours = compiling is not None and compiling.startswith(OURS)
+        if ours and not _called_from_python(library):
             _link(library)
             return
         finalize(library)

@@ -167,7 +167,7 @@ def curved_laws(model: MechanicalModel) -> tuple[CurvedLaw, ...]:
     if not isinstance(model, LumpedSystem):
         return ()
     springs = (_of_spring(model, each) for each in model.cubic_springs)
-    return (*springs, *(_of_stops(model, gap) for gap in model.gaps if gap.hertz is not None))
+    return (*springs, *(_of_stops(model, gap) for gap in model.gaps if gap.law == "hertz"))
 
 
 def _of_spring(model: LumpedSystem, spring: CubicSpring) -> CurvedLaw:

@@ -45,7 +45,7 @@ def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[st
     A design without responses, or one that no board can be made of, has no rule that fails for
     want of something to look at; the latter is a warning.
     """
-    warnings = [*error_warnings(synthesis), *_responses(synthesis), *_ranges(synthesis)]
+    warnings = [*error_warnings(synthesis), *_responses(synthesis), *_misfits(synthesis)]
     failed: list[RuleOutcome] = []
     if isinstance(subject, InputError):
         warnings.append(f"The design rules were not looked at: {subject}")
@@ -91,7 +91,7 @@ def _responses(synthesis: Synthesis) -> Iterator[str]:
             yield f"The nominal circuit does not show {name} at {at}: it shows {shown}."
 
 
-def _ranges(synthesis: Synthesis) -> Iterator[str]:
+def _misfits(synthesis: Synthesis) -> Iterator[str]:
     """Curved laws whose force is off where a response of the model draws them."""
     file = synthesis.modelfile
     if not curved_laws(file.model):

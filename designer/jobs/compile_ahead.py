@@ -26,39 +26,15 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
+from designer.model.element_keys import GROUND
+from designer.model.lumped_elements import Damper, Force, Gap, Mass, Spring
+from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import SecondOrderSystem
-from designer.model.model_file import parse_model_file
 from designer.synthesis.part_checks import unit_circuit
 
 CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits({masses})"
 STORED = "circuits-{masses}"
-MASS = """
-[[mass]]
-name = "m{k}"
-mass = 1
-
-[[spring]]
-between = ["m{k}", "ground"]
-stiffness = 1
-
-[[damper]]
-between = ["m{k}", "ground"]
-damping = 0.5
-"""
-MODEL = """format = 2
-title = "compiled"
-{masses}
-[[clearance]]
-name = "A"
-between = ["m1", "ground"]
-upper = 0.5
-lower = 0.5
-stiffness = 5
-
-[[force]]
-on = "m1"
-amplitude = 0.1
-"""
+"""What is noted of the compiled code once the part for circuits of so many masses is stored."""
 
 
 @contextmanager
@@ -99,8 +75,7 @@ def compiling_ahead(jobs: int, system: SecondOrderSystem) -> Iterator[Callable[[
 def compile_circuits(masses: int) -> None:
     """Compile it by using it once: a model of so many masses, after which a line is printed, and
     one board of its circuit with every value 1."""
-    text = MODEL.format(masses="".join(MASS.format(k=k + 1) for k in range(masses)))
-    model = parse_model_file(text).model
+    model = grounded(masses)
     drive, rest = Drive(1.0), np.zeros(2 * masses)
     Flow(model.second_order().piecewise_linear(), drive).run(rest, 1)
     sys.stdout.write("motion\n")
@@ -111,3 +86,15 @@ def compile_circuits(masses: int) -> None:
     boards.swept(0, [(drive, 1)], rest[None])
     Flow(boards.reduction(0).system(), drive).run(rest, 1)
     jit.note_stored(STORED.format(masses=masses))
+
+
+def grounded(masses: int) -> LumpedSystem:
+    """So many masses, each on a spring and a damper to ground, of which the first meets stops."""
+    names = [f"m{k + 1}" for k in range(masses)]
+    return LumpedSystem(
+        tuple(Mass(name, 1.0) for name in names),
+        tuple(Spring((name, GROUND), 1.0) for name in names),
+        tuple(Damper((name, GROUND), 0.5) for name in names),
+        (Gap("A", (names[0], GROUND), upper=0.5, lower=0.5, stiffness=5.0),),
+        (Force(names[0], 0.1),),
+    )

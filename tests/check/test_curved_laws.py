@@ -1,5 +1,5 @@
-"""Cubic springs whose pieces are off where a motion draws them: against the amplitude of a linear
-oscillator, and against a solver that knows the cube itself."""
+"""Cubic springs and Hertzian stops whose pieces are off where a motion draws them: against the
+amplitude of a linear oscillator, and against a solver that knows the law itself."""
 
 from __future__ import annotations
 

@@ -89,17 +89,17 @@ def test_it_is_each_board_alone() -> None:
 def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
     """Every verdict and every margin, against the general kernel and ``attractors.settle``."""
     indices = range(12)
-    compiled = 0
+    compiled = undecided = 0
     for got, want in zip(
         respond(kind, p, indices), respond(kind, p, indices, fast=False), strict=True
     ):
         a, b = got.orbit, want.orbit
-        if b.status is not OrbitStatus.PERIODIC:
-            # Rounding decides how long chaos is watched before it is called so, or not settled.
-            assert a.status is not OrbitStatus.PERIODIC
+        if {a.status, b.status} == {OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED}:
+            # Of chaos that is watched until the steps are spent rounding decides what it is called.
+            undecided += 1
             continue
-        if b.n > 4:
-            # The way there is long: rounding decides at which strobe it is met.
+        if b.status is OrbitStatus.APERIODIC or b.n > 4:
+            # The way there is long or chaotic: rounding decides at which strobe it is met.
             assert (a.status, a.n, {a.p, a.q}) == (b.status, b.n, {b.p, b.q})
             continue
         assert (a.status, a.n, a.p, a.q, a.mode) == (b.status, b.n, b.p, b.q, b.mode)
@@ -119,6 +119,7 @@ def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
         assert np.abs(got.trace - want.trace).max() < 1e-9 * peak[0]
         compiled += 1
     assert compiled >= 4, "the test wants periodic answers"
+    assert undecided <= 1
 
 
 @pytest.mark.parametrize("kind", sorted(STAGES))

@@ -11,15 +11,11 @@ import pytest
 from designer.base import jit
 from designer.circuit import kernel_nodal
 from designer.jobs import compile_ahead
-from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
+from designer.jobs.compile_ahead import compile_circuits, compiling_ahead, grounded
 from designer.kernels import kernel_boards, kernel_propagators
-from designer.model.model_file import parse_model_file
 from tests.shared.stages import PAPER
 
-MODEL = compile_ahead.MODEL.format(
-    masses="".join(compile_ahead.MASS.format(k=k) for k in (1, 2, 3))
-)
-SYSTEM = parse_model_file(MODEL).model.second_order()
+SYSTEM = grounded(3).second_order()
 
 
 class Process:

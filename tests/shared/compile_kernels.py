@@ -18,8 +18,8 @@ MODELS = "from tests.shared.compile_kernels import use_models; use_models()"
 
 
 def compile_kernels() -> None:
-    """Compile what circuits and what models need, where nothing is compiled yet."""
-    if not jit.nothing_compiled():
+    """Compile what circuits of two masses and what models need, where that is not stored yet."""
+    if jit.stored_whole(compile_ahead.STORED.format(masses=2)):
         return
     processes = [
         subprocess.Popen([sys.executable, "-c", call], cwd=ROOT, stdin=subprocess.DEVNULL)
