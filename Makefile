@@ -71,6 +71,7 @@ reports: env ngspice ## make the reports that this commit lacks
 
 picture: env ngspice ## draw the README's pictures
 	@$(VENV)/bin/python scripts/make-model-picture
+	@$(VENV)/bin/python scripts/make-bifurcation-pictures
 	@$(VENV)/bin/python scripts/make-picture
 	@$(VENV)/bin/python scripts/make-board-picture
 	@$(VENV)/bin/python scripts/make-explore-picture

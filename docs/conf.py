@@ -7,12 +7,10 @@ help, the Python functions from their docstrings. Warnings are errors.
 
 from __future__ import annotations
 
-import ast
-import inspect
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from click.testing import CliRunner
 from sphinx.application import Sphinx
@@ -21,7 +19,6 @@ from designer.base.version import __version__
 from designer.cli.app import VERBS
 from designer.cli.command_line import application
 from designer.model.model_file import json_schema
-from designer.verbs import declared
 
 project = "designer"
 author = "The designer maintainers"
@@ -49,38 +46,11 @@ _HELP = {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
 def setup(site: Sphinx) -> None:
     site.connect("builder-inited", _write_pages)
     site.connect("source-read", _name_files_of_the_repository)
-    site.connect("autodoc-process-docstring", _describe_parameters)
 
 
 def _name_files_of_the_repository(site: Sphinx, page: str, source: list[str]) -> None:
     """A link out of ``docs/`` leads to a file of the repository, which the site does not hold."""
     source[0] = _OUTSIDE.sub(r"\1 (`\2` in the repository)", source[0])
-
-
-def _describe_parameters(
-    _site: Sphinx, _what: str, _name: str, function: Any, _options: Any, lines: list[str]
-) -> None:
-    """Of a verb's function: what each parameter is, which its declaration says."""
-    module = inspect.getmodule(function)
-    verb = getattr(module, "VERB", None)
-    if verb is None or verb.function is not function:
-        return
-    lines.append("")
-    for parameter, word, _ in verb.words():
-        name = re.sub("_$", r"\\_", parameter.name)
-        spelled = " ".join([*word.names[-1:], *([word.metavar] if word.metavar else [])])
-        help_text = f"{word.help} (``{spelled}``)" if word.names else word.help
-        lines.append(f":param {name}: {help_text}")
-        lines.append(f":type {name}: {_type(parameter.annotation)}")
-
-
-def _type(annotation: str) -> str:
-    """The type of a verb's parameter, without how the command line spells it."""
-    expression = ast.parse(annotation, mode="eval").body
-    if isinstance(expression, ast.Subscript) and isinstance(expression.slice, ast.Tuple):
-        return ast.unparse(expression.slice.elts[0])
-    own = get_args(getattr(declared, annotation))[0]
-    return getattr(own, "__forward_arg__", None) or inspect.formatannotation(own)
 
 
 def _write_pages(site: Sphinx) -> None:
@@ -99,9 +69,12 @@ def _commands() -> Iterator[str]:
         "Look up a verb and its options. This page is the help that `designer VERB --help` prints. "
         "[What you may build on](../contract.md) says what each verb writes."
     )
+    parser = application()
     for verb in VERBS:
-        shown = CliRunner().invoke(application(), [verb, "--help"], env=_HELP, prog_name="designer")
-        yield from ("", f"## designer {verb}", "", "```text", shown.output.strip(), "```")
+        for name in (verb, *(n for n in parser.commands if n.startswith(f"{verb} "))):
+            shown = CliRunner().invoke(parser, [name, "--help"], env=_HELP, prog_name="designer")
+            level = "##" if name == verb else "###"
+            yield from ("", f"{level} designer {name}", "", "```text", shown.output.strip(), "```")
 
 
 def _keys() -> Iterator[str]:

@@ -33,6 +33,20 @@ Show = Callable[[Mapping[str, Any]], None]
 """Takes an answer while the work goes on: of a design once its parts stand, of a study once the
 yields of the exact circuit stand, where ngspice is asked after that, and once all yields stand,
 where blame or maps take time after that."""
+
+
+class _Quiet:
+    """Takes an answer and shows nobody; by its name in the help of a function."""
+
+    def __call__(self, answer: object) -> None:
+        """Does nothing."""
+
+    def __repr__(self) -> str:
+        return "quiet"
+
+
+quiet = _Quiet()
+"""What shows an answer where nothing else was given."""
 LOG = logging.getLogger("designer")
 EVERY = 20.0
 """s between two lines about the steps of a stage."""

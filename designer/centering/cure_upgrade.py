@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from designer.base.toml_reader import parse_toml
-from designer.base.toml_writer import toml_text
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import components, to_buy
@@ -30,7 +28,7 @@ from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, find, peaks
-from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.model_file import ModelFile
 from designer.model.response_table import placed
 from designer.synthesis import output_loads, side_conditions
 
@@ -141,7 +139,7 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     """
     if upgrades == Upgrades():
         return modelfile
-    data = parse_toml(modelfile.text, None)
+    data = modelfile.data
     circuit = data.setdefault("circuit", {})
     if upgrades.opamp is not None:
         circuit["opamp"] = upgrades.opamp
@@ -170,8 +168,7 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     for network in upgrades.networks:
         networks = data["spread"].setdefault("network", [])
         networks.append({"parts": list(network.parts), "family": network.family})
-    read = parse_model_file(toml_text(data), modelfile.source)
-    return replace(read, title=modelfile.title, measured=modelfile.measured)
+    return modelfile.rewritten(data)
 
 
 def _was_picked_out(modelfile: ModelFile, name: str, grade: float) -> bool:

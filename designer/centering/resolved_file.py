@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.toml_reader import parse_toml
-from designer.base.toml_writer import toml_text
 from designer.centering.levers import DesignChoice
 from designer.check.synthesis_result import Synthesis
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.model_file import ModelFile
 from designer.model.response_table import placed
 
 
@@ -25,13 +22,13 @@ def resolved(
     the synthesis aimed at inside its conditions is no key of a model file: the parts stand in
     ``design.json``.
     """
-    text = _text(modelfile, synthesis.model_responses, choice)
-    file = parse_model_file(text, source)
-    return replace(file, measured=modelfile.measured)
+    return modelfile.rewritten(_tables(modelfile, synthesis.model_responses, choice), source)
 
 
-def _text(modelfile: ModelFile, responses: Sequence[ModelResponse], choice: DesignChoice) -> str:
-    data: dict[str, Any] = parse_toml(modelfile.text.lstrip("\ufeff"), None)
+def _tables(
+    modelfile: ModelFile, responses: Sequence[ModelResponse], choice: DesignChoice
+) -> dict[str, Any]:
+    data = modelfile.data
     data.setdefault("title", modelfile.title)
     wanted = zip(modelfile.responses, responses, strict=True)
     for index, (spec, response) in enumerate(wanted):
@@ -44,4 +41,4 @@ def _text(modelfile: ModelFile, responses: Sequence[ModelResponse], choice: Desi
         circuit.pop("saturation", None)  # it was stated for the other op-amp
     order = ["format", "title", "model", "mechanical", "response", "circuit"]
     first = {key: data[key] for key in order if key in data}
-    return toml_text({**first, **data})
+    return {**first, **data}

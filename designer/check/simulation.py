@@ -17,7 +17,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.defaults import DRAWN_STARTS, SEED, cores
 from designer.base.errors import InputError
-from designer.base.frames import table_html
+from designer.base.frames import frame, table_html
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
 from designer.check.absolute_motion import absolute_extremes
@@ -26,11 +26,12 @@ from designer.check.coexistence import Coexistence
 from designer.check.curved_laws import LawMisfit, law_misfits
 from designer.check.trust import Trust
 from designer.circuit import nominal
-from designer.circuit.nominal import Trace, circuit_flow, record_of, traces_of
+from designer.circuit.nominal import Trace, UnitFlow, circuit_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import settle, starts as sobol_starts
 from designer.dynamics.coexisting_attractors import coexisting, outlived
 from designer.dynamics.counts import MAX_PERIOD
+from designer.dynamics.drive_shape import Shape
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
@@ -43,7 +44,7 @@ from designer.model.find_responses import (
     matches,
     scale_of,
 )
-from designer.model.mechanics import MechanicalModel, check_omega
+from designer.model.mechanics import MechanicalModel, check_omega, state_names
 from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.model.relative_motion import (
     RelativeMotion,
@@ -57,6 +58,9 @@ from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool, require_ngspice
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
     from designer.check.synthesis_result import Synthesis
 
 Engine = Literal["model", "circuit", "ngspice"]
@@ -110,6 +114,8 @@ class Simulated:
     """Where traces are asked, the orbit over many periods if it has none; not of ngspice."""
     trust: Trust = field(default_factory=Trust)
     """What is known of the orbit's error."""
+    flow: UnitFlow | None = field(default=None, repr=False)
+    """What the orbits are motions of; None in ngspice."""
     coexistence: Coexistence | None = None
     """What share of the starts in a box goes to the orbit, to each of ``others`` and to none; its
     orbits are in the flow's own units. None where the engine was not asked (ngspice)."""
@@ -118,6 +124,37 @@ class Simulated:
     def twin(self) -> Orbit | None:
         """The mirror twin of the orbit, if it has one."""
         return self.twins[0] if self.twins else None
+
+    def motion(self, times: ArrayLike | None = None, *, orbit: Orbit | None = None) -> pd.DataFrame:
+        """The states x1, x1', x2, … at any times, in model units; where the base moves, "y" is its
+        displacement and the states are counted from it.
+
+        times : (k,) from 0, where the drive's phase is 0; without it the period, or
+        ``SHOWN_PERIODS`` drive periods of a motion that has none, at ``TRACE_POINTS`` a drive
+        period. orbit : ``twin`` or one of ``others`` in place of the response's own.
+
+        Raises
+        ------
+        InputError : of ngspice, an orbit that was not found, or times that are none.
+        """
+        shown = self.orbit if orbit is None else orbit
+        if self.flow is None or not len(shown.start):
+            found = shown.response if self.flow else "ngspice"
+            raise InputError(None, "orbit", found, "a motion that the exact flow has found")
+        if times is None:
+            laps = nominal.shown_periods(shown)
+            times = np.arange(laps * nominal.TRACE_POINTS + 1) / nominal.TRACE_POINTS
+            times = times * (2.0 * math.pi / self.omega)
+        at = np.asarray(times, dtype=float)
+        if at.ndim != 1 or not len(at) or not (at >= 0.0).all() or not np.isfinite(at).all():
+            raise InputError(None, "times", repr(times), "a list of numbers >= 0")
+        states = self.flow.states_at(shown, at)
+        names = ["time", *state_names(states.shape[1] // 2)]
+        columns = [at, states]
+        if self.flow.ground:
+            names, columns = [*names, "y"], [*columns, self.flow.ground_at(at)]
+        rows = np.column_stack(columns).tolist()
+        return frame(dict(zip(names, row, strict=True)) for row in rows)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each orbit, which ``orbit`` says: "wanted" or "reached", "twin", "other"."""
@@ -150,16 +187,18 @@ def simulate(
     rung: Rung = "ideal",
     starts: int = DRAWN_STARTS,
     seed: int = SEED,
+    start: Array | None = None,
     choose: Callable[[ModelFile], Synthesis] | None = None,
 ) -> tuple[Simulated, ...]:
-    """The responses of a model file, or what is reached from rest at ``omegas``.
+    """The responses of a model file, or at ``omegas`` what is reached from rest or ``start``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
     synthesis : of this model file; where the engine needs one and None is given it is made by
     ``choose``, or as ``check.synthesis_result`` makes it. traces : keep the orbits and their mirror
     twins as traces too. rung : the op-amps' model in ngspice. starts, seed : of the initial states
     that are drawn to see which attractors coexist
-    (``check.coexistence``); ngspice has none.
+    (``check.coexistence``); ngspice has none. start : (states,) in model units, where the drive's
+    phase is 0.
 
     Raises
     ------
@@ -183,17 +222,18 @@ def simulate(
         if spec.omega is not None:
             check_omega(f"response[{number}].omega", spec.omega, modelfile.model, file)
     if engine != "ngspice":
-        one = partial(_on_model, modelfile, traces, sampling)
+        one = partial(_on_model, modelfile, start, traces, sampling)
         if engine == "circuit":
             synthesis = synthesis or _design(modelfile, choose)
-            one = partial(_on_circuit, synthesis, bool(omegas), traces, sampling)
+            one = partial(_on_circuit, synthesis, _Scan(bool(omegas), start), traces, sampling)
         engine_name = "model" if engine == "model" else "exact circuit"
         step = progress.stage(f"responses of the {engine_name}", len(specs))
         return tuple(_timed(step, one, spec) for spec in specs)
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
         synthesis = synthesis or _design(modelfile, choose)
-        return _in_ngspice(synthesis, specs, bool(omegas), pool, progress, traces, rung)
+        scan = _Scan(bool(omegas), start)
+        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, rung)
 
 
 def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | None) -> Synthesis:
@@ -231,13 +271,14 @@ def _figures(orbit: Orbit, extremes: Array) -> dict[str, Any]:
 
     extremes : (states, 2) or (0, 2) of absolute displacements.
     """
-    low, high = extremes[0] if len(extremes) else (np.nan, np.nan)
+    masses = max(len(orbit.start) // 2, 1)
+    ends = extremes[0::2] if len(extremes) else np.full((masses, 2), np.nan)
     return {
         "response": orbit.response,
         "status": str(orbit.status),
         "symmetric": orbit.symmetric,
-        "x1_max": float(high),
-        "x1_min": float(low),
+        **{f"x{i}_max": float(high) for i, (_, high) in enumerate(ends, 1)},
+        **{f"x{i}_min": float(low) for i, (low, _) in enumerate(ends, 1)},
         "largest_multiplier": orbit.radius,
         "lyapunov": orbit.lyapunov,
         "lyapunov_error": orbit.lyapunov_error,
@@ -255,11 +296,23 @@ def _timed(
     return replace(result, seconds=time.perf_counter() - began)
 
 
+@dataclass(frozen=True)
+class _Scan:
+    """Whether a board is looked at from many starts, and the first of them."""
+
+    many: bool
+    first: Array | None
+
+
 def _on_model(
-    modelfile: ModelFile, traces: bool, sampling: tuple[int, int], spec: Response
+    modelfile: ModelFile,
+    start: Array | None,
+    traces: bool,
+    sampling: tuple[int, int],
+    spec: Response,
 ) -> Simulated:
     with errors_in(modelfile):
-        (r,) = find(modelfile.model, [spec])
+        (r,) = find(modelfile.model, [spec], start)
     model = modelfile.model.at(r.b)
     flow = model_flow(model, r.omega)
     orbits = _apart(flow, [_measured(flow, o) for o in (r.orbit, *_attractors(r.others))])
@@ -284,6 +337,7 @@ def _on_model(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
         misfits=tuple(law_misfits(model, flow, o, units) for o in orbits),
+        flow=UnitFlow(flow, units, 1.0, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
 
@@ -301,6 +355,11 @@ def _apart(flow: Flow, orbits: Sequence[Orbit]) -> list[Orbit]:
 def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
     """Those of them that are an answer."""
     return [o for o in orbits if o.status in ANSWERS]
+
+
+def _ground(model: MechanicalModel, omega: float) -> Shape:
+    system = model.second_order()
+    return system.ground_shape(omega) if system.ground_moves else ()
 
 
 def _of_system(model: MechanicalModel, omega: float) -> dict[str, Any]:
@@ -344,24 +403,25 @@ def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
 
 
 def _circuit_orbits(
-    synthesis: Synthesis, spec: Response, scan: bool
+    synthesis: Synthesis, spec: Response, scan: _Scan
 ) -> tuple[ModelResponse, Flow, list[Orbit]]:
-    """The wanted orbit first, in volts and seconds; with ``scan`` what is reached from rest."""
+    """The wanted orbit first, in volts and seconds; or what is reached from the first of many."""
     with errors_in(synthesis.modelfile):
         same = [r for r in synthesis.model_responses if r.spec is spec]
         (r,) = same or find(synthesis.modelfile.model, [spec])
     flow = circuit_flow(nominal.nominal_reduction(synthesis.design).system(), synthesis.design, r)
     volts = synthesis.design.volts(r.b)
-    if scan:
+    if scan.many:
         model = synthesis.modelfile.model.at(r.b)
-        return r, flow, coexisting(flow, sobol_starts(scale_of(model, r.omega) * volts, STARTS))
+        states = sobol_starts(scale_of(model, r.omega), STARTS, first=scan.first)
+        return r, flow, coexisting(flow, states * volts)
     starts = [o.start * volts for o in (r.orbit, *r.others) if len(o.start)]
     settled = [settle(flow, x, watch=0) for x in starts or [np.zeros(flow.system.size)]]
     return r, flow, outlived(flow, settled)
 
 
 def _on_circuit(
-    synthesis: Synthesis, scan: bool, traces: bool, sampling: tuple[int, int], spec: Response
+    synthesis: Synthesis, scan: _Scan, traces: bool, sampling: tuple[int, int], spec: Response
 ) -> Simulated:
     design = synthesis.design
     r, flow, orbits = _circuit_orbits(synthesis, spec, scan)
@@ -395,6 +455,7 @@ def _on_circuit(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
         misfits=tuple(law_misfits(model, flow, measured[i], volts) for i in rows),
+        flow=UnitFlow(flow, volts, seconds, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
 
@@ -410,7 +471,7 @@ def _found_in_ngspice(orbit: Orbit, spec: Response) -> bool:
 def _in_ngspice(
     synthesis: Synthesis,
     specs: Sequence[Response],
-    scan: bool,
+    scan: _Scan,
     pool: SpicePool,
     progress: Progress,
     traces: bool,

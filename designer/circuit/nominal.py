@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,11 +10,13 @@ from functools import lru_cache
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.errors import InputError
 from designer.circuit.board_values import nominal_board
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
+from designer.dynamics.drive_shape import Shape, wave
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
@@ -43,6 +46,8 @@ def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelR
 
 TRACE_POINTS = 1024
 """Points of a drawn orbit per drive period."""
+KNOTS = 4 * TRACE_POINTS
+"""Exact states per drive period that the states between them are interpolated from."""
 
 
 SHOWN_PERIODS = 30
@@ -59,6 +64,44 @@ class Trace:
     """(k,) times."""
     states: Array
     """(k, states) states."""
+
+
+@dataclass(frozen=True)
+class UnitFlow:
+    """A flow whose times and states are told in model units."""
+
+    flow: Flow
+    """The model's, or a board's."""
+    volts: Array
+    """(states,) a model's unit in units of the flow."""
+    seconds: float
+    """The same of time."""
+    ground: Shape = ()
+    """How the ground moves, in model units; () where it rests."""
+
+    def ground_at(self, times: Array) -> Array:
+        """(k,) displacement of the ground at times (k,), in model units."""
+        return wave(self.ground, times * self.seconds * self.flow.drive.omega)
+
+    def states_at(self, orbit: Orbit, times: Array) -> Array:
+        """(k, states) of an orbit in model units at times (k,) >= 0, drive phase 0 at time 0: exact
+        at ``KNOTS`` times a period, and between these by a cubic spline.
+
+        Raises
+        ------
+        InputError : a time that the motion does not reach.
+        """
+        from scipy.interpolate import CubicSpline
+
+        phases = times * (self.seconds / self.flow.drive.period)
+        laps = max(1, math.ceil(phases.max(initial=0.0)))
+        start, mode = orbit.start * self.volts, orbit.mode or None
+        strobes = self.flow.run(start, laps, mode=mode, points=KNOTS).strobes
+        if len(strobes) <= laps * KNOTS:
+            expected = f"times in the {len(strobes) // KNOTS} periods that can be run"
+            raise InputError(None, "times", float(times.max()), expected)
+        knots = np.arange(len(strobes)) / KNOTS
+        return np.asarray(CubicSpline(knots, strobes)(phases)) / self.volts
 
 
 def nominal_reduction(design: Design) -> Reduction:
@@ -79,8 +122,12 @@ def response_flow(design: Design, response: ModelResponse) -> Flow:
 
 def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
     """An orbit over its n periods in model units; from rest where it has no start."""
-    periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
-    return _trace(flow, orbit, volts, seconds, periods, TRACE_POINTS)
+    return _trace(flow, orbit, volts, seconds, shown_periods(orbit), TRACE_POINTS)
+
+
+def shown_periods(orbit: Orbit) -> int:
+    """Drive periods of an orbit's trace."""
+    return max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
 
 
 def traces_of(

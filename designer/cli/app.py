@@ -19,7 +19,7 @@ from designer.base.errors import DesignerError, InputError, ResponseNotFound
 from designer.base.printed import printable
 from designer.base.progress import Progress, Show, progress_for
 from designer.base.version import __version__
-from designer.verbs.declared import GROUPS, Verb, Word
+from designer.verbs.declared import GROUPS, Kind, Verb, Word
 
 VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules bench "
@@ -55,7 +55,7 @@ def empty_application() -> typer.Typer:
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": list(HELP)},
     )
 
 
@@ -80,18 +80,22 @@ _EVERY: tuple[inspect.Parameter, ...] = tuple(
     )
 )
 """The options of every verb, after its own."""
+HELP = ("-h", "--help")
 SOURCE = "model"
 """Name of a parameter that is a model file or a design folder."""
 
 
-def register(app: typer.Typer, name: str, verb: Verb, *, hidden: bool = False) -> None:
-    """Give an application a verb by its declaration."""
+def register(
+    app: typer.Typer, name: str, verb: Verb, *, kind: Kind | None = None, hidden: bool = False
+) -> None:
+    """Give an application a verb by its declaration, or one of the things that it does."""
 
     def command(
         *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
     ) -> int:
         # A parameter without a value has the function's own default.
         given = {key: _plain(value) for key, value in words.items() if value not in (None, [])}
+        given |= {} if kind is None else kind.given
         try:
             with _logged(log), progress_for(quiet) as progress:
                 _refuse_at_once(given.get(SOURCE))
@@ -113,16 +117,19 @@ def register(app: typer.Typer, name: str, verb: Verb, *, hidden: bool = False) -
             verb.show(result)
         return 0 if verb.satisfied(result) else 1
 
-    parameters = [_parameter(*each) for each in verb.words()]
+    parameters = [_parameter(*each) for each in verb.words(kind)]
     parameters += [p for p in _EVERY if p.name != "json" or verb.json is not None]
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
-    command.__doc__ = (inspect.getdoc(verb.function) or "").split("\n\n")[0]
+    summary = (inspect.getdoc(verb.function) or "").split("\n\n")[0]
+    command.__doc__ = summary if kind is None else kind.help
+    of_kinds = "".join(f"\n  designer {name} {each.name} --help" for each in verb.kinds)
+    several = f"\n\n\b\nOne thing at a time:{of_kinds}" if of_kinds and kind is None else ""
     app.command(
-        name,
+        name if kind is None else f"{name} {kind.name}",
         hidden=hidden,
         rich_help_panel=verb.group,
-        epilog=f"\b\nExample:\n  {verb.example}",
+        epilog=f"\b\nExample:\n  {(kind or verb).example}{several}",
     )(command)
 
 

@@ -6,6 +6,7 @@ import platform
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, cast
 
 import typer
@@ -15,7 +16,7 @@ import typer.main
 from designer.base.defaults import cores
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.version import __version__
-from designer.cli.app import VERBS, empty_application, register
+from designer.cli.app import HELP, VERBS, empty_application, register
 
 OTHER_SPELLINGS = {"synthesize": "synthesise"}
 """Verbs that the help does not list, and those that they are."""
@@ -57,7 +58,19 @@ def application(verbs: tuple[str, ...] = VERBS) -> typer.core.TyperGroup:
     for name in verbs:
         module = import_module(f"designer.verbs.{OTHER_SPELLINGS.get(name, name)}")
         register(app, name, module.VERB, hidden=name in OTHER_SPELLINGS)
+        for kind in module.VERB.kinds:
+            register(app, name, module.VERB, kind=kind, hidden=True)
     return cast(typer.core.TyperGroup, typer.main.get_command(app))
+
+
+def _names_kind(parser: typer.core.TyperGroup, arguments: list[str]) -> bool:
+    """Whether the word after the verb's is one of its kinds, and not the path of a model or a
+    folder that has the same name: a kind is followed by its source, or by --help."""
+    if " ".join(arguments[:2]) not in parser.commands or len(arguments) < 2:
+        return False
+    following = arguments[2:3]
+    alone = not following or (following[0].startswith("-") and following[0] not in HELP)
+    return not (alone and Path(arguments[1]).exists())
 
 
 def dispatch(arguments: list[str]) -> int:
@@ -67,5 +80,8 @@ def dispatch(arguments: list[str]) -> int:
         from designer.base.schema import one_of
 
         raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
-    result = application(asked).main(arguments, prog_name="designer", standalone_mode=False)
+    parser = application(asked)
+    if _names_kind(parser, arguments):
+        arguments = [" ".join(arguments[:2]), *arguments[2:]]
+    result = parser.main(arguments, prog_name="designer", standalone_mode=False)
     return result if isinstance(result, int) else 0

@@ -446,12 +446,14 @@ def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
         return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
 
 
-def starts(scale: Array, count: int, seed: int = 0) -> Array:
-    """(count, n) initial states: rest, then a scrambled Sobol set in the box ± scale."""
+def starts(scale: Array, count: int, seed: int = 0, first: Array | None = None) -> Array:
+    """(count, n) initial states: rest, or ``first``, then a scrambled Sobol set in the box
+    ± scale."""
     from scipy.stats import qmc
 
     box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
-    return np.vstack([np.zeros((1, len(scale))), scale * (2.0 * box - 1.0)])[:count]
+    rest = np.zeros(len(scale)) if first is None else first
+    return np.vstack([rest, scale * (2.0 * box - 1.0)])[:count]
 
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:

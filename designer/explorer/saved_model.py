@@ -12,16 +12,14 @@ from typing import Any
 
 from designer.base import atomic_write
 from designer.base.errors import InputError
-from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
-from designer.base.units import restated, shortest
+from designer.base.units import shortest
 from designer.dynamics.counts import Counts
 from designer.explorer.place import ModelPlace, read_place
 from designer.model.find_responses import find
-from designer.model.lumped_system import LumpedSystem
-from designer.model.model import Dimensionless, Mechanical, SiScales
+from designer.model.model import SiScales
 from designer.model.model_file import ModelFile, parse_model_file
-from designer.model.si_units import MECHANICAL_UNITS, angular_frequency, in_si
+from designer.model.si_units import angular_frequency
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}")
 """What a file may be called: one name, without a folder."""
@@ -72,15 +70,14 @@ def _pin(modelfile: ModelFile, text: str) -> PinnedResponse:
 def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedResponse] = ()) -> str:
     """The model file with the values of a place; the pins take the place of its responses.
 
-    Comments are lost. A value keeps its unit. The factor ``b`` of a system is no number of its
-    file, so it goes to the pins.
+    Comments are lost. The factor ``b`` of a system goes to the pins.
 
     Raises
     ------
     InputError : the text would be no model file.
     """
-    data = parse_toml(modelfile.text, None)
-    _put_values(data, modelfile, place)
+    data = modelfile.data
+    modelfile.numbers.put(data, place.model)
     own = parse_model_file(toml_text(data)).model.b
     if pins:
         key = _frequency_key(data.get("response", ()), modelfile.si)
@@ -114,40 +111,6 @@ def _table(pin: PinnedResponse, own: float, key: str, si: SiScales | None) -> di
         value = 2.0 * math.pi * si.hertz(pin.omega)
     table: dict[str, Any] = {key: value, "expect": pin.expect}
     return table if pin.b == own else {**table, "b": pin.b}
-
-
-def _put_values(data: dict[str, Any], modelfile: ModelFile, place: ModelPlace) -> None:
-    """Change the numbers of a file that the place has changed."""
-    model, new = modelfile.model, place.model
-    changed = [name for name in model.parameters if model.parameter(name) != new.parameter(name)]
-    if isinstance(model, LumpedSystem):
-        units = model.units if in_si(modelfile.si, model) else {}
-        for name in changed:
-            if name != "b":
-                table, index, key = model.places[name]
-                entry = data[table] if index is None else data[table][index]
-                entry[key] = _with_unit(new.parameter(name), units.get(name, ""), entry.get(key))
-    elif modelfile.mechanical is None:
-        data["model"] |= {name: new.parameter(name) for name in changed}
-    elif changed:
-        assert isinstance(new, Dimensionless)
-        _put_si(data["mechanical"], modelfile.mechanical, new)
-
-
-def _put_si(table: dict[str, Any], old: Mechanical, model: Dimensionless) -> None:
-    """Of the mechanisms with these ratios the one with the file's M1, K1 and force."""
-    new = Mechanical.from_dimensionless(model, M1=old.M1, K1=old.K1, force=old.P1 + old.P2)
-    for name, unit in MECHANICAL_UNITS.items():
-        value = float(getattr(new, name))
-        if abs(value - getattr(old, name)) > 1e-12 * abs(value):
-            table[name] = _with_unit(value, unit, table.get(name))
-
-
-def _with_unit(value: float, unit: str, old: object) -> float | str:
-    """As the file writes it: in the unit and prefix of its text; a plain number with the unit."""
-    if not unit:
-        return value
-    return restated(value, unit, old if isinstance(old, str) else f"1 {unit}")
 
 
 def not_found(modelfile: ModelFile) -> list[str]:

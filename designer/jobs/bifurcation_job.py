@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,10 +29,10 @@ from designer.bifurcations import (
     window_ends,
 )
 from designer.bifurcations.basin_shares import BasinShares, SharePlan
-from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.basins import BasinPlan, Basins
 from designer.bifurcations.border_curve import BorderCurve
 from designer.bifurcations.border_curves import CurvePlan
-from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.parameter_map import MapPlan, ParameterMap
 from designer.bifurcations.points import SIDES, Bifurcation
 from designer.bifurcations.response_region import ResponseRegion, SpreadBox
 from designer.bifurcations.subject import Subject
@@ -42,6 +42,7 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.curve_store import CurveBlocks, curves_csv
 from designer.folders.model_source import model_of
 from designer.folders.origin import provenance
@@ -83,6 +84,8 @@ class BifurcationWork:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
+        self._swept: Sweep | None = None
+        self._grid: ParameterMap | Basins | None = None
         self.curves: CurvePlan | None = None
         self.region: float | None = None
         self.spread: Spread | None = None
@@ -108,6 +111,33 @@ class BifurcationWork:
             seed=self._seed,
             settings={"bifurcation": self.decides},
         )
+
+    def swept(self, folder: Folder | None) -> Sweep:
+        """The sweep, or what of it the folder has not; made once."""
+        plan = self.plan
+        assert isinstance(plan, SweepPlan)
+        if self._swept is None:
+            name = plan.parameter
+            store = None if folder is None else SweepStore(self.files(folder), name)
+            blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
+            step = self.progress.stage(f"sweep over {name}", blocks)
+            self._swept = sweep.run(plan, self.jobs, store, step)
+        return self._swept
+
+    def grid(self, folder: Folder | None) -> ParameterMap | Basins:
+        """The map or the basins likewise."""
+        plan, kind = self.plan, self.request.kind
+        assert not isinstance(plan, SweepPlan)
+        if self._grid is None:
+            store = None
+            if folder is not None:
+                store = GridStore(self.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
+            step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+            if isinstance(plan, MapPlan):
+                self._grid = parameter_map.run(plan, self.jobs, store, step)
+            else:
+                self._grid = basins.run(plan, self.jobs, store, step)
+        return self._grid
 
     @property
     def _seed(self) -> int | None:
@@ -160,12 +190,7 @@ def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
 def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) -> Made:
     """The sweep, its points, and what else was asked for along it."""
     progress, jobs, name = work.progress, work.jobs, plan.parameter
-    store = None
-    if folder is not None:
-        store = SweepStore(work.files(folder), name)
-    blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-    swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
-    found = None
+    swept, found = work.swept(folder), None
     if work.request.points:
         step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
         found = window_ends.find(swept, jobs, step)
@@ -362,6 +387,70 @@ class BifurcationResult:
     """The folder that it is in, if any."""
     ends: tuple[str, str]
     """Of the sweep, as they were asked for: they say the unit that comes first."""
+    work: BifurcationWork = field(repr=False)
+    """What was computed, with the data of its pictures."""
+
+    def steps(self) -> pd.DataFrame:
+        """What a sweep shows at each value on each track, a row each: the response with its
+        exponent, and of a periodic one the largest multiplier; empty of a map and of basins."""
+        return frame(
+            {
+                **place,
+                "response": step.response,
+                "symmetric": step.symmetric,
+                "lyapunov": step.lyapunov,
+                "lyapunov_error": step.lyapunov_error,
+                "largest_multiplier": step.radius,
+            }
+            for place, step in self._steps()
+        )
+
+    def diagram(self) -> pd.DataFrame:
+        """The dots of a sweep's picture, a row each: the least displacement in each period that was
+        kept, and the velocity of each impact on a stop that is shown; empty of a map and of
+        basins."""
+        rows = list[dict[str, Any]]()
+        for place, step in self._steps():
+            stops = [stop.name for stop in self.work.plan.subject.stops]
+            clouds = {"least displacement": step.minima}
+            every = (step.velocities, *step.further)
+            clouds |= {f"impact velocity on {n}": v for n, v in zip(stops, every, strict=False)}
+            rows += [
+                {**place, "quantity": quantity, "value": float(value)}
+                for quantity, values in clouds.items()
+                for value in values
+            ]
+        return frame(rows)
+
+    def cells(self) -> pd.DataFrame:
+        """The points of a map or of basins, a row each: both coordinates, the response there, and
+        of basins the number of the attractor; empty of a sweep."""
+        if isinstance(self.work.plan, SweepPlan):
+            return frame(())
+        made = self.work.grid(self._written)
+        plan = made.plan
+        places = ((x, y) for y in plan.ys.tolist() for x in plan.xs.tolist())
+        return frame(
+            {
+                plan.x: x,
+                plan.y: y,
+                "response": cell.response,
+                **({"attractor": cell.attractor} if isinstance(made, Basins) else {}),
+            }
+            for (x, y), cell in zip(places, made.cells, strict=True)
+        )
+
+    def _steps(self) -> Iterator[tuple[dict[str, Any], SteadyMotion]]:
+        """Every step of a sweep, with its track and its value."""
+        plan = self.work.plan
+        if isinstance(plan, SweepPlan):
+            for track, steps in self.work.swept(self._written).steps.items():
+                for value, step in zip(plan.values.tolist(), steps, strict=True):
+                    yield {"track": track, plan.parameter: value}, step
+
+    @property
+    def _written(self) -> Folder | None:
+        return None if self.folder is None else Folder(self.folder)
 
     def windows(self) -> pd.DataFrame:
         """The windows of a sweep, a row each; empty of a map and of basins."""
@@ -370,6 +459,16 @@ class BifurcationResult:
     def curves(self) -> pd.DataFrame:
         """The curves over two parameters, a row each; empty where none were asked for."""
         return frame(self.answer.get("curves", ()))
+
+    def curve_points(self) -> pd.DataFrame:
+        """The points of these curves, a row each: the curve's number from 1, both parameters, and
+        whether the orbit is stable on one side; empty where none were asked for."""
+        names = (self._over, self.answer.get("and", {}).get("name", ""))
+        return frame(
+            {"curve": number, **dict(zip(names, point, strict=True)), "stable": stable}
+            for number, curve in enumerate(self.answer.get("curves", ()), 1)
+            for point, stable in zip(curve["points"], curve["stable"], strict=True)
+        )
 
     def shares(self) -> pd.DataFrame:
         """The counted basins of a sweep, a row for each attractor at each value; empty where none
@@ -415,7 +514,7 @@ def requested(
     if out is None:
         answer, _ = _make(work, None)
         answer["cost"]["seconds"] = time.perf_counter() - began
-        return BifurcationResult(answer, False, None, request.ends)
+        return BifurcationResult(answer, False, None, request.ends, work)
     folder = Folder(out)
     inputs = {
         "model": modelfile.sha256,
@@ -438,7 +537,7 @@ def requested(
                 folder.write(name, content)
             answer["cost"]["seconds"] = time.perf_counter() - began
             folder.write(f"{kind}.json", dumps(answer))
-    return BifurcationResult(folder.json(f"{kind}.json"), not todo, out, request.ends)
+    return BifurcationResult(folder.json(f"{kind}.json"), not todo, out, request.ends, work)
 
 
 # ---------------------------------------------------------------------------------------------
@@ -485,30 +584,24 @@ def _make(
 def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan, folder: Folder | None) -> Made:
     from designer.plots import bifurcation_plots
 
-    kind, progress, jobs = work.request.kind, work.progress, work.jobs
-    store = None
-    if folder is not None:
-        store = GridStore(work.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
-    step = progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+    kind, made = work.request.kind, work.grid(folder)
     body: dict[str, Any] = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),
         "y": _grid_axis(plan.subject, plan.y, plan.ys),
     }
-    if isinstance(plan, MapPlan):
-        mapped = parameter_map.run(plan, jobs, store, step)
-        body["counts"] = mapped.counts
+    if isinstance(made, ParameterMap):
+        body["counts"] = made.counts
         return (
             body,
             {},
-            lambda: image_files(kind, bifurcation_plots.parameter_map(mapped, work.title)),
+            lambda: image_files(kind, bifurcation_plots.parameter_map(made, work.title)),
         )
-    plane = basins.run(plan, jobs, store, step)
     body |= {
-        "at": plan.changes,
-        "attractors": [dict(a.__dict__) for a in plane.attractors],
-        "cells": [c.attractor for c in plane.cells],
+        "at": made.plan.changes,
+        "attractors": [dict(a.__dict__) for a in made.attractors],
+        "cells": [c.attractor for c in made.cells],
     }
-    return body, {}, lambda: image_files(kind, bifurcation_plots.basins(plane, work.title))
+    return body, {}, lambda: image_files(kind, bifurcation_plots.basins(made, work.title))
 
 
 def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import plain
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.base.second_process import Ask, other_process
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
@@ -58,7 +58,7 @@ class StageRunner:
         progress: Progress,
         *,
         anew: bool = False,
-        shown: Show = lambda _: None,
+        shown: Show = quiet,
     ) -> None:
         options.check()
         self.modelfile, self.options, self.progress = modelfile, options, progress

@@ -11,7 +11,7 @@ from typing import Any
 from designer.base.design_folder import MEASURED, Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
@@ -124,7 +124,7 @@ def run_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
     *,
     routed: bool = False,
 ) -> JobOutcome:
@@ -177,7 +177,7 @@ def measured_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
 ) -> JobOutcome:
     """Study the boards of a list, once each, in the design folder whose parts they have.
 

@@ -18,7 +18,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files, study_json
@@ -151,7 +151,7 @@ class StudyStage:
         self,
         help_: StudyHelp,
         design_seconds: float = 0.0,
-        checked: Callable[[CheckedResponse], None] = lambda _: None,
+        checked: Callable[[CheckedResponse], None] = quiet,
     ) -> RunResult:
         """Make the study, write it and finish the stage.
 
@@ -246,7 +246,7 @@ def study_of(
     checked: tuple[CheckedResponse, ...],
     stores: Stores | None = None,
     progress: Progress | None = None,
-    sampled: Callable[[Study], None] = lambda _: None,
+    sampled: Callable[[Study], None] = quiet,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
     """The study that the options want. checked, stores, sampled, standing : as of ``tolerance``."""

@@ -14,7 +14,7 @@ from typing import Any
 from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
@@ -38,7 +38,7 @@ def synthesise_into(
     out: Path,
     options: Options,
     progress: Progress,
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
     *,
     compare: bool = False,
 ) -> JobOutcome:

@@ -114,7 +114,7 @@ SECOND = (
     """\
 # A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
 # Numbers may carry units as text: "22.1k", "100nF", "1 kHz". Texts with units become SI; plain
-# numbers are any consistent units, and omega is in them. docs/model-file.md has every key.
+# numbers are any consistent units, and omega is in them. docs/model-file.md says more.
 
 format = 2
 title = "My model"

@@ -66,8 +66,12 @@ class ModelResponse:
         return None if self.spec.expect is None else str(self.spec.expect)
 
 
-def find(model: MechanicalModel, wanted: Sequence[Response]) -> tuple[ModelResponse, ...]:
+def find(
+    model: MechanicalModel, wanted: Sequence[Response], start: Array | None = None
+) -> tuple[ModelResponse, ...]:
     """Find each wanted response on the model with the exact flow.
+
+    start : (states,) the first start that is tried, in the place of rest.
 
     Raises
     ------
@@ -87,7 +91,7 @@ def find(model: MechanicalModel, wanted: Sequence[Response]) -> tuple[ModelRespo
         b = model.b if spec.b is None else spec.b
         if len(wanted) > 1:
             doing(f"response {number} of {len(wanted)} on the model")
-        out.append(_find_one(model.at(b), spec, b))
+        out.append(_find_one(model.at(b), spec, b, start))
     return tuple(out)
 
 
@@ -267,10 +271,12 @@ class _Span:
         return float(moves.min()), float(moves.max())
 
 
-def _find_one(model: MechanicalModel, spec: Response, b: float) -> ModelResponse:
+def _find_one(
+    model: MechanicalModel, spec: Response, b: float, start: Array | None
+) -> ModelResponse:
     assert spec.omega is not None
     flow = model_flow(model, spec.omega)
-    orbits = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
+    orbits = coexisting(flow, starts(scale_of(model, spec.omega), STARTS, first=start))
     if spec.least_exponent is not None:
         orbits = [with_exponent(flow, orbit) for orbit in orbits]
     for orbit in orbits:

@@ -50,6 +50,16 @@ def _parameter(domain: str, inside: Callable[[float], bool]) -> Accepts:
     return number("", f"a number {domain}", inside)
 
 
+_INSIDE_0_1 = _parameter("in (0, 1)", lambda value: 0.0 < value < 1.0)
+_HOLDING = _parameter(
+    "in (0, 1); k = 0 leaves a mode of motion without stiffness, which no circuit can hold",
+    lambda k: 0.0 < k < 1.0,
+)
+_BELOW_1 = _parameter("in [0, 1)", lambda value: 0.0 <= value < 1.0)
+_SHARE = _parameter("in [0, 1]", lambda value: 0.0 <= value <= 1.0)
+_POSITIVE = _parameter("> 0", lambda value: value > 0.0)
+
+
 @dataclass(frozen=True)
 class Dimensionless(FileTable):
     """Dimensionless parameters, Eq. (3). Each lies in its domain and within ``TRIED``.
@@ -59,25 +69,19 @@ class Dimensionless(FileTable):
     InputError : a parameter lies outside its domain, or outside what was tried of it.
     """
 
-    m: Annotated[float, _parameter("in (0, 1)", lambda m: 0.0 < m < 1.0)]
+    m: Annotated[float, _INSIDE_0_1]
     """Mass ratio M2/(M1 + M2), in (0, 1)."""
-    k: Annotated[
-        float,
-        _parameter(
-            "in (0, 1); k = 0 leaves a mode of motion without stiffness, which no circuit can hold",
-            lambda k: 0.0 < k < 1.0,
-        ),
-    ]
+    k: Annotated[float, _HOLDING]
     """Stiffness ratio K2/(K1 + K2), in (0, 1)."""
-    k0: Annotated[float, _parameter("in [0, 1)", lambda k0: 0.0 <= k0 < 1.0)]
+    k0: Annotated[float, _BELOW_1]
     """Stop stiffness ratio K0/(K0 + K1), in [0, 1)."""
-    c: Annotated[float, _parameter("in [0, 1)", lambda c: 0.0 <= c < 1.0)]
+    c: Annotated[float, _BELOW_1]
     """Damping ratio C2/(C1 + C2), in [0, 1)."""
-    zeta: Annotated[float, _parameter("> 0", lambda zeta: zeta > 0.0)]
+    zeta: Annotated[float, _POSITIVE]
     """Damping C1/(2 sqrt(K1 M1)), > 0."""
-    f20: Annotated[float, _parameter("in [0, 1]", lambda f20: 0.0 <= f20 <= 1.0)]
+    f20: Annotated[float, _SHARE]
     """Share of the force on the second mass P2/(P1 + P2), in [0, 1]."""
-    b: Annotated[float, _parameter("> 0", lambda b: b > 0.0)]
+    b: Annotated[float, _POSITIVE]
     """Clearance B K1/(P1 + P2), > 0."""
     sides: Annotated[Sides, _SIDES] = "both"
     """The stops that exist."""

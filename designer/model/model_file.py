@@ -25,7 +25,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -35,6 +35,7 @@ from designer.base.json_schema import DIALECT, either, of_tables
 from designer.base.schema import FileTable, checked, line, such, whole_number
 from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
+from designer.base.toml_writer import toml_text
 from designer.catalog.entries import Kind
 from designer.catalog.parts_catalog import Catalog
 from designer.dynamics.counts import Counts
@@ -42,6 +43,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
+from designer.model.file_numbers import FileNumbers
 from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
@@ -111,6 +113,52 @@ class ModelFile:
         """A drive frequency for people: "36 Hz" where ω is in rad/s, else "ω = 0.85"."""
         return drive_text(omega, None if self.si is None else self.si.hertz(omega))
 
+    def with_(self, changes: Mapping[str, Any]) -> ModelFile:
+        """This file with other values, checked as a file is; nothing is written.
+
+        changes : by the name of a parameter that a sweep may change ("b", "A.upper"), a number or
+        a text with its unit; or by a key ("title", "circuit.opamp", "response"), what a file would
+        have there, and None to leave it out.
+
+        Raises
+        ------
+        InputError : a name that is neither, or a value that the file may not have.
+        """
+        keys, data = (each.name for each in fields(FORMATS[self.format - 1])), self.data
+        with errors_in(self):
+            self.numbers.change(data, changes, keys)
+            return self.rewritten(data)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """A copy of its tables, as plain data."""
+        return parse_toml(self.text.lstrip("\ufeff"), None)
+
+    @property
+    def numbers(self) -> FileNumbers:
+        """Its numbers, which may be changed in its data."""
+        return FileNumbers(self.model, self.mechanical, self.si)
+
+    @property
+    def format(self) -> int:
+        """1 for the paper's two masses, 2 for any system."""
+        return 1 if isinstance(self.model, Dimensionless) else 2
+
+    def rewritten(self, data: Mapping[str, Any], source: Path | None = None) -> ModelFile:
+        """A file of other tables with what this one has beside its own: the title where none is
+        stated, the list of measured values, and the place that it was read from, unless ``source``
+        says another.
+
+        Raises
+        ------
+        InputError : the tables are no model file.
+        """
+        read = parse_model_file(toml_text(data), source or self.source)
+        measured = self.measured
+        if read.spread.measured != self.spread.measured:
+            measured = _measured(read)
+        return replace(read, title=data.get("title", self.title), measured=measured)
+
     def choices(self, catalog: Catalog) -> Catalog:
         """The catalogue restricted to the cases and families that this file allows, for boards of
         the temperatures that it states.
@@ -146,16 +194,20 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     except InputError as error:
         raise InputError(path, error.field, error.found, error.expected) from None
     modelfile = parse_model_file(text, path)
+    return replace(modelfile, measured=_measured(modelfile, measured))
+
+
+def _measured(modelfile: ModelFile, place: Path | None = None) -> MeasuredBoards | None:
+    """The list that a file names, if any. place : where it lies, if not beside the file."""
     named = modelfile.spread.measured
     if named is None:
-        return modelfile
+        return None
     from designer.model.measured_values import read_measured
 
-    try:
-        place = measured or inside(path.parent, named, "spread.measured")
-    except InputError as error:
-        raise InputError(path, error.field, error.found, error.expected) from None
-    return replace(modelfile, measured=read_measured(place))
+    folder = Path() if modelfile.source is None else modelfile.source.parent
+    with errors_in(modelfile):
+        place = place or inside(folder, named, "spread.measured")
+    return read_measured(place)
 
 
 def parse_model_file(text: str, source: Path | None = None) -> ModelFile:

@@ -19,14 +19,14 @@ from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import Damper, Gap, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
-from designer.model.system_equations import (
+from designer.plots.mechanical_symbols import MechanicalSheet
+from designer.plots.system_equations import (
     drive_terms,
     element_rows,
     ground_line,
     law_symbols,
     law_variable,
 )
-from designer.plots.mechanical_symbols import MechanicalSheet
 
 Joint = Spring | Damper | CubicSpring | Friction | Law
 T = TypeVar("T", Spring, Damper)

@@ -132,10 +132,10 @@ class DesignColumn:
 def compare(
     result: Synthesis, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[DesignColumn, ...]:
-    """The paper's circuits for this model, as far as they can follow it, and the design."""
+    """The paper's circuits for this model of two masses, as far as they can follow it, and the
+    design."""
     model, spec = result.design.model, result.modelfile.circuit
-    if not isinstance(model, Dimensionless):
-        return ()  # the paper's circuit is for its two masses
+    assert isinstance(model, Dimensionless)
     design = ComparedCircuit(
         OURS,
         f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "
@@ -341,7 +341,7 @@ def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
 
 def comparison_json(columns: Sequence[DesignColumn]) -> dict[str, Any]:
     """``columns`` in order, and the sources of the printed values where they are one of them."""
-    by_net = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
+    by_net = {s.output: s.name for s in columns[0].candidate.circuit.sections}
     answer: dict[str, Any] = {
         "columns": [_column_json(c) | _paper_names(c, by_net) for c in columns]
     }

@@ -30,7 +30,7 @@ from designer.fabrication.board_cost import CostEstimate, cost_words
 from designer.model.ascii_sketch import sketch, system_sketch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
-from designer.model.system_equations import approximation_notes, equations_of, number_of
+from designer.plots.system_equations import approximation_notes, equations_of, number_of
 from designer.report import (
     design_tables,
     equations as forms,

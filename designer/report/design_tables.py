@@ -18,7 +18,7 @@ from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.relative_motion import relative_motions, subscripted
 from designer.model.si_units import MECHANICAL_UNITS
-from designer.model.system_equations import element_rows
+from designer.plots.system_equations import element_rows
 from designer.report import words
 from designer.workbench.prediction import PredictedStop
 

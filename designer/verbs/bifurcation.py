@@ -13,7 +13,7 @@ from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.si_unit import quantity_text, suffix, value_text
 from designer.verbs.console import say, table
-from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
+from designer.verbs.declared import Jobs, Kind, Out, Overwrite, Resume, Seed, Source, Verb, option
 from designer.verbs.tables import YES_NO, files
 
 if TYPE_CHECKING:
@@ -480,9 +480,53 @@ def _basins(answer: Mapping[str, Any]) -> None:
     )
 
 
+_EVERY = "model over from_ to steps omega frequency periods keep circuit out jobs overwrite resume"
+_SWEEP = f"{_EVERY} down up starts points"
+_LINE = "designer bifurcation"
 VERB = Verb(
     bifurcation,
     "Explore",
-    "designer bifurcation model.toml --over omega --from 0.2 --to 1 --steps 200 --out out/sweep",
+    f"{_LINE} model.toml --over omega --from 0.2 --to 1 --steps 200 --out out/sweep",
     show=show,
+    kinds=(
+        Kind(
+            "sweep",
+            "Draw the bifurcation diagram over one parameter: what is reached at each value, and "
+            "where responses are born and die.",
+            _SWEEP,
+            f"{_LINE} sweep model.toml --from 0.2 --to 1 --steps 200 --down --up --out out/sweep",
+        ),
+        Kind(
+            "curves",
+            "Sweep one parameter and continue each bifurcation point as a curve over a second one.",
+            f"{_SWEEP} and_! depth",
+            f"{_LINE} curves model.toml --from 0.5 --to 0.9 --steps 81 --and b 0.2 0.4",
+        ),
+        Kind(
+            "region",
+            "Show where in two parameters a response lives, what ends it, and where it has most "
+            "room.",
+            f"{_SWEEP} and_! depth region! seed",
+            f"{_LINE} region model.toml --from 0.5 --to 1 --steps 81 --and b 0.2 0.4 --region 0.7",
+        ),
+        Kind(
+            "map",
+            "Draw a map of the responses that are reached from rest over two parameters.",
+            f"{_EVERY} map_!",
+            f"{_LINE} map model.toml --from 0.2 --to 1.8 --steps 200 --map b 0.05 0.5 200",
+        ),
+        Kind(
+            "basins",
+            "Draw the basins of attraction: where the starts on a plane of two states end.",
+            f"{_EVERY} map_",
+            f"{_LINE} basins model.toml --omega 0.85 --over x1 --map x2 -1 1 200 --steps 200",
+            {"basins": True},
+        ),
+        Kind(
+            "shares",
+            "Sweep one parameter and count on which attractor random starts end at each value.",
+            f"{_SWEEP} shares! box seed",
+            f"{_LINE} shares model.toml --from 0.5 --to 0.9 --steps 41 --shares 200",
+        ),
+    ),
 )

@@ -2,17 +2,18 @@
 
 A parameter with an ``option`` or an ``argument`` is a word of the command line; another is for
 Python alone. The command line, its help, its completion and the pages of the reference are derived
-from the signature (``cli.app``).
+from the signature (``cli.app``). ``help()`` shows types, and below the docstring what each word is.
 """
 
 from __future__ import annotations
 
+import ast
 import builtins
 import inspect
 import os
 import shlex
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
@@ -96,6 +97,27 @@ def answer_of(result: Any) -> Mapping[str, Any]:
 
 
 @dataclass(frozen=True)
+class Kind:
+    """One of the things that a verb does, with a help page of its own: a word after the verb's."""
+
+    name: str
+    """The word, such as "map"."""
+    help: str
+    """What it does, in a sentence."""
+    words: str
+    """The parameters that it has besides those of every kind; those with a "!" it must be given."""
+    example: str
+    """A command line, which the help shows."""
+    given: Mapping[str, Any] = field(default_factory=dict)
+    """Parameters that the word itself decides."""
+
+    def required(self, parameter: str) -> bool | None:
+        """Whether this kind must be given a parameter; None of one that it does not have."""
+        words = self.words.split()
+        return True if f"{parameter}!" in words else False if parameter in words else None
+
+
+@dataclass(frozen=True)
 class Verb:
     """A function, and what the command line has to know of it beside its signature."""
 
@@ -118,15 +140,51 @@ class Verb:
     """How a study's answer is shown while the work goes on, the first time and then, likewise."""
     computes: bool = True
     """Whether it may need the exact engine, whose compilation is then announced."""
+    kinds: tuple[Kind, ...] = ()
+    """What it does, each by its name, where it does several things."""
+    declared: inspect.Signature = field(init=False)
+    """The function's signature with its words; the function itself shows types alone."""
 
-    def words(self) -> Iterator[tuple[inspect.Parameter, Word, Any]]:
-        """The parameters that are words of the command line, with the type that it reads."""
-        names = _Names(vars(inspect.getmodule(self.function)))
-        for parameter in inspect.signature(self.function).parameters.values():
-            kind = eval(parameter.annotation, {}, names)  # our own source text
-            if get_origin(kind) is Annotated:
-                own, word = get_args(kind)
-                yield parameter, word, own if word.reads is None else word.reads
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "declared", inspect.signature(self.function))
+        plain = [
+            parameter.replace(annotation=_type(parameter.annotation, self._names))
+            for parameter in self.declared.parameters.values()
+        ]
+        self.function.__signature__ = self.declared.replace(parameters=plain)  # type: ignore[attr-defined]
+        before, raises, after = (inspect.getdoc(self.function) or "").partition("\n\nRaises\n")
+        self.function.__doc__ = f"{before}\n\n{self._described(plain)}{raises}{after}"
+
+    def _described(self, plain: Iterable[inspect.Parameter]) -> str:
+        """The section of a docstring that says what each word is."""
+        types, lines = {each.name: each.annotation for each in plain}, ["Parameters", "-" * 10]
+        for parameter, word, _ in self.words():
+            spelled = " ".join([*word.names[-1:], *([word.metavar] if word.metavar else [])])
+            lines.append(f"{parameter.name} : {types[parameter.name]}")
+            lines.append(f"    {word.help}" + (f" (``{spelled}``)" if word.names else ""))
+        return "\n".join(lines)
+
+    @property
+    def _names(self) -> _Names:
+        return _Names(vars(inspect.getmodule(self.function)))
+
+    def words(self, kind: Kind | None = None) -> Iterator[tuple[inspect.Parameter, Word, Any]]:
+        """The parameters that are words of the command line, with the type that it reads.
+
+        kind : only those that it has; what it must be given has no usual value.
+        """
+        names = self._names
+        for parameter in self.declared.parameters.values():
+            annotation = eval(parameter.annotation, {}, names)  # our own source text
+            if get_origin(annotation) is not Annotated:
+                continue
+            own, word = get_args(annotation)
+            required = False if kind is None else kind.required(parameter.name)
+            if required is None:
+                continue
+            if required:
+                parameter = parameter.replace(default=inspect.Parameter.empty)
+            yield parameter, word, own if word.reads is None else word.reads
 
     def command(
         self, options: Any, model: Path, out: Path | None, without: Collection[str] = ()
@@ -150,6 +208,19 @@ class Verb:
             if number or value != usual.get(name):
                 line += _stated(word, value)
         return shlex.join(line)
+
+
+def _type(annotation: str, names: Mapping[str, Any]) -> str:
+    """The type in a parameter's annotation, without how the command line spells it."""
+    expression = ast.parse(annotation, mode="eval").body
+    if isinstance(expression, ast.Subscript) and isinstance(expression.slice, ast.Tuple):
+        outer, own = ast.unparse(expression.value), expression.slice.elts[0]
+        return ast.unparse(own) if outer == "Annotated" else annotation
+    kind = names.get(annotation)
+    if get_origin(kind) is not Annotated:
+        return annotation
+    own_type = get_args(kind)[0]
+    return getattr(own_type, "__forward_arg__", None) or inspect.formatannotation(own_type)
 
 
 def _stated(word: Word, value: Any) -> list[str]:

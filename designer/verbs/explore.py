@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from designer.base.defaults import SAMPLES, SEED
-from designer.base.progress import Progress
+from designer.base.progress import Progress, quiet
 from designer.verbs.declared import Jobs, Overwrite, Samples, Seed, Source, Verb, option
 
 
@@ -37,7 +37,7 @@ def explore(
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     progress: Progress | None = None,
-    ready: Callable[[str], None] = lambda _: None,
+    ready: Callable[[str], None] = quiet,
 ) -> None:
     """Move the model's parameters on a local page and see the response follow.
 

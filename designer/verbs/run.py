@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.verbs import next_steps
 from designer.verbs.declared import (
     Blame,
@@ -38,7 +38,7 @@ def run(
     resume: Resume = False,
     catalog: Catalog | None = None,
     progress: Progress | None = None,
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
 ) -> JobOutcome:
     """Do the whole job: parts, circuit, check in ngspice, yield, report.
 

@@ -22,9 +22,11 @@ from designer.verbs.tables import YES_NO, pictures, response_cells, untrusted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.base.arrays import Array
     from designer.check.simulation import Simulated
     from designer.check.synthesis_result import Synthesis
     from designer.model.model_file import ModelFile
+    from designer.model.si_units import Reader
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,15 @@ def simulate(
         int, option("--starts", "N", "Initial states that are drawn: the attractors' shares.")
     ] = DRAWN_STARTS,
     seed: Seed = SEED,
+    start: Annotated[
+        Simulated | Mapping[str, float | str] | Iterable[float | str],
+        option(
+            "--start",
+            "STATE=VALUE",
+            "Begin here instead of at rest, where the drive's phase is 0; may be repeated.",
+            reads=list[str],
+        ),
+    ] = (),
     plots: Annotated[
         Path | str | None, option("--plots", "DIR", "Draw each response: PNG and SVG.", Path)
     ] = None,
@@ -108,7 +119,9 @@ def simulate(
     --omega and --frequency.
 
     omega, frequency : one value or several. An omega is a number in the model's units, a frequency
-    a text such as "10 Hz" or a number in Hz.
+    a text such as "10 Hz" or a number in Hz. start : a response of an earlier answer, states by
+    their names (the others are 0), all states in their order, or texts such as "x1=0.2"; where
+    the base moves, counted from it.
 
     Raises
     ------
@@ -138,6 +151,10 @@ def simulate(
     omegas = tuple(read.value("--omega", "omega", w) for w in _several("omega", omega, "0.85"))
     frequencies = _several("frequency", frequency, "'10 Hz'")
     omegas += tuple(read.frequency("--frequency", f) for f in frequencies)
+    begin = _start(start, read)
+    if begin is not None and not omegas:
+        expected = "--omega or --frequency too: a wanted response is looked for from many starts"
+        raise InputError(None, "--start", ", ".join(f"{x:g}" for x in begin), expected)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
     place = None if plots is None else Path(plots)
     names: tuple[str, ...] = ()
@@ -158,9 +175,11 @@ def simulate(
         rung=rung,
         starts=starts,
         seed=seed,
+        start=begin,
         choose=_chosen,
     )
     settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
+    settings |= {} if begin is None else {"start": begin}
     origin = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
     seconds = time.perf_counter() - began
     answer = simulate_json(simulated, engine, origin, seconds, modelfile.si)
@@ -176,6 +195,45 @@ def _chosen(modelfile: ModelFile) -> Synthesis:
     from designer.centering import stage_choice
 
     return stage_choice.synthesise(modelfile, all_found=False)
+
+
+def _start(given: object, read: Reader) -> Array | None:
+    """(states,) the start that an argument gives, in model units; None where it is rest.
+
+    Raises
+    ------
+    InputError : it gives none.
+    """
+    import numpy as np
+
+    from designer.base.schema import one_of
+    from designer.check.simulation import Simulated
+    from designer.model.mechanics import state_names
+
+    names = state_names(read.model.second_order().size)
+    if isinstance(given, Simulated):
+        given = given.orbit.start.tolist() or given.orbit.response
+    if isinstance(given, Mapping):
+        given = [f"{name}={value}" for name, value in given.items()]
+    values = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    if not values:
+        return None
+    out = dict.fromkeys(names, 0.0)
+    if all(isinstance(value, str) and "=" in value for value in values):
+        for text in map(str, values):
+            name, value = (word.strip() for word in text.split("=", 1))
+            if name not in out:
+                raise InputError(None, "--start", name, one_of(name, names))
+            out[name] = read.value("--start", name, value)
+    elif len(values) == len(names) and all(isinstance(value, Real) for value in values):
+        out = {name: float(str(value)) for name, value in zip(names, values, strict=True)}
+    else:
+        expected = f"a response of this model, or values of {', '.join(names)}, such as x1=0.2"
+        raise InputError(None, "--start", repr(given), expected)
+    state = np.array(list(out.values()))
+    if not np.isfinite(state).all():
+        raise InputError(None, "--start", repr(given), "finite numbers")
+    return state
 
 
 def _several(name: str, given: object, example: str) -> list[float | str]:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import SEED
-from designer.base.progress import Progress, Show
+from designer.base.errors import InputError
+from designer.base.progress import Progress, Show, quiet
 from designer.verbs import next_steps
 from designer.verbs.console import grid, say
 from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
@@ -16,6 +17,7 @@ from designer.verbs.tables import design_written, not_good_enough, synthesised
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
+    from designer.model.model_file import ModelFile
 
 
 def synthesise(
@@ -31,7 +33,7 @@ def synthesise(
     resume: Resume = False,
     catalog: Catalog | None = None,
     progress: Progress | None = None,
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
 ) -> JobOutcome:
     """Choose the parts and write the design folder.
 
@@ -57,15 +59,23 @@ def synthesise(
     in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
     if out is None and in_memory:
         modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+        _check_comparable(modelfile, compare)
         return synthesise_job.synthesise_in_memory(
             modelfile, catalog, compare, options.workers, progress
         )
     modelfile, folder = source(model, out)
+    _check_comparable(modelfile, compare)
     with progress.whole(usual_times.of_design(modelfile)):
         modelfile = design_file(modelfile, folder, options, progress)
         return synthesise_job.synthesise_into(
             modelfile, folder, options, progress, shown, compare=compare
         )
+
+
+def _check_comparable(modelfile: ModelFile, compare: bool) -> None:
+    if compare and modelfile.format != 1:
+        expected = "a file of format 1: the paper's circuit is for its two masses"
+        raise InputError(modelfile.source, "--compare", "a file of format 2", expected)
 
 
 synthesize = synthesise

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import Over, StudyEngine
 from designer.base.errors import InputError
-from designer.base.progress import Progress, Show
+from designer.base.progress import Progress, Show, quiet
 from designer.verbs import next_steps, tables
 from designer.verbs.declared import (
     Blame,
@@ -99,7 +99,7 @@ def tolerance(
     overwrite: Overwrite = False,
     resume: Resume = False,
     progress: Progress | None = None,
-    shown: Show = lambda _: None,
+    shown: Show = quiet,
 ) -> JobOutcome:
     """Count the boards that will work, into the design folder; a model file needs --out.
 

@@ -24,9 +24,9 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
-from designer.model.system_equations import equations_of, number_of
 from designer.paper.report_files import make_report, write_files
 from designer.plots import system_drawing
+from designer.plots.system_equations import equations_of, number_of
 from reports.makers import (
     backbone,
     bilinear,

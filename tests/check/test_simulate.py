@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from designer import parse_model_file
-from designer.check import simulation
+from designer import InputError, parse_model_file, read_model_file
+from designer.check import simulation, synthesis_result
 from designer.cli import entry
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowResult
@@ -21,6 +22,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.plots import simulate_plots
 from tests.shared.model_text import PAPER_TABLE
+from tests.shared.oracles import Plain
 from tests.shared.system_text import clearance, system_text, table
 
 BASE = "format = 1\n" + PAPER_TABLE
@@ -307,3 +309,83 @@ def test_parameters_outside_their_domain(
     text = re.sub(rf"^{key} = .*$", f"{key} = {value}", BASE, flags=re.MULTILINE)
     arguments = ["simulate", _model(tmp_path, text), "--omega", "1", "-q"]
     _refused(arguments, capfd, "model.toml", f"model.{key}", "expected")
+
+
+def test_a_motion_at_any_times_is_what_an_integrator_finds() -> None:
+    """DOP853 from the orbit's own start; times that are no knots, contacts among them. Of the base
+    of another model the displacement is given too."""
+    (found,) = simulation.simulate(parse_model_file(BASE), [0.85], starts=1)
+    times = np.random.default_rng(3).uniform(0.0, 2.0 * math.pi / 0.85, 40)
+    plain = Plain(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+    truth = solve_ivp(
+        lambda t, y: plain.rhs(t, y, 0.85, plain.side_of(y[0])),
+        (0.0, times.max()),
+        found.orbit.start,
+        method="DOP853",
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=0.005,
+        t_eval=np.sort(times),
+    ).y.T
+    motion = found.motion(np.sort(times))
+    assert list(motion.columns) == ["time", "x1", "x1'", "x2", "x2'"]
+    assert motion[["x1", "x1'", "x2", "x2'"]].to_numpy() == pytest.approx(truth, abs=2e-6)
+    whole = found.motion()
+    assert len(whole) == 1025  # 1-2-2
+    assert whole.iloc[-1, 1:].to_numpy() == pytest.approx(whole.iloc[0, 1:].to_numpy(), abs=1e-9)
+    assert whole.x1.max() == pytest.approx(found.orbit.extremes[0, 1], abs=2e-5)
+    for wrong in ([-1.0], [math.nan], [], [[0.0]]):
+        with pytest.raises(InputError, match="times"):
+            found.motion(wrong)
+
+
+def test_a_moving_base_stands_beside_the_states_that_are_counted_from_it() -> None:
+    file = Path(__file__).parents[2] / "examples" / "hammer-base.toml"
+    modelfile = read_model_file(file)
+    omega = modelfile.responses[0].omega
+    assert omega is not None
+    (found,) = simulation.simulate(modelfile, [omega], starts=1)
+    motion = found.motion()
+    assert motion.y.max() == pytest.approx(found.base, rel=1e-5)
+    absolute = motion.x1 + motion.y
+    ends = pytest.approx(tuple(found.absolute[0][0]), abs=1e-4 * found.base)
+    assert (absolute.min(), absolute.max()) == ends
+
+
+@pytest.mark.parametrize("engine", ["model", "circuit"])
+def test_what_is_reached_from_a_start_comes_first(engine: Any) -> None:
+    """Rest leads to one of two attractors; the other one's own state leads to it."""
+    text = (Path(__file__).parents[2] / "examples" / "duffing-gap.toml").read_text("utf-8")
+    file = parse_model_file(text)
+    (rest,) = simulation.simulate(file, [0.58], starts=50)
+    (other,) = rest.others
+    assert {rest.orbit.response, other.response} == {"1-2-2", "1-1-1"}
+    made = None if engine == "model" else synthesis_result.synthesise(file)
+    words: dict[str, Any] = {"starts": 1, "engine": engine, "synthesis": made}
+    (found,) = simulation.simulate(file, [0.58], **words, start=other.start)
+    assert found.orbit.response == other.response
+    assert found.orbit.extremes == pytest.approx(other.extremes, rel=1e-2)
+    assert rest.orbit.response in [o.response for o in found.others]
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        (["--omega", "0.85", "--start", "x3=1"], ("--start: found x3", "x1, x1', x2, x2'")),
+        (["--omega", "0.85", "--start", "x1"], ("--start", "such as x1=0.2")),
+        (["--omega", "0.85", "--start", "x1=1 mm"], ("--start: found 1 mm", "dimensionless")),
+        (["--omega", "0.85", "--start", "x1=inf"], ("--start", "finite numbers")),
+        (["--start", "x1=0.1"], ("--start", "--omega or --frequency too")),
+    ],
+)
+def test_what_is_no_start_is_refused(
+    tmp_path: Path, capfd: Captured, start: list[str], words: tuple[str, ...]
+) -> None:
+    _refused(["simulate", _model(tmp_path), *start], capfd, *words)
+
+
+def test_a_start_is_stated_with_what_it_led_to(tmp_path: Path, capfd: Captured) -> None:
+    arguments = ["simulate", _model(tmp_path), "--omega", "0.85", "--starts", "1"]
+    answer = _answer([*arguments, "--start", "x2'=-0.5", "--start", "x1 = 0.2"], capfd)
+    assert answer["provenance"]["settings"]["start"] == [0.2, 0.0, 0.0, -0.5]
+    assert "start" not in _answer(arguments, capfd)["provenance"]["settings"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import time
 from dataclasses import replace
@@ -20,6 +21,7 @@ from designer.cli import entry
 from designer.dynamics import attractors
 from designer.folders.design_files import load
 from designer.model.model_file import read_model_file
+from designer.verbs import bifurcation as bifurcation_verb
 from designer.verbs.bifurcation import bifurcation
 from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
 from tests.shared.model_text import COARSE_CIRCUIT
@@ -422,3 +424,43 @@ def test_bad_starts(
     text = capfd.readouterr().err
     assert "--shares" in text or "--box" in text
     assert part in text
+
+
+KINDS = {kind.name: kind for kind in bifurcation_verb.VERB.kinds}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_has_a_help_page_with_an_example_that_it_reads(
+    kind: str, model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The example's words are among the page's; what the kind must be given is asked for."""
+    assert entry.status(["bifurcation", kind, "--help"]) == 0
+    page = capfd.readouterr().out
+    own = KINDS[kind]
+    assert own.help.split()[0] in page
+    assert f"  {own.example}\n" in page
+    words = set(re.findall(r"--[a-z-]+", own.example))
+    assert all(re.search(rf"^  {word} ", page, re.MULTILINE) for word in words)
+    required = re.findall(
+        r"^  (--\S+)(?:.(?!\n  --))*?\[required\]", page, re.MULTILINE | re.DOTALL
+    )
+    if "!" in own.words:
+        assert len(required) == own.words.count("!")
+        assert entry.status(["bifurcation", kind, str(model), "--from", "0.8", "--to", "1"]) == 2
+        assert f"Missing option '{required[0]}'" in capfd.readouterr().err
+
+
+def test_a_kind_is_the_verb_with_the_words_that_it_stands_for(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    ends = ["--from", "-1", "--to", "1", "--steps", "2", "--map", "x2", "-1", "1", "2"]
+    at = ["--omega", "0.85"]
+    said = _asked(capfd, "basins", model, *ends, *at)
+    once = _asked(capfd, model, "--basins", *ends, *at)
+    assert (said["kind"], said["cells"]) == ("basins", once["cells"])
+    assert entry.status(["bifurcation", "map", str(model), "--basins"]) == 2
+    monkeypatch.chdir(tmp_path)
+    Path("sweep").write_bytes(model.read_bytes())  # a file of a kind's name is a file
+    words = ["--from", "1.4", "--to", "1.41", "--steps", "2", "--no-points"]
+    assert _asked(capfd, "sweep", *words)["kind"] == "sweep"
+    assert _asked(capfd, "sweep", model, *words)["kind"] == "sweep"

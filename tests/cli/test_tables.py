@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -107,7 +107,7 @@ def test_the_unit_that_was_asked_for_comes_first(
             }
         ],
     }
-    bifurcation.show(BifurcationResult(sweep, False, None, ends))
+    bifurcation.show(BifurcationResult(sweep, False, None, ends, cast(Any, None)))
     text = " ".join(capsys.readouterr().err.split())
     assert f"track {heads} response" in text
     assert "λ [1/s]" in text

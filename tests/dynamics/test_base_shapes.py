@@ -17,7 +17,7 @@ from designer.fidelity.system_runge_kutta import rates_of
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of
-from designer.model.system_equations import equations_of
+from designer.plots.system_equations import equations_of
 from tests.shared.system_text import clearance, system_text
 
 GROUNDED = ("a", "ground")

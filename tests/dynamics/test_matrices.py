@@ -15,7 +15,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.fidelity.system_runge_kutta import rates_of
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file, read_model_file
-from designer.model.system_equations import equations_of, number_of
+from designer.plots.system_equations import equations_of, number_of
 from tests.shared.system_text import clearance, system_text
 
 Matrix = list[list[float]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import hashlib
 import math
 import os
@@ -20,15 +19,15 @@ from designer.base.schema import FileTable, keys_of
 from designer.dynamics.counts import Counts
 from designer.jobs.template import TEXT
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
-from designer.model.law_elements import CubicSpring, Friction, Law
-from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
-from designer.model.matrices import Matrices
 from designer.model.model import Dimensionless, Mechanical
-from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
-from designer.model.response_table import Response, ResponseTable
-from designer.model.search_table import SearchSpec
-from designer.model.spread_table import SpreadSpec
-from designer.model.tuning_bands import Bands
+from designer.model.model_file import (
+    MAX_BYTES,
+    ModelFile,
+    json_schema,
+    parse_model_file,
+    read_model_file,
+)
+from designer.model.response_table import Response
 from tests.shared.model_text import dimensionless
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -552,101 +551,28 @@ def test_what_the_starter_shows_in_comments_is_valid() -> None:
     assert read.measured == "measured.csv"
 
 
-# What docs/model-file.md says of the keys.
-
-DOCS = (EXAMPLES.parent / "docs" / "model-file.md").read_text(encoding="utf-8")
-TABLES: dict[str, type[FileTable]] = {
-    "model": Dimensionless,
-    "mechanical": Mechanical,
-    "response": ResponseTable,
-    "tuning": Bands,
-    "circuit": CircuitSpec,
-    "search": SearchSpec,
-    "spread": SpreadSpec,
-}
+# What the JSON Schema, and so docs/reference/model-file-keys.md, says of the keys of a model.
 
 
-def rows(name: str) -> dict[str, list[str]]:
-    """Rows of a table of the docs by key; [model] and [mechanical] share a heading."""
-    shared = name in ("model", "mechanical")
-    heading = "`[model]`" if shared else "`[[response]]`" if name == "response" else f"`[{name}]`"
-    section = DOCS.split(f"\n## {heading}", 1)[1].split("\n## ", 1)[0]
-    if shared:
-        section = next(t for t in section.split("\n\n") if t.startswith(f"| key | `[{name}]`"))
-    found: dict[str, list[str]] = {}
-    for row in re.findall(r"^\| (`.*) \|$", section, re.MULTILINE):
-        first, *cells = (cell.strip(" |") for cell in row.split(" | "))
-        keys = re.findall(rf"`(?:\[\[{name}\.)?(\w+)(?:\]\])?`", first)
-        found |= {key: [first, *cells] for key in keys}
-    return found
-
-
-@pytest.mark.parametrize("name", ["model", "mechanical"])
-def test_the_docs_say_what_is_required_and_what_else_holds(name: str) -> None:
-    said, table = rows(name), TABLES[name]
-    assert said.keys() == keys_of(table).keys()
-    for field in fields(table):
-        required = field.default is dataclasses.MISSING
-        assert said[field.name][-1] == ("required" if required else f'`"{field.default}"`')
+@pytest.mark.parametrize(("name", "table"), [("model", Dimensionless), ("mechanical", Mechanical)])
+def test_the_model_s_keys_are_required(name: str, table: type[FileTable]) -> None:
+    required = json_schema()["$defs"][table.__name__]["required"]
+    assert set(required) == keys_of(table).keys() - {"sides"}
     fine = {"model": MODEL, "mechanical": DRILL[DRILL.index("[mechanical]") :].split("\n\n")[0]}
-    for key in set(said) - {"sides"}:
+    for key in required:
         rest, count = re.subn(rf"^{key} *=.*\n?", "", fine[name], flags=re.MULTILINE)
         assert count == 1, key
         assert refused(f"format = 1\n{rest}").field == f"{name}.{key}"
 
 
-@pytest.mark.parametrize("key", sorted(set(rows("model")) - {"sides"}))
-def test_the_docs_say_the_domain_of_each_parameter(key: str) -> None:
-    """The ends of the interval that the docs give, by trying them."""
-    domain = rows("model")[key][2]
-    for end, inside in ((0.0, "[0" in domain), (1.0, "1]" in domain or domain == "> 0")):
+@pytest.mark.parametrize("key", sorted(keys_of(Dimensionless).keys() - {"sides"}))
+def test_the_schema_says_the_domain_of_each_parameter(key: str) -> None:
+    """The ends of the interval that it gives, by trying them."""
+    domain = json_schema()["$defs"]["Dimensionless"]["properties"][key]["description"]
+    domain = domain.partition("Expected: a number ")[2]
+    for end, inside in ((0.0, "[0" in domain), (1.0, "1]" in domain or domain == "> 0.")):
         text = "format = 1\n" + re.sub(rf"^{key} = .*", f"{key} = {end}", MODEL, flags=re.M)
         if inside:
             assert getattr(parse_model_file(text).model, key) == end
         else:
             assert refused(text).field == f"model.{key}"
-
-
-@pytest.mark.parametrize("name", ["response", "tuning", "circuit", "search", "spread"])
-def test_the_docs_name_every_key(name: str) -> None:
-    said = rows(name)
-    assert said.keys() == keys_of(TABLES[name]).keys()
-    for field in fields(TABLES[name]):
-        key = field.name
-        if len(said[key]) < 3:  # a table without a column of defaults
-            continue
-        names, shown = re.findall(r"`(\w+)`", said[key][0]), said[key][1].split(", ")
-        default = shown[min(names.index(key), len(shown) - 1)] if names else ""
-        if isinstance(field.default, float):
-            assert float(default) == field.default, key
-        elif isinstance(field.default, str):
-            assert default == f'`"{field.default}"`', key
-
-
-def test_the_docs_name_every_key_of_an_element() -> None:
-    """Of format 2, by table, with the default of those that have one."""
-    section = DOCS.split("\n## Format 2", 1)[1].split("\n## ", 1)[0]
-    found: dict[str, dict[str, str]] = {}
-    table = ""
-    for line in section.splitlines():
-        match = re.fullmatch(r"\| (?:`\[+(\w+)\]+`)? ?\| (`.*?) \|.*\| (.*) \|", line)
-        if match is not None:
-            table = match[1] or table
-            keys = re.findall(r"`(\w+)`", match[2])
-            found.setdefault(table, {}).update(dict.fromkeys(keys, match[3]))
-    kinds: dict[str, type[FileTable]] = {
-        "mass": Mass, "spring": Spring, "damper": Damper, "clearance": Gap, "force": Force,
-        "base": BaseTable, "law": Law, "cubic_spring": CubicSpring, "friction": Friction,
-        "matrices": Matrices,
-    }  # fmt: skip
-    assert found.keys() == kinds.keys()
-    for table, kind in kinds.items():
-        assert found[table].keys() == keys_of(kind).keys()
-        for field in fields(kind):
-            if field.default is dataclasses.MISSING:
-                assert found[table][field.name] == "required"
-            elif isinstance(field.default, str | int | float):
-                shown = found[table][field.name].strip('`"')
-                assert shown == (
-                    field.default if isinstance(field.default, str) else f"{field.default:g}"
-                )

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from designer.base import figure_style
 from designer.model.ascii_sketch import system_sketch
-from designer.model.system_equations import element_rows
 from designer.plots.system_drawing import system_drawing
-from tests.model.test_system_equations import FILES, system
+from designer.plots.system_equations import element_rows
+from tests.plots.test_system_equations import FILES, system
 from tests.shared.system_text import clearance, system_text, table
 
 BRANCH = system_text(

@@ -274,6 +274,13 @@ def printed(arguments: list[str | Path], capfd: pytest.CaptureFixture[str]) -> t
     return json.loads(out) if out else None, err
 
 
+def test_another_system_has_no_circuit_of_the_paper_s(capfd: pytest.CaptureFixture[str]) -> None:
+    path = Path(__file__).parents[2] / "examples" / "duffing-gap.toml"
+    assert entry.status(["synthesise", str(path), "--compare"]) == 2
+    said = capfd.readouterr().err
+    assert f"{path}: --compare: found a file of format 2" in said
+
+
 def test_without_a_folder_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,7 +34,6 @@ SMALLER = {
     "--steps 1801": "--steps 5 --no-points",
     "--steps 251": "--steps 5",
     "--steps 301 --starts 16": "--steps 3 --starts 2",
-    "--steps 201": "--steps 5",
     "--steps 200 --map b 0.05 0.5 200": "--steps 4 --map b 0.05 0.5 4",
     "--omega 1.505": "--omega 1.505 --steps 4 --map x2 -1 1 4",
     """--steps 300 --map 'x2'"'"'' -1 1 300""": """--steps 4 --map 'x2'"'"'' -1 1 4""",
@@ -48,14 +47,13 @@ SMALLER = {
 }
 FILLED = {
     # what a page leaves open, by the command: what a reader would write
-    "bifurcation DIR --circuit": "bifurcation out/paper --circuit",
+    "bifurcation sweep DIR --circuit": "bifurcation sweep out/paper --circuit",
     "synthesise examples/paper.toml --compare --out DIR": (
         "synthesise examples/paper.toml --compare --out out/compared"
     ),
     "synthesise DIR --compare": "synthesise out/paper --compare",
 }
 IN_PYTHON = {
-    "samples=1000": "samples=10",
     "samples=50": "samples=2",
     "made)  # of synthesise()": "_made)",
 }
@@ -71,7 +69,6 @@ NOT_RUN = {
     "search examples/robust.toml": "minutes; tests/jobs/test_search_job.py has a smaller one",
     "search out/paper --yield": "minutes; tests/jobs/test_cure_whole.py has a smaller one",
     "trade out/paper": "minutes in ngspice; tests/fidelity/test_trade_study.py has a smaller one",
-    "trade examples/paper.toml": "the same, of 400 boards",
     "tolerance out/paper --samples 100000": "a cluster; tests/jobs/test_dask_runner.py",
     "bench out/": "a record of an oscilloscope: tests/jobs/test_bench_job.py",
     "export out/paper --fab": "KiCad and a routed board: tests/jobs/test_order_export.py",
@@ -212,4 +209,4 @@ def test_a_page_is_read_as_a_reader_reads_it() -> None:
     study = next(c for c in commands("docs/tolerance.md") if "--until" in c.text)
     assert study.is_pattern
     assert "--resume" in study.options  # on a further line of the pattern
-    assert len(snippets("docs/paper-case.md")) == 2
+    assert len(snippets("docs/paper-case.md")) == 1

@@ -8,6 +8,7 @@ import importlib
 import inspect
 import json
 import math
+import pydoc
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -90,6 +91,17 @@ def test_every_verb_is_a_function() -> None:
     assert designer.synthesize is designer.synthesise
 
 
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb != "catalog"])
+def test_help_says_types_and_what_each_word_is(verb: str) -> None:
+    function = getattr(designer, verb)
+    text = pydoc.plain(pydoc.render_doc(function))
+    for code in ("Annotated", "lambda", " at 0x", "option("):
+        assert code not in text
+    for parameter, word, _ in importlib.import_module(function.__module__).VERB.words():
+        assert f"    {parameter.name} : " in text
+        assert word.help in text
+
+
 def test_new_and_load_catalog(tmp_path: Path) -> None:
     path = designer.new(tmp_path / "mine.toml")
     assert len(designer.read_model_file(path).responses) == 2
@@ -153,10 +165,26 @@ def test_bifurcation(model: Path, tmp_path: Path) -> None:
     assert windows.iloc[0]["response"] == written["windows"][0]["response"] == "1-2-2"
     assert len(found.points()) == len(written["points"])
     assert designer.bifurcation(str(model), **words, out=str(tmp_path / "sweep")).reused
+    steps, dots = found.steps(), found.diagram()
+    assert list(steps.omega) == [0.85, 0.855, 0.86]
+    assert list(steps.response) == ["1-2-2"] * 3
+    least = dots[dots.quantity == "least displacement"]
+    assert least.value.to_numpy() == pytest.approx(-0.401, abs=2e-3)  # the mirror of x1_max above
+    assert len(least) == 3 * 30  # periods that are kept
+    speeds = dots[dots.quantity.str.startswith("impact velocity")]
+    assert len(speeds) == 2 * len(least)
+    again = designer.bifurcation(str(model), **words, out=str(tmp_path / "sweep"))
+    pd.testing.assert_frame_equal(again.diagram(), dots)
+    pd.testing.assert_frame_equal(again.steps(), steps)
+    assert found.cells().empty
     basins = designer.bifurcation(
         model, from_=-1.0, to=1.0, steps=2, basins=True, omega=0.85, map_=("x2", -1.0, 1.0, 2)
     )
     assert basins.windows().empty
+    assert basins.diagram().empty
+    cells = basins.cells()
+    assert cells[["x1", "x2"]].to_numpy().tolist() == [[x, y] for y in (-1, 1) for x in (-1, 1)]
+    assert set(cells.attractor) == {a["number"] for a in basins.answer["attractors"]}
     assert "x1 and x2" in basins._repr_html_()
 
 

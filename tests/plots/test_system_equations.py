@@ -9,7 +9,7 @@ import pytest
 
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import parse_model_file
-from designer.model.system_equations import (
+from designer.plots.system_equations import (
     approximation_notes,
     element_rows,
     equations_of,

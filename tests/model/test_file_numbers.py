@@ -1,0 +1,84 @@
+"""A model file with other values is the file that somebody would have written with them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from designer import InputError, ModelFile, parse_model_file, read_model_file
+from tests.shared.model_text import PAPER_TABLE
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PAPER = 'format = 1\ntitle = "as it was"\n' + PAPER_TABLE
+SI = (
+    "format = 1\n[mechanical]\nM1 = '2 kg'\nM2 = 3\nC1 = 60\nC2 = 24\nK0 = '540 kN/m'\n"
+    "K1 = '60 kN/m'\nK2 = '40 kN/m'\nB = '0.5 mm'\nP1 = 80\nP2 = 0\n"
+)
+
+
+def asked(modelfile: ModelFile) -> dict[str, Any]:
+    """All that a file asks for."""
+    words = vars(modelfile).copy()
+    return {key: words[key] for key in words if key not in ("text", "source", "mechanical", "si")}
+
+
+def test_a_parameter_is_what_a_sweep_calls_it() -> None:
+    file = parse_model_file(PAPER)
+    assert asked(file.with_({"b": 0.3})) == asked(parse_model_file(PAPER.replace("0.25", "0.3")))
+    assert file.with_({}).model == file.model
+    assert file.model.b == 0.25
+    moved = parse_model_file(SI).with_({"b": 2.0 * parse_model_file(SI).model.b})
+    assert moved.mechanical is not None
+    assert pytest.approx(1e-3, rel=1e-9) == moved.mechanical.B
+    assert 'B = "1 mm"' in moved.text
+
+
+@pytest.mark.parametrize("value", ["0.7 mm", 0.0007])
+def test_a_number_of_an_element_may_have_its_unit(value: object) -> None:
+    file = read_model_file(EXAMPLES / "rig.toml")
+    moved = file.with_({"buffers.upper": value, "carriage.mass": "1900 g"})
+    assert moved.model.parameter("buffers.upper") == pytest.approx(0.0007, rel=1e-12)
+    assert moved.model.parameter("carriage.mass") == pytest.approx(1.9, rel=1e-12)
+    unmoved = set(file.model.parameters) - {"buffers.upper", "carriage.mass"}
+    assert all(moved.model.parameter(n) == file.model.parameter(n) for n in unmoved)
+    assert (moved.title, moved.source, moved.responses) == (file.title, file.source, file.responses)
+
+
+def test_keys_and_tables_are_set_added_and_left_out() -> None:
+    wanted = [{"omega": 0.85, "expect": "1-2-2"}]
+    file = parse_model_file(PAPER).with_({"response": wanted, "circuit.max_error": 0.01})
+    assert [str(r.expect) for r in file.responses] == ["1-2-2"]
+    assert file.circuit.max_error == 0.01
+    assert file.with_({"circuit.max_error": None, "title": "new"}).circuit.max_error is None
+    assert (file.title, file.with_({"title": "new"}).title) == ("as it was", "new")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "field"),
+    [
+        ("nonsense", 1.0, "nonsense"),
+        ("b", "wide", "b"),
+        ("b", math.nan, "model.b"),
+        ("k0", 2.0, "model.k0"),
+        ("circuit.opamp", "no such op-amp\n", "circuit.opamp"),
+        ("circuit.max_error", math.inf, "circuit.max_error"),
+        ("circuit.opamp", object(), "circuit.opamp"),
+        ("circuit.opamp.name", "TL074C", "circuit.opamp.name"),
+        ("response.omega", 1.0, "response.omega"),
+        ("format", 3, "format"),
+    ],
+)
+def test_what_no_file_could_say_is_refused(name: str, value: object, field: str) -> None:
+    file = parse_model_file(PAPER + '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n[circuit]\n')
+    file = file.with_({"circuit.opamp": "TL074C"})
+    with pytest.raises(InputError) as refused:
+        file.with_({name: value})
+    assert refused.value.field == field
+
+
+def test_the_factor_on_all_gaps_is_no_number_of_a_file() -> None:
+    with pytest.raises(InputError, match="the gaps themselves"):
+        read_model_file(EXAMPLES / "rig.toml").with_({"b": 2.0})
