@@ -12,7 +12,7 @@ LOCK := requirements/constraints.txt
 PARALLEL := --numprocesses auto --dist loadfile --no-loadscope-reorder
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
-.PHONY: help env ngspice demo test check-all lint format bench reports picture site lock clean
+.PHONY: help env ngspice demo test check-all lint format bench reports picture site dist lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -78,6 +78,9 @@ picture: env ngspice ## draw the README's pictures
 
 site: env ## build the documentation into out/site
 	@$(VENV)/bin/python -m sphinx -q -W --keep-going -d out/site/.doctrees docs out/site
+
+dist: env ## build wheel and sdist into dist/, and try both in clean environments
+	@scripts/make-dist $(VENV)/bin/python
 
 lock: ## resolve pyproject.toml anew into requirements/constraints.txt
 	@PYTHON=$(PYTHON) scripts/lock

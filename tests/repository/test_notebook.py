@@ -1,4 +1,4 @@
-"""The example notebook runs, and prints what it is stored with."""
+"""The example notebooks run, and show what they are stored with."""
 
 from __future__ import annotations
 
@@ -31,11 +31,10 @@ def values(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     return [output for output in cell.outputs if output.output_type != "stream"]
 
 
-def test_the_notebook_shows_what_it_is_stored_with(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.ipynb")))
+def test_a_notebook_shows_what_it_is_stored_with(name: str, tmp_path: Path) -> None:
     shutil.copy(EXAMPLES / "rig.toml", tmp_path)
-    stored = nbformat.read(  # type: ignore[no-untyped-call]
-        EXAMPLES / "notebook.ipynb", as_version=4
-    )
+    stored = nbformat.read(EXAMPLES / name, as_version=4)  # type: ignore[no-untyped-call]
     fresh = copy.deepcopy(stored)
     for cell in fresh.cells:
         if cell.cell_type == "code":
