@@ -53,7 +53,7 @@ def _clean(text: str) -> str:
 def table(scope: Scope) -> str:
     """The rules of one scope as docs/rules.md holds them, in the order of the list."""
     rows = [_row(rule) for rule in RULES if rule.scope == scope]
-    head = ["| id | what is found | limit | source | what to do |", "|---|---|---|---|---|"]
+    head = ["| id | what is found | limit | source |", "|---|---|---|---|"]
     return "\n".join([*head, *rows]) + "\n"
 
 
@@ -66,5 +66,5 @@ def _row(rule: DesignRule) -> str:
     else:
         limit = f"at most: {limit}"
     unit = f" [{rule.unit}]" if rule.unit else ""
-    cells = (f"`{rule.id}`", f"{rule.title}{unit}", limit, rule.source, rule.do)
+    cells = (f"`{rule.id}`", f"{rule.title}{unit}", limit, rule.source)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -138,6 +138,25 @@ def test_the_help_of_bifurcation_has_its_defaults(option: str, usual: int, maps:
     assert f"[{usual}; maps {maps}]" in str(getattr(found, "help", ""))
 
 
+def paragraphs(page: Path) -> list[str]:
+    """Texts of a page between blank lines; each item of a list, and each row of a table, by itself.
+    Blocks of code are left out."""
+    text = re.sub(r"^```.*?^```$|^ {4}[^\n]*$", "", page.read_text("utf-8"), flags=re.M | re.S)
+    return re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) |\|)", text)
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_no_paragraph_is_longer_than_a_hundred_words(page: Path) -> None:
+    longest = max(paragraphs(page), key=lambda text: len(text.split()))
+    assert len(longest.split()) <= 100, longest
+
+
+def test_the_docs_can_be_read_in_a_day() -> None:
+    """Words with a letter or a digit, of the pages that are written by hand."""
+    words = " ".join(page.read_text("utf-8") for page in DOCS.glob("*.md")).split()
+    assert sum(any(map(str.isalnum, word)) for word in words) <= 35_000
+
+
 def files_of_the_contract() -> list[str]:
     table = section("Design folder").split("\n\n")
     (rows,) = [t for t in table if t.startswith("| File |")]

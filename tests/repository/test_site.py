@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,17 @@ def test_every_page_is_on_the_site(site: Path) -> None:
     assert missing == set(), "no way leads from the first page to these"
     assert "Search.setIndex" in (site / "searchindex.js").read_text("utf-8")
     assert 'id="search-results"' in (site / "search.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    "word",
+    "excit restitut beam neimark acceler backlash graz corner derat yield hysteresi shaker "
+    "continu floquet poincar".split(),
+)
+def test_the_search_knows_the_field_s_words(word: str, site: Path) -> None:
+    """By the stems that the site's search looks for."""
+    index = (site / "searchindex.js").read_text("utf-8")
+    assert re.search(rf'[{{,]"?{word}[^":,]*"?:', index), word
 
 
 def test_options_keys_and_functions_stand_on_it(site: Path) -> None:
