@@ -139,7 +139,7 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     """
     if upgrades == Upgrades():
         return modelfile
-    data = modelfile.data
+    data = {**modelfile.data, "title": modelfile.title}
     circuit = data.setdefault("circuit", {})
     if upgrades.opamp is not None:
         circuit["opamp"] = upgrades.opamp

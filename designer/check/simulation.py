@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.defaults import DRAWN_STARTS, SEED, cores
 from designer.base.errors import InputError
-from designer.base.frames import frame, table_html
+from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
 from designer.check.absolute_motion import absolute_extremes
@@ -26,7 +27,7 @@ from designer.check.coexistence import Coexistence
 from designer.check.curved_laws import LawMisfit, law_misfits
 from designer.check.trust import Trust
 from designer.circuit import nominal
-from designer.circuit.nominal import Trace, UnitFlow, circuit_flow, record_of, traces_of
+from designer.circuit.nominal import Trace, UnitFlow, board_flow, record_of, traces_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import settle, starts as sobol_starts
 from designer.dynamics.coexisting_attractors import coexisting, outlived
@@ -131,30 +132,35 @@ class Simulated:
 
         times : (k,) from 0, where the drive's phase is 0; without it the period, or
         ``SHOWN_PERIODS`` drive periods of a motion that has none, at ``TRACE_POINTS`` a drive
-        period. orbit : ``twin`` or one of ``others`` in place of the response's own.
+        period. Exact at ``KNOTS`` times a drive period, between these by a spline. orbit : ``twin``
+        or one of ``others`` in place of the response's own.
 
         Raises
         ------
         InputError : of ngspice, an orbit that was not found, or times that are none.
         """
+        import pandas as pd
+
         shown = self.orbit if orbit is None else orbit
-        if self.flow is None or not len(shown.start):
-            found = shown.response if self.flow else "ngspice"
-            raise InputError(None, "orbit", found, "a motion that the exact flow has found")
+        own = any(shown is each for each in (self.orbit, *self.twins, *self.others))
+        if self.flow is None or not own or not len(shown.start):
+            found = "one of ngspice" if self.flow is None else getattr(shown, "response", shown)
+            expected = "a motion of this response that the exact flow has found"
+            raise InputError(None, "orbit", found, expected)
         if times is None:
             laps = nominal.shown_periods(shown)
-            times = np.arange(laps * nominal.TRACE_POINTS + 1) / nominal.TRACE_POINTS
-            times = times * (2.0 * math.pi / self.omega)
-        at = np.asarray(times, dtype=float)
+            phases = np.arange(laps * nominal.TRACE_POINTS + 1) / nominal.TRACE_POINTS
+            times = phases * (2.0 * math.pi / self.omega)
+        try:
+            at = np.asarray(times, dtype=float)
+        except (TypeError, ValueError):
+            at = np.full(1, np.nan)
         if at.ndim != 1 or not len(at) or not (at >= 0.0).all() or not np.isfinite(at).all():
-            raise InputError(None, "times", repr(times), "a list of numbers >= 0")
+            raise InputError(None, "times", shorten(repr(times), 80), "a list of numbers >= 0")
         states = self.flow.states_at(shown, at)
-        names = ["time", *state_names(states.shape[1] // 2)]
-        columns = [at, states]
-        if self.flow.ground:
-            names, columns = [*names, "y"], [*columns, self.flow.ground_at(at)]
-        rows = np.column_stack(columns).tolist()
-        return frame(dict(zip(names, row, strict=True)) for row in rows)
+        motion = pd.DataFrame(states, columns=state_names(states.shape[1] // 2))
+        motion.insert(0, "time", at)
+        return motion.assign(y=self.flow.ground_at(at, self.omega)) if self.flow.ground else motion
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each orbit, which ``orbit`` says: "wanted" or "reached", "twin", "other"."""
@@ -337,7 +343,7 @@ def _on_model(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
         misfits=tuple(law_misfits(model, flow, o, units) for o in orbits),
-        flow=UnitFlow(flow, units, 1.0, _ground(model, r.omega)),
+        flow=UnitFlow(partial(model_flow, model, r.omega), units, 1.0, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
 
@@ -409,7 +415,7 @@ def _circuit_orbits(
     with errors_in(synthesis.modelfile):
         same = [r for r in synthesis.model_responses if r.spec is spec]
         (r,) = same or find(synthesis.modelfile.model, [spec])
-    flow = circuit_flow(nominal.nominal_reduction(synthesis.design).system(), synthesis.design, r)
+    flow = board_flow(synthesis.design, r)
     volts = synthesis.design.volts(r.b)
     if scan.many:
         model = synthesis.modelfile.model.at(r.b)
@@ -455,7 +461,7 @@ def _on_circuit(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
         misfits=tuple(law_misfits(model, flow, measured[i], volts) for i in rows),
-        flow=UnitFlow(flow, volts, seconds, _ground(model, r.omega)),
+        flow=UnitFlow(partial(board_flow, design, r), volts, seconds, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
 

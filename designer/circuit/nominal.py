@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,7 +17,8 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.drive_shape import Shape, wave
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.flow_result import FlowStatus
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
@@ -48,6 +48,8 @@ TRACE_POINTS = 1024
 """Points of a drawn orbit per drive period."""
 KNOTS = 4 * TRACE_POINTS
 """Exact states per drive period that the states between them are interpolated from."""
+MOST_LAPS = 100_000
+"""Drive periods that a motion without a period is followed for at most."""
 
 
 SHOWN_PERIODS = 30
@@ -68,10 +70,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class UnitFlow:
-    """A flow whose times and states are told in model units."""
+    """What makes a flow, whose times and states are told in model units."""
 
-    flow: Flow
-    """The model's, or a board's."""
+    make: Callable[[], Flow]
+    """The flow of the model, or of a board."""
     volts: Array
     """(states,) a model's unit in units of the flow."""
     seconds: float
@@ -79,9 +81,9 @@ class UnitFlow:
     ground: Shape = ()
     """How the ground moves, in model units; () where it rests."""
 
-    def ground_at(self, times: Array) -> Array:
+    def ground_at(self, times: Array, omega: float) -> Array:
         """(k,) displacement of the ground at times (k,), in model units."""
-        return wave(self.ground, times * self.seconds * self.flow.drive.omega)
+        return wave(self.ground, times * omega)
 
     def states_at(self, orbit: Orbit, times: Array) -> Array:
         """(k, states) of an orbit in model units at times (k,) >= 0, drive phase 0 at time 0: exact
@@ -89,19 +91,32 @@ class UnitFlow:
 
         Raises
         ------
-        InputError : a time that the motion does not reach.
+        InputError : a time past ``MOST_LAPS`` periods of a motion that has no period, or one that
+            the motion does not reach.
         """
         from scipy.interpolate import CubicSpline
 
-        phases = times * (self.seconds / self.flow.drive.period)
-        laps = max(1, math.ceil(phases.max(initial=0.0)))
-        start, mode = orbit.start * self.volts, orbit.mode or None
-        strobes = self.flow.run(start, laps, mode=mode, points=KNOTS).strobes
-        if len(strobes) <= laps * KNOTS:
-            expected = f"times in the {len(strobes) // KNOTS} periods that can be run"
-            raise InputError(None, "times", float(times.max()), expected)
-        knots = np.arange(len(strobes)) / KNOTS
-        return np.asarray(CubicSpline(knots, strobes)(phases)) / self.volts
+        flow = self.make()
+        phases = times * (self.seconds / flow.drive.period)
+        phases = phases % orbit.n if orbit.n else phases
+        if phases.max() > MOST_LAPS:
+            latest = MOST_LAPS * flow.drive.period / self.seconds
+            raise InputError(None, "times", float(times.max()), f"times up to {latest:g}")
+        laps, states = np.floor(phases).astype(int), np.empty((len(times), flow.system.size))
+        x, mode, at = orbit.start * self.volts, orbit.mode or None, 0
+        knots = np.arange(KNOTS + 1) / KNOTS
+        for lap in np.unique(laps):
+            for periods, points in ((int(lap) - at, 1), (1, KNOTS)):
+                if not periods:
+                    continue
+                run = flow.run(x, periods, mode=mode, points=points)
+                if run.status is not FlowStatus.DONE:
+                    expected = f"times before the motion ends, in period {at + 1}"
+                    raise InputError(None, "times", float(times.max()), expected)
+                x, mode, at = run.strobes[-1], run.mode, at + periods
+            here = laps == lap
+            states[here] = CubicSpline(knots, run.strobes)(phases[here] - lap)
+        return states / self.volts
 
 
 def nominal_reduction(design: Design) -> Reduction:
@@ -113,6 +128,11 @@ def nominal_reduction(design: Design) -> Reduction:
 @lru_cache(maxsize=4)
 def _reduction(circuit: Circuit) -> Reduction:
     return Reduction(circuit, nominal_board(circuit))
+
+
+def board_flow(design: Design, response: ModelResponse) -> Flow:
+    """The flow of the nominal board at a response."""
+    return circuit_flow(nominal_reduction(design).system(), design, response)
 
 
 def response_flow(design: Design, response: ModelResponse) -> Flow:
@@ -127,7 +147,7 @@ def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
 
 def shown_periods(orbit: Orbit) -> int:
     """Drive periods of an orbit's trace."""
-    return max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
+    return orbit.n or SHOWN_PERIODS
 
 
 def traces_of(

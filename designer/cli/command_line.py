@@ -16,7 +16,7 @@ import typer.main
 from designer.base.defaults import cores
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.version import __version__
-from designer.cli.app import HELP, VERBS, empty_application, register
+from designer.cli.app import HELP, SOURCE, VERBS, empty_application, register
 
 OTHER_SPELLINGS = {"synthesize": "synthesise"}
 """Verbs that the help does not list, and those that they are."""
@@ -64,13 +64,28 @@ def application(verbs: tuple[str, ...] = VERBS) -> typer.core.TyperGroup:
 
 
 def _names_kind(parser: typer.core.TyperGroup, arguments: list[str]) -> bool:
-    """Whether the word after the verb's is one of its kinds, and not the path of a model or a
-    folder that has the same name: a kind is followed by its source, or by --help."""
-    if " ".join(arguments[:2]) not in parser.commands or len(arguments) < 2:
+    """Whether the word after the verb's is one of its kinds. A model or a folder of the same name
+    is meant where no other one follows.
+
+    Raises
+    ------
+    InputError : it is none, and another word follows that is no option.
+    """
+    (verb, word), following = arguments[:2], arguments[2:]
+    kinds = [name.split()[1] for name in parser.commands if name.startswith(f"{verb} ")]
+    if not kinds or word.startswith("-"):
         return False
-    following = arguments[2:3]
-    alone = not following or (following[0].startswith("-") and following[0] not in HELP)
-    return not (alone and Path(arguments[1]).exists())
+    if word not in kinds:
+        if following and not following[0].startswith("-"):
+            from designer.base.schema import one_of
+
+            raise InputError(None, verb, word, f"{one_of(word, kinds)}, or a model or a folder")
+        return False
+    if set(following) & set(HELP) or not Path(word).exists():
+        return True
+    command = parser.commands[f"{verb} {word}"]
+    context = command.make_context(word, following, resilient_parsing=True)
+    return context.params[SOURCE] is not None
 
 
 def dispatch(arguments: list[str]) -> int:
@@ -81,7 +96,7 @@ def dispatch(arguments: list[str]) -> int:
 
         raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
     parser = application(asked)
-    if _names_kind(parser, arguments):
+    if len(arguments) > 1 and _names_kind(parser, arguments):
         arguments = [" ".join(arguments[:2]), *arguments[2:]]
     result = parser.main(arguments, prog_name="designer", standalone_mode=False)
     return result if isinstance(result, int) else 0

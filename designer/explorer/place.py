@@ -11,14 +11,13 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import one_of
+from designer.model.find_responses import LARGEST_START
 from designer.model.mechanics import MechanicalModel, check_omega
 from designer.model.model_file import ModelFile
 from designer.model.si_units import Reader, in_si
 from designer.model.swept_model import ModelSubject
 
 OMEGA, START, SHOWN = "omega", "start", "shown"
-LARGEST_START = 1e9
-"""Of a state that the address may give: far past any motion, and no overflow."""
 
 
 @dataclass(frozen=True)

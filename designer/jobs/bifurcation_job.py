@@ -12,7 +12,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.design_folder import Folder
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
@@ -84,8 +84,7 @@ class BifurcationWork:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
-        self._swept: Sweep | None = None
-        self._grid: ParameterMap | Basins | None = None
+        self.made: Sweep | ParameterMap | Basins | None = None
         self.curves: CurvePlan | None = None
         self.region: float | None = None
         self.spread: Spread | None = None
@@ -113,31 +112,29 @@ class BifurcationWork:
         )
 
     def swept(self, folder: Folder | None) -> Sweep:
-        """The sweep, or what of it the folder has not; made once."""
+        """The sweep, or what of it the folder has not."""
         plan = self.plan
         assert isinstance(plan, SweepPlan)
-        if self._swept is None:
-            name = plan.parameter
-            store = None if folder is None else SweepStore(self.files(folder), name)
-            blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-            step = self.progress.stage(f"sweep over {name}", blocks)
-            self._swept = sweep.run(plan, self.jobs, store, step)
-        return self._swept
+        name = plan.parameter
+        store = None if folder is None else SweepStore(self.files(folder), name)
+        blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
+        step = self.progress.stage(f"sweep over {name}", blocks)
+        self.made = sweep.run(plan, self.jobs, store, step)
+        return self.made
 
     def grid(self, folder: Folder | None) -> ParameterMap | Basins:
         """The map or the basins likewise."""
         plan, kind = self.plan, self.request.kind
         assert not isinstance(plan, SweepPlan)
-        if self._grid is None:
-            store = None
-            if folder is not None:
-                store = GridStore(self.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
-            step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
-            if isinstance(plan, MapPlan):
-                self._grid = parameter_map.run(plan, self.jobs, store, step)
-            else:
-                self._grid = basins.run(plan, self.jobs, store, step)
-        return self._grid
+        store = None
+        if folder is not None:
+            store = GridStore(self.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
+        step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+        if isinstance(plan, MapPlan):
+            self.made = made = parameter_map.run(plan, self.jobs, store, step)
+            return made
+        self.made = plane = basins.run(plan, self.jobs, store, step)
+        return plane
 
     @property
     def _seed(self) -> int | None:
@@ -375,6 +372,54 @@ def _curves(
     return border_curves.run(plan, points, work.jobs, store, step)
 
 
+class _Finished:
+    """The blocks of a finished work, which are only read."""
+
+    def __init__(self, store: SweepStore | GridStore) -> None:
+        self.store = store
+
+    def read(self, *place: Any) -> Any:
+        found = self.store.read(*place)
+        if found is None:
+            expected = "every block of the finished work: --overwrite makes it anew"
+            raise InputError(self.store.files.root, self.store.name(*place), MISSING, expected)
+        return found
+
+    def write(self, *_: Any) -> None:
+        raise AssertionError("a finished work is only read")
+
+
+@dataclass(frozen=True)
+class PictureData:
+    """What the pictures of a work show: in memory, or in the blocks of its folder."""
+
+    plan: Plan
+    """What was asked for."""
+    made: Sweep | ParameterMap | Basins | None
+    """What was made now; None where the folder had all."""
+    kept: WorkFiles | None
+    """The blocks in the folder, if there is one."""
+
+    def read(self) -> Sweep | ParameterMap | Basins:
+        """The data.
+
+        Raises
+        ------
+        InputError : the folder's blocks are gone, or not those of this work.
+        """
+        plan, kept = self.plan, self.kept
+        if self.made is not None:
+            return self.made
+        assert kept is not None
+        if isinstance(plan, SweepPlan):
+            return sweep.run(plan, 1, _Finished(SweepStore(kept, plan.parameter)))
+        kind = "map" if isinstance(plan, MapPlan) else "basins"
+        grid = _Finished(GridStore(kept, kind, plan.x, plan.xs, plan.y, plan.ys))
+        if isinstance(plan, MapPlan):
+            return parameter_map.run(plan, 1, grid)
+        return basins.run(plan, 1, grid)
+
+
 @dataclass(frozen=True)
 class BifurcationResult:
     """What the verb ``bifurcation`` answers."""
@@ -387,23 +432,22 @@ class BifurcationResult:
     """The folder that it is in, if any."""
     ends: tuple[str, str]
     """Of the sweep, as they were asked for: they say the unit that comes first."""
-    work: BifurcationWork = field(repr=False)
-    """What was computed, with the data of its pictures."""
+    data: PictureData = field(repr=False)
+    """The data of its pictures."""
 
     def steps(self) -> pd.DataFrame:
         """What a sweep shows at each value on each track, a row each: the response with its
         exponent, and of a periodic one the largest multiplier; empty of a map and of basins."""
-        return frame(
+        names = "response", "symmetric", "lyapunov", "lyapunov_error"
+        rows = (
             {
                 **place,
-                "response": step.response,
-                "symmetric": step.symmetric,
-                "lyapunov": step.lyapunov,
-                "lyapunov_error": step.lyapunov_error,
+                **{name: getattr(step, name) for name in names},
                 "largest_multiplier": step.radius,
             }
             for place, step in self._steps()
         )
+        return frame(rows, ("track", *names, "largest_multiplier"))
 
     def diagram(self) -> pd.DataFrame:
         """The dots of a sweep's picture, a row each: the least displacement in each period that was
@@ -411,7 +455,7 @@ class BifurcationResult:
         basins."""
         rows = list[dict[str, Any]]()
         for place, step in self._steps():
-            stops = [stop.name for stop in self.work.plan.subject.stops]
+            stops = [stop.name for stop in self.data.plan.subject.stops]
             clouds = {"least displacement": step.minima}
             every = (step.velocities, *step.further)
             clouds |= {f"impact velocity on {n}": v for n, v in zip(stops, every, strict=False)}
@@ -420,14 +464,14 @@ class BifurcationResult:
                 for quantity, values in clouds.items()
                 for value in values
             ]
-        return frame(rows)
+        return frame(rows, ("track", "quantity", "value"))
 
     def cells(self) -> pd.DataFrame:
         """The points of a map or of basins, a row each: both coordinates, the response there, and
         of basins the number of the attractor; empty of a sweep."""
-        if isinstance(self.work.plan, SweepPlan):
-            return frame(())
-        made = self.work.grid(self._written)
+        made = self.data.read()
+        if isinstance(made, Sweep):
+            return frame((), ("response",))
         plan = made.plan
         places = ((x, y) for y in plan.ys.tolist() for x in plan.xs.tolist())
         return frame(
@@ -442,15 +486,11 @@ class BifurcationResult:
 
     def _steps(self) -> Iterator[tuple[dict[str, Any], SteadyMotion]]:
         """Every step of a sweep, with its track and its value."""
-        plan = self.work.plan
-        if isinstance(plan, SweepPlan):
-            for track, steps in self.work.swept(self._written).steps.items():
-                for value, step in zip(plan.values.tolist(), steps, strict=True):
-                    yield {"track": track, plan.parameter: value}, step
-
-    @property
-    def _written(self) -> Folder | None:
-        return None if self.folder is None else Folder(self.folder)
+        made = self.data.read()
+        if isinstance(made, Sweep):
+            for track, steps in made.steps.items():
+                for value, step in zip(made.plan.values.tolist(), steps, strict=True):
+                    yield {"track": track, made.plan.parameter: value}, step
 
     def windows(self) -> pd.DataFrame:
         """The windows of a sweep, a row each; empty of a map and of basins."""
@@ -514,7 +554,8 @@ def requested(
     if out is None:
         answer, _ = _make(work, None)
         answer["cost"]["seconds"] = time.perf_counter() - began
-        return BifurcationResult(answer, False, None, request.ends, work)
+        data = PictureData(plan, work.made, None)
+        return BifurcationResult(answer, False, None, request.ends, data)
     folder = Folder(out)
     inputs = {
         "model": modelfile.sha256,
@@ -537,7 +578,8 @@ def requested(
                 folder.write(name, content)
             answer["cost"]["seconds"] = time.perf_counter() - began
             folder.write(f"{kind}.json", dumps(answer))
-    return BifurcationResult(folder.json(f"{kind}.json"), not todo, out, request.ends, work)
+    data = PictureData(plan, work.made, WorkFiles(folder.path, work.hash, work.provenance))
+    return BifurcationResult(folder.json(f"{kind}.json"), not todo, out, request.ends, data)
 
 
 # ---------------------------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from designer.base.units import restated
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
-from designer.model.si_units import MECHANICAL_UNITS, in_si
+from designer.model.si_units import MECHANICAL_UNITS, Reader, in_si
 
 
 @dataclass(frozen=True)
@@ -27,26 +28,35 @@ class FileNumbers:
     si: SiScales | None
     """SI values of the model's units; None where they are not known."""
 
-    def change(self, data: dict[str, Any], changes: Mapping[str, Any], keys: Iterable[str]) -> None:
-        """Make the changes of ``ModelFile.with_`` in a file's data. keys : of its top level.
+    def change(self, data: dict[str, Any], changes: Mapping[str, Any]) -> None:
+        """Give parameters other values in a file's data: a number, a text with a unit, or None to
+        leave a number of an element out.
 
         Raises
         ------
-        InputError : a name that is neither a parameter nor a key, or a value outside its domain.
+        InputError : a name that is no parameter, or a value outside its domain.
         """
         model, numbers = self.model, dict[str, float]()
-        is_system, known = isinstance(model, LumpedSystem), (*keys, *model.parameters)
         for name, value in changes.items():
             if name not in model.parameters:
-                _put_key(data, name, value, known)
-            elif is_system and isinstance(value, str) and name != "b":
-                entry, key = self._entry(data, name)
-                entry[key] = value
+                raise InputError(None, name, repr(value), one_of(name, model.parameters))
+            if not isinstance(model, LumpedSystem):
+                numbers[name] = self._number(name, value)
+            elif name == "b":
+                raise InputError(None, "b", value, "the gaps themselves: b is a factor on all")
+            elif value is None or isinstance(value, str):
+                put_key(*self._entry(data, name), name, value)
             else:
-                numbers[name] = _number(name, value)
-        if is_system and "b" in numbers:
-            raise InputError(None, "b", numbers["b"], "the gaps themselves: b is a factor on all")
+                numbers[name] = self._number(name, value)
         self.put(data, model.changed(numbers))
+
+    def _number(self, name: str, value: object) -> float:
+        """A parameter in the model's units."""
+        if not isinstance(value, bool):
+            with suppress(TypeError, OverflowError):
+                plain_value = value if isinstance(value, str) else float(value)  # type: ignore[arg-type]
+                return Reader(self.model, self.si).value(name, name, plain_value)
+        raise InputError(None, name, repr(value), "a number, or a text with a unit")
 
     def put(self, data: dict[str, Any], new: MechanicalModel) -> None:
         """Change the numbers of a file's data that another model has otherwise; a value keeps its
@@ -89,30 +99,33 @@ def _with_unit(value: float, unit: str, old: object) -> float | str:
     return restated(value, unit, old if isinstance(old, str) else f"1 {unit}")
 
 
-def _number(name: str, value: object) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError(None, name, repr(value), "a number") from None
+def put_at(data: dict[str, Any], name: str, value: object) -> None:
+    """Change, add or, with None, remove a key of a file's data such as "circuit.opamp", or a whole
+    table.
 
-
-def _put_key(data: dict[str, Any], name: str, value: object, known: Collection[str]) -> None:
-    """Change, add or, with None, remove a key such as "circuit.opamp", or a whole table."""
-    *tables, key = name.split(".")
-    if (tables or [key])[0] not in known:
-        raise InputError(None, name, repr(value), f"a parameter or a key: {one_of(name, known)}")
-    table = data
+    Raises
+    ------
+    InputError : no table has such a key, or the value has no form in a file.
+    """
+    table, (*tables, key) = data, name.split(".")
     for each in tables:
         table = table.setdefault(each, {})
         if not isinstance(table, dict):
             expected = f"a key of a table; {each} is none (a list is given as a whole)"
             raise InputError(None, name, repr(value), expected)
+    put_key(table, key, name, value)
+
+
+def put_key(table: dict[str, Any], key: str, name: str, value: object) -> None:
+    """The same of the table itself. name : what was asked for, which an error names."""
     if value is None:
-        table.pop(key, None)
+        if key not in table:
+            raise InputError(None, name, "None", "a key that the file has")
+        del table[key]
         return
     try:
         table[key] = plain(value)
-    except TypeError:
+    except (TypeError, RecursionError):
         raise InputError(None, name, repr(value), "a text, a number, a list or a table") from None
     if table[key] is None:  # plain of what is not finite
         raise InputError(None, name, repr(value), "a finite number")

@@ -29,6 +29,8 @@ STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
 """Frequencies over the model's own that set the swing of a model file that names no response."""
+LARGEST_START = 1e9
+"""Of a state that a motion may be asked to begin at: far past any motion, and no overflow."""
 LEAST_SHARE = 0.1
 """Of the widest start of a mass: the least of another, where a law may be all that moves it."""
 DENSE = 1024

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
 from designer.base.json_schema import DIALECT, either, of_tables
-from designer.base.schema import FileTable, checked, line, such, whole_number
+from designer.base.schema import FileTable, checked, line, one_of, such, whole_number
 from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
@@ -43,7 +43,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
-from designer.model.file_numbers import FileNumbers
+from designer.model.file_numbers import FileNumbers, put_at
 from designer.model.law_elements import CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
@@ -116,17 +116,31 @@ class ModelFile:
     def with_(self, changes: Mapping[str, Any]) -> ModelFile:
         """This file with other values, checked as a file is; nothing is written.
 
-        changes : by the name of a parameter that a sweep may change ("b", "A.upper"), a number or
-        a text with its unit; or by a key ("title", "circuit.opamp", "response"), what a file would
-        have there, and None to leave it out.
+        changes : by a key ("title", "circuit.opamp", "response"), what a file would have there, and
+        None to leave it out; or by the name of a parameter ("zeta", "A.upper"; of format 2 not b, a
+        factor on all gaps), a number or a text with its unit. Keys are changed first.
 
         Raises
         ------
         InputError : a name that is neither, or a value that the file may not have.
         """
-        keys, data = (each.name for each in fields(FORMATS[self.format - 1])), self.data
+        keys = {each.name for each in fields(FORMATS[self.format - 1])}
+        of_keys, of_numbers = dict[str, Any](), dict[str, Any]()
+        for name, value in changes.items():
+            is_key = name.split(".")[0] in keys and name not in self.model.parameters
+            (of_keys if is_key else of_numbers)[name] = value
         with errors_in(self):
-            self.numbers.change(data, changes, keys)
+            file, data = self, {**self.data, "title": self.title}
+            if of_keys:
+                for name, value in of_keys.items():
+                    put_at(data, name, value)
+                file = self.rewritten(data)
+            for name in of_numbers.keys() - file.model.parameters.keys():
+                known = one_of(name, (*sorted(keys), *file.model.parameters))
+                raise InputError(
+                    None, name, repr(of_numbers[name]), f"a parameter or a key: {known}"
+                )
+            file.numbers.change(data, of_numbers)
             return self.rewritten(data)
 
     @property
@@ -145,9 +159,8 @@ class ModelFile:
         return 1 if isinstance(self.model, Dimensionless) else 2
 
     def rewritten(self, data: Mapping[str, Any], source: Path | None = None) -> ModelFile:
-        """A file of other tables with what this one has beside its own: the title where none is
-        stated, the list of measured values, and the place that it was read from, unless ``source``
-        says another.
+        """A file of other tables with the list of measured values that this one has beside its own,
+        and the place that it was read from, unless ``source`` says another.
 
         Raises
         ------
@@ -156,8 +169,8 @@ class ModelFile:
         read = parse_model_file(toml_text(data), source or self.source)
         measured = self.measured
         if read.spread.measured != self.spread.measured:
-            measured = _measured(read)
-        return replace(read, title=data.get("title", self.title), measured=measured)
+            measured = _named_list(read)
+        return replace(read, measured=measured)
 
     def choices(self, catalog: Catalog) -> Catalog:
         """The catalogue restricted to the cases and families that this file allows, for boards of
@@ -194,10 +207,10 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     except InputError as error:
         raise InputError(path, error.field, error.found, error.expected) from None
     modelfile = parse_model_file(text, path)
-    return replace(modelfile, measured=_measured(modelfile, measured))
+    return replace(modelfile, measured=_named_list(modelfile, measured))
 
 
-def _measured(modelfile: ModelFile, place: Path | None = None) -> MeasuredBoards | None:
+def _named_list(modelfile: ModelFile, place: Path | None = None) -> MeasuredBoards | None:
     """The list that a file names, if any. place : where it lies, if not beside the file."""
     named = modelfile.spread.measured
     if named is None:

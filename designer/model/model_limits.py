@@ -270,7 +270,8 @@ LIMITS = (
     ModelLimit(
         "initial conditions",
         "`[initial]`, `x0`, `v0`",
-        "none: a response is what a motion settles on; simulate --starts N asks N starts",
+        "none: a response is what a motion settles on; simulate --start STATE=VALUE begins at one "
+        "start, --starts N asks N",
         tables=r"initial\w*|start|state",
         keys=r"initial\w*|[xv]_?0|start",
     ),

@@ -483,6 +483,15 @@ def _basins(answer: Mapping[str, Any]) -> None:
 _EVERY = "model over from_ to steps omega frequency periods keep circuit out jobs overwrite resume"
 _SWEEP = f"{_EVERY} down up starts points"
 _LINE = "designer bifurcation"
+_SWEPT = (
+    "omega (default), b, k0, zeta, m, k, c or f20; of format 2 a number of an element, such as "
+    "A.upper; with --circuit frequency in Hz (default), omega, amplitude or offset in V."
+)
+_OF_SWEEP = {
+    "over": _SWEPT,
+    "periods": "Drive periods left out [500].",
+    "keep": "Drive periods shown [30].",
+}
 VERB = Verb(
     bifurcation,
     "Explore",
@@ -495,12 +504,14 @@ VERB = Verb(
             "where responses are born and die.",
             _SWEEP,
             f"{_LINE} sweep model.toml --from 0.2 --to 1 --steps 200 --down --up --out out/sweep",
+            texts=_OF_SWEEP,
         ),
         Kind(
             "curves",
             "Sweep one parameter and continue each bifurcation point as a curve over a second one.",
             f"{_SWEEP} and_! depth",
             f"{_LINE} curves model.toml --from 0.5 --to 0.9 --steps 81 --and b 0.2 0.4",
+            texts=_OF_SWEEP,
         ),
         Kind(
             "region",
@@ -508,12 +519,20 @@ VERB = Verb(
             "room.",
             f"{_SWEEP} and_! depth region! seed",
             f"{_LINE} region model.toml --from 0.5 --to 1 --steps 81 --and b 0.2 0.4 --region 0.7",
+            texts=_OF_SWEEP,
         ),
         Kind(
             "map",
             "Draw a map of the responses that are reached from rest over two parameters.",
             f"{_EVERY} map_!",
             f"{_LINE} map model.toml --from 0.2 --to 1.8 --steps 200 --map b 0.05 0.5 200",
+            texts={
+                "over": _SWEPT,
+                "from_": 'One end of the horizontal axis; of a file with SI values also "10 Hz".',
+                "map_": "The other parameter, its ends and its number of values.",
+                "periods": "Drive periods left out [134].",
+                "keep": "Drive periods looked at [16].",
+            },
         ),
         Kind(
             "basins",
@@ -521,12 +540,22 @@ VERB = Verb(
             f"{_EVERY} map_",
             f"{_LINE} basins model.toml --omega 0.85 --over x1 --map x2 -1 1 200 --steps 200",
             {"basins": True},
+            {
+                "over": "The state along the horizontal axis [x1].",
+                "from_": "One end of the horizontal axis [a few static deflections].",
+                "map_": "The other state, its ends and its number of values [x1'].",
+                "steps": "Values along the horizontal axis [200].",
+                "omega": "The drive's frequency [the first response's].",
+                "periods": "Drive periods left out [500].",
+                "keep": "Drive periods looked at [30].",
+            },
         ),
         Kind(
             "shares",
             "Sweep one parameter and count on which attractor random starts end at each value.",
             f"{_SWEEP} shares! box seed",
             f"{_LINE} shares model.toml --from 0.5 --to 0.9 --steps 41 --shares 200",
+            texts=_OF_SWEEP,
         ),
     ),
 )

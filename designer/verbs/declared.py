@@ -13,7 +13,7 @@ import inspect
 import os
 import shlex
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
@@ -110,6 +110,8 @@ class Kind:
     """A command line, which the help shows."""
     given: Mapping[str, Any] = field(default_factory=dict)
     """Parameters that the word itself decides."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """Help of parameters that mean less here than of the verb as a whole."""
 
     def required(self, parameter: str) -> bool | None:
         """Whether this kind must be given a parameter; None of one that it does not have."""
@@ -184,6 +186,8 @@ class Verb:
                 continue
             if required:
                 parameter = parameter.replace(default=inspect.Parameter.empty)
+            if kind is not None and parameter.name in kind.texts:
+                word = replace(word, help=kind.texts[parameter.name])
             yield parameter, word, own if word.reads is None else word.reads
 
     def command(
@@ -220,7 +224,8 @@ def _type(annotation: str, names: Mapping[str, Any]) -> str:
     if get_origin(kind) is not Annotated:
         return annotation
     own_type = get_args(kind)[0]
-    return getattr(own_type, "__forward_arg__", None) or inspect.formatannotation(own_type)
+    text = getattr(own_type, "__forward_arg__", None) or inspect.formatannotation(own_type)
+    return str(text).replace("pathlib.", "")
 
 
 def _stated(word: Word, value: Any) -> list[str]:

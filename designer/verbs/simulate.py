@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from designer.base.defaults import DRAWN_STARTS, SEED
@@ -98,7 +99,7 @@ def simulate(
     ] = DRAWN_STARTS,
     seed: Seed = SEED,
     start: Annotated[
-        Simulated | Mapping[str, float | str] | Iterable[float | str],
+        Simulated | Mapping[str, float | str] | Iterable[float | str] | None,
         option(
             "--start",
             "STATE=VALUE",
@@ -208,32 +209,39 @@ def _start(given: object, read: Reader) -> Array | None:
 
     from designer.base.schema import one_of
     from designer.check.simulation import Simulated
+    from designer.model.find_responses import LARGEST_START
     from designer.model.mechanics import state_names
 
     names = state_names(read.model.second_order().size)
+    expected = f"a response of this model, or values of {', '.join(names)}, such as x1=0.2"
+    found = shorten(repr(given), 80)
+    if isinstance(given, SimulationResult) and len(given) == 1:
+        given = given[0]
     if isinstance(given, Simulated):
         given = given.orbit.start.tolist() or given.orbit.response
     if isinstance(given, Mapping):
         given = [f"{name}={value}" for name, value in given.items()]
-    values = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-    if not values:
+    if given is None or (isinstance(given, tuple | list) and not given):
         return None
-    out = dict.fromkeys(names, 0.0)
-    if all(isinstance(value, str) and "=" in value for value in values):
+    values = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    state = dict[str, float]()
+    if values and all(isinstance(value, str) and "=" in value for value in values):
         for text in map(str, values):
             name, value = (word.strip() for word in text.split("=", 1))
-            if name not in out:
-                raise InputError(None, "--start", name, one_of(name, names))
-            out[name] = read.value("--start", name, value)
-    elif len(values) == len(names) and all(isinstance(value, Real) for value in values):
-        out = {name: float(str(value)) for name, value in zip(names, values, strict=True)}
+            if name not in names or name in state:
+                raise InputError(None, "--start", text, f"each once, {one_of(name, names)}")
+            state[name] = read.value("--start", name, value)
+    elif len(values) == len(names):
+        kinds = float, int, np.number
+        if any(isinstance(value, bool) or not isinstance(value, kinds) for value in values):
+            raise InputError(None, "--start", found, expected)
+        state = dict(zip(names, np.array(values, dtype=float).tolist(), strict=True))
     else:
-        expected = f"a response of this model, or values of {', '.join(names)}, such as x1=0.2"
-        raise InputError(None, "--start", repr(given), expected)
-    state = np.array(list(out.values()))
-    if not np.isfinite(state).all():
-        raise InputError(None, "--start", repr(given), "finite numbers")
-    return state
+        raise InputError(None, "--start", found, expected)
+    out = np.array([state.get(name, 0.0) for name in names])
+    if not (np.abs(out) <= LARGEST_START).all():
+        raise InputError(None, "--start", found, f"numbers of at most {LARGEST_START:g} in size")
+    return out
 
 
 def _several(name: str, given: object, example: str) -> list[float | str]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -334,9 +336,32 @@ def test_a_motion_at_any_times_is_what_an_integrator_finds() -> None:
     assert len(whole) == 1025  # 1-2-2
     assert whole.iloc[-1, 1:].to_numpy() == pytest.approx(whole.iloc[0, 1:].to_numpy(), abs=1e-9)
     assert whole.x1.max() == pytest.approx(found.orbit.extremes[0, 1], abs=2e-5)
-    for wrong in ([-1.0], [math.nan], [], [[0.0]]):
+    late = found.motion([1.0 + 1e6 * 2.0 * math.pi / 0.85])
+    assert late.iloc[0, 1:].to_list() == pytest.approx(found.motion([1.0]).iloc[0, 1:], abs=1e-7)
+    for wrong in ([-1.0], [math.nan], [], [[0.0]], ["a"], [1j], [[1.0], [2.0, 3.0]]):
         with pytest.raises(InputError, match="times"):
             found.motion(wrong)
+    with pytest.raises(InputError, match="orbit"):
+        found.motion(orbit=replace(found.orbit))
+
+
+def test_a_motion_without_a_period_goes_on_from_period_to_period() -> None:
+    """Each lap begins where the one before ended; single times are those of all."""
+    (found,) = simulation.simulate(parse_model_file(BASE), [0.93], starts=1)
+    assert found.orbit.response == "aperiodic"
+    times = np.linspace(0.0, 40.0, 9)
+    whole = found.motion(times)
+    for row, time in enumerate(times):
+        assert found.motion([time]).iloc[0].to_list() == pytest.approx(whole.iloc[row].to_list())
+    assert len(found.motion()) == 30 * 1024 + 1
+    with pytest.raises(InputError, match="times up to"):
+        found.motion([1e9])
+
+
+def test_what_was_simulated_is_the_same_in_another_process() -> None:
+    simulated = simulation.simulate(parse_model_file(BASE), [0.85], starts=1)
+    again = pickle.loads(pickle.dumps(simulated))
+    assert again[0].motion([0.3]).equals(simulated[0].motion([0.3]))
 
 
 def test_a_moving_base_stands_beside_the_states_that_are_counted_from_it() -> None:
@@ -374,7 +399,12 @@ def test_what_is_reached_from_a_start_comes_first(engine: Any) -> None:
         (["--omega", "0.85", "--start", "x3=1"], ("--start: found x3", "x1, x1', x2, x2'")),
         (["--omega", "0.85", "--start", "x1"], ("--start", "such as x1=0.2")),
         (["--omega", "0.85", "--start", "x1=1 mm"], ("--start: found 1 mm", "dimensionless")),
-        (["--omega", "0.85", "--start", "x1=inf"], ("--start", "finite numbers")),
+        (["--omega", "0.85", "--start", "x1=inf"], ("--start", "at most 1e+09")),
+        (["--omega", "0.85", "--start", "x1=1e308"], ("--start", "at most 1e+09")),
+        (
+            ["--omega", "0.85", "--start", "x1=1", "--start", "x1=2"],
+            ("found x1=2", "once"),
+        ),
         (["--start", "x1=0.1"], ("--start", "--omega or --frequency too")),
     ],
 )

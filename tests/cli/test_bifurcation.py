@@ -437,7 +437,8 @@ def test_a_kind_has_a_help_page_with_an_example_that_it_reads(
     assert entry.status(["bifurcation", kind, "--help"]) == 0
     page = capfd.readouterr().out
     own = KINDS[kind]
-    assert own.help.split()[0] in page
+    assert " ".join(own.help.split()) in " ".join(page.split())
+    assert all(" ".join(text.split()) in " ".join(page.split()) for text in own.texts.values())
     assert f"  {own.example}\n" in page
     words = set(re.findall(r"--[a-z-]+", own.example))
     assert all(re.search(rf"^  {word} ", page, re.MULTILINE) for word in words)
@@ -464,3 +465,6 @@ def test_a_kind_is_the_verb_with_the_words_that_it_stands_for(
     words = ["--from", "1.4", "--to", "1.41", "--steps", "2", "--no-points"]
     assert _asked(capfd, "sweep", *words)["kind"] == "sweep"
     assert _asked(capfd, "sweep", model, *words)["kind"] == "sweep"
+    assert _asked(capfd, "sweep", *words, model)["kind"] == "sweep"
+    assert entry.status(["bifurcation", "sweeps", str(model), *words]) == 2
+    assert "found sweeps, expected one of sweep, curves" in capfd.readouterr().err

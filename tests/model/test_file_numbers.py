@@ -19,6 +19,28 @@ SI = (
 )
 
 
+SYSTEM = """format = 2
+[[mass]]
+name = "m"
+mass = 1.0
+[[spring]]
+between = ["m", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["m", "ground"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["m", "ground"]
+upper = 0.5
+lower = 0.7
+stiffness = 9.0
+[[force]]
+on = "m"
+amplitude = 1.0
+"""
+
+
 def asked(modelfile: ModelFile) -> dict[str, Any]:
     """All that a file asks for."""
     words = vars(modelfile).copy()
@@ -69,6 +91,11 @@ def test_keys_and_tables_are_set_added_and_left_out() -> None:
         ("circuit.opamp.name", "TL074C", "circuit.opamp.name"),
         ("response.omega", 1.0, "response.omega"),
         ("format", 3, "format"),
+        ("b", True, "b"),
+        ("b", 10**400, "b"),
+        ("circuit.nonsense", None, "circuit.nonsense"),
+        ("model", 3, "model"),
+        ("model", None, "model"),
     ],
 )
 def test_what_no_file_could_say_is_refused(name: str, value: object, field: str) -> None:
@@ -77,6 +104,42 @@ def test_what_no_file_could_say_is_refused(name: str, value: object, field: str)
     with pytest.raises(InputError) as refused:
         file.with_({name: value})
     assert refused.value.field == field
+
+
+def test_a_number_of_an_element_may_be_left_out() -> None:
+    text = SYSTEM.replace("lower = 0.7\n", "")
+    assert text != SYSTEM
+    file = parse_model_file(SYSTEM).with_({"A.lower": None})
+    assert file.model == parse_model_file(text).model
+    with pytest.raises(InputError, match=r"A\.lower: found None, expected a parameter or a key"):
+        file.with_({"A.lower": None})
+
+
+def test_keys_are_changed_before_the_parameters_that_they_make() -> None:
+    """A parameter beside a key of its own table is what was asked for, wherever it stands now."""
+    drill = read_model_file(EXAMPLES / "drill.toml")
+    moved = drill.with_({"mechanical.K1": "50 kN/m", "b": 0.6})
+    assert moved.model.b == pytest.approx(0.6, rel=1e-12)
+    assert moved.mechanical is not None
+    assert moved.mechanical.K1 == 50e3
+    paper = parse_model_file(PAPER)
+    assert paper.with_({"model.b": 0.4, "b": 0.25}).model.b == 0.25
+    pair = read_model_file(EXAMPLES / "backlash.toml")
+    turned = pair.with_({"mass": pair.data["mass"][::-1], "load.mass": 3})
+    assert turned.model.parameter("load.mass") == 3.0
+    assert turned.model.parameter("driver.mass") == pair.model.parameter("driver.mass")
+    with pytest.raises(InputError, match=r"spring\.between"):
+        pair.with_({"mass": pair.data["mass"][:1], "load.mass": 3})
+
+
+def test_a_length_of_a_mechanism_may_have_its_unit() -> None:
+    moved = read_model_file(EXAMPLES / "drill.toml").with_({"b": "0.5 mm"})
+    assert moved.mechanical is not None
+    assert pytest.approx(0.5e-3, rel=1e-12) == moved.mechanical.B
+
+
+def test_without_a_title_a_file_has_its_name() -> None:
+    assert parse_model_file(PAPER, Path("there/mine.toml")).with_({"title": None}).title == "mine"
 
 
 def test_the_factor_on_all_gaps_is_no_number_of_a_file() -> None:

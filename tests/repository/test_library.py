@@ -8,6 +8,7 @@ import importlib
 import inspect
 import json
 import math
+import pickle
 import pydoc
 import shutil
 from collections import Counter
@@ -176,12 +177,17 @@ def test_bifurcation(model: Path, tmp_path: Path) -> None:
     again = designer.bifurcation(str(model), **words, out=str(tmp_path / "sweep"))
     pd.testing.assert_frame_equal(again.diagram(), dots)
     pd.testing.assert_frame_equal(again.steps(), steps)
+    pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(again)).steps(), steps)
+    shutil.rmtree(tmp_path / "sweep" / "sweep.parquet")
+    with pytest.raises(designer.InputError, match=r"down-000000\.parquet is missing"):
+        again.steps()
+    assert not (tmp_path / "sweep" / "sweep.parquet").exists()
     assert found.cells().empty
     basins = designer.bifurcation(
         model, from_=-1.0, to=1.0, steps=2, basins=True, omega=0.85, map_=("x2", -1.0, 1.0, 2)
     )
     assert basins.windows().empty
-    assert basins.diagram().empty
+    assert basins.diagram().query("quantity == 'none'").empty
     cells = basins.cells()
     assert cells[["x1", "x2"]].to_numpy().tolist() == [[x, y] for y in (-1, 1) for x in (-1, 1)]
     assert set(cells.attractor) == {a["number"] for a in basins.answer["attractors"]}
