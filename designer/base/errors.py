@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from designer.base.printed import one_line, printable
 
@@ -47,6 +47,8 @@ class InputError(DesignerError):
     """
 
     exit_status = 2
+    longest_found: ClassVar[int] = 200
+    """Characters of what was found that are told: it may be anything."""
 
     def __init__(self, file: Path | str | None, field: str, found: object, expected: str) -> None:
         self.file = None if file is None else str(file)
@@ -55,7 +57,7 @@ class InputError(DesignerError):
         self.expected = expected
         prefix = f"{one_line(self.file)}: " if self.file else ""
         text = found if isinstance(found, str) else repr(found)
-        stands = " is missing" if found is MISSING else f": found {_clip(text)}"
+        stands = " is missing" if found is MISSING else f": found {_clip(text, self.longest_found)}"
         super().__init__(f"{prefix}{one_line(field)}{stands}, expected {printable(expected)}")
 
 
@@ -83,7 +85,9 @@ def problems_in(error: InputError) -> tuple[InputError, ...]:
 
 
 class Unreachable(InputError):
-    """The target cannot be met with this catalogue: names the condition that binds."""
+    """The target cannot be met with this catalogue: names the conditions that bind."""
+
+    longest_found = 2000
 
 
 class ResponseNotFound(DesignerError):
@@ -103,7 +107,7 @@ class EnvironmentMissing(DesignerError):
     exit_status = 3
 
 
-def _clip(text: str, limit: int = 200) -> str:
+def _clip(text: str, limit: int) -> str:
     """One line, printable, at most ``limit`` characters: foreign text stays harmless."""
     flat = "".join(ch if ch.isprintable() else "?" for ch in text)
     return flat if len(flat) <= limit else flat[: limit - 1] + "…"

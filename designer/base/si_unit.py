@@ -10,6 +10,13 @@ from designer.base.units import spaced_quantity
 PREFIXED = {
     "Hz": ((1e7, 1e6, "MHz"), (1e4, 1e3, "kHz"), (0.1, 1.0, "Hz"), (0.0, 1e-3, "mHz")),
     "m": ((1.0, 1.0, "m"), (1e-5, 1e-3, "mm"), (1e-8, 1e-6, "µm"), (0.0, 1e-9, "nm")),
+    "N": (
+        (1e6, 1e6, "MN"),
+        (1e3, 1e3, "kN"),
+        (1.0, 1.0, "N"),
+        (1e-3, 1e-3, "mN"),
+        (0.0, 1e-6, "µN"),
+    ),
     "m/s": ((1.0, 1.0, "m/s"), (1e-5, 1e-3, "mm/s"), (1e-8, 1e-6, "µm/s"), (0.0, 1e-9, "nm/s")),
 }
 """(from which value on, SI value, name) of the units that a value is shown in, largest first."""

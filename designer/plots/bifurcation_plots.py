@@ -483,7 +483,8 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
             handles.append(Line2D([], [], color=RED, label="its mirror twin", **dot))
         for colour, _, steps in coloured:
             if colour not in (BLACK, RED):
-                families = list(dict.fromkeys(_family(s) for s in steps))
+                # Named as it was met: of a model without a mirror the image is no response.
+                families = list({_family(s): s.response for s in reversed(steps)}.values())[::-1]
                 some = ", ".join(families[:3]) + (" …" if len(families) > 3 else "")
                 handles.append(Line2D([], [], color=colour, label=f"also {some}", **dot))
     shown = {bool(w.symmetric) for w in sweep.windows if read_counts(w.response)}

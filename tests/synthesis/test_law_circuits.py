@@ -74,6 +74,9 @@ def test_the_curve_of_a_law_is_that_of_the_board() -> None:
     beyond = off.x > 0.06
     change = (off.made[beyond] - 4.0 * off.x[beyond]) / (curve.made[beyond] - 4.0 * off.x[beyond])
     assert change == pytest.approx(1.0 / 1.1, rel=0.01)
+    (in_si,) = law_curves(design, [], si=True)  # 0.2 N beyond 0.05 m/s
+    assert (in_si.symbol, in_si.unit) == ("x₁′ [mm/s]", "mN")
+    assert in_si.wanted == pytest.approx(1e3 * np.clip(4e-3 * in_si.x, -0.2, 0.2))
 
 
 @pytest.mark.slow
