@@ -56,7 +56,10 @@ AVOIDED = (
     "Per cent of the lost boards that were asked again. Above the line groups, below it the parts "
     "that help most."
 )
-INDICES = "First-order: what a coordinate explains alone; total: with all others."
+INDICES = (
+    "First-order: what a coordinate explains alone; total: with all others. Thin lines: 95 % noise "
+    "of each, by the bootstrap."
+)
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
 """From where each side is seen."""

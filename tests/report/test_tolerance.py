@@ -19,6 +19,7 @@ from designer.report.tolerance_tables import (
     boards,
     corners,
     differences,
+    indices,
     kinds,
     limits,
     maps,
@@ -96,7 +97,7 @@ def blamed(question: int, lost: int) -> ResponseBlame:
         question,
         lost,
         subjects if lost else (),
-        (Index("U3C.offset", "U3C", 0.2, 0.6), Index("R204", "R204", 0.1, 0.3)),
+        (Index("U3C.offset", "U3C", 0.2, 0.6, 0.02, 0.05), Index("R204", "R204", -0.01, 0.3)),
         (NearLimit("stability: a fold", 1.5),),
         Prediction(80, 20, 2, 3),
         8,
@@ -250,6 +251,10 @@ def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
     assert parts == "U3C: 6 of 10 (31 to 83 %)"
     assert rows_of(limits(full))[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
     assert rows_of(corners(full))[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
+    assert [row[1:] for row in rows_of(indices(full))[:2]] == [
+        ("U3C.offset", "20 ± 4 %", "60 ± 10 %"),  # 1.96 standard errors
+        ("R204", "−1 %", "30 %"),  # of an earlier version, that knew no noise
+    ]
     assert "500 attractors" in render_markdown(full)
 
 
