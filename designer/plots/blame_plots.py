@@ -124,9 +124,11 @@ def _noise(axes: Axes, rows: Sequence[float], values: Sequence[tuple[float, floa
     known = [(row, v, NOISE * e) for row, (v, e) in zip(rows, values, strict=True) if e > 0.0]
     if known:
         places, middles, halves = zip(*known, strict=True)
-        ends = [[100.0 * max(v + sign * h, 0.0) for v, h in zip(middles, halves, strict=True)]
-                for sign in (-1.0, 1.0)]  # fmt: skip
-        axes.hlines(places, *ends, color=INK, lw=0.9, zorder=3)
+        low, high = (
+            [100.0 * max(v + sign * h, 0.0) for v, h in zip(middles, halves, strict=True)]
+            for sign in (-1.0, 1.0)
+        )
+        axes.hlines(places, low, high, color=INK, lw=0.9, zorder=3)
 
 
 def _rows(blames: Sequence[ResponseBlame]) -> tuple[list[str], list[str]]:

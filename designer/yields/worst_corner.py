@@ -101,7 +101,7 @@ def sobol(
 
     def method(f_A: Array, f_B: Array, f_AB: Array) -> tuple[Array, Array]:  # scipy's names
         generator = np.random.default_rng([seed, base, RESAMPLES])
-        drawn = generator.multinomial(base, np.full(base, 1.0 / base), RESAMPLES)
+        drawn = generator.multinomial(base, np.full(base, 1.0 / base), RESAMPLES).astype(float)
         errors.extend(each.std(axis=-1, ddof=1) for each in saltelli(f_A, f_B, f_AB, drawn))
         first, total = saltelli(f_A, f_B, f_AB, np.ones((1, base)))
         return first[..., 0], total[..., 0]
