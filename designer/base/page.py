@@ -208,9 +208,9 @@ class PageSection:
 
     @property
     def linked(self) -> list[PageSection]:
-        """The section, and those within it, that have an anchor, in their order."""
+        """The sections within it that have an anchor, in their order; itself where it has none."""
         inner = [s for block in self.blocks if isinstance(block, PageSection) for s in block.linked]
-        return [self, *inner] if self.anchor else inner
+        return inner or [self] * bool(self.anchor)
 
 
 @dataclass(frozen=True)

@@ -85,8 +85,15 @@ def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True)
     for axes in grid.flat[len(blamed) :]:
         axes.set_axis_off()
+    largest = max(
+        100.0 * (x.total + (NOISE * x.total_error if x.total_error > 0.0 else 0.0))
+        for _, b in blamed
+        for x in b.indices[:1]
+    )
+    end = next((end for end in (25.0, 50.0) if largest <= end), 100.0)
     for axes, (title, b) in zip(grid.flat, blamed, strict=False):
         _indices(axes, title, b)
+        axes.set_xlim(0.0, end)
     figure.supxlabel("share of the margin’s variance [%]", size=8.5)  # wider than one panel
     handles = [
         axes.barh([0], [0], color=_TOTAL, label="total index"),
@@ -106,7 +113,6 @@ def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
     _noise(axes, [k + 0.09 for k in place], [(x.first, x.first_error) for x in top])
     name_rows(axes, [x.coordinate for x in top])
     axes.set_ylim(INDICES_SHOWN - 0.4, -0.6)
-    axes.set_xlim(0.0, 100.0)
     axes.set_title(title, size=8, color=INK, loc="left")
     axes.tick_params(axis="y", labelsize=7)
     axes.tick_params(axis="x", labelbottom=True)

@@ -253,18 +253,18 @@ def _parts(data: ReportData) -> list[Block]:
 
 def _remedies(data: ReportData) -> list[Block]:
     listed = remedies(data)
-    lead = Lead(f"{words.plural(len(listed), 'point')}, the weightiest first.")
+    lead = f"{words.plural(len(listed), 'point')}, the weightiest first."
     if not listed:
-        lead = Lead("Nothing that this study shows.")
+        lead = "Nothing that this study shows."
         listed = [
             Remedy("Check the rules of the design, then order boards.", "designer rules DIR"),
             Remedy("Lay the tracks first.", "designer export DIR --routed"),
         ]
     folder = shlex.quote(data.folder) if data.folder else "DIR"
     items = tuple((r.text, r.command.replace("DIR", folder)) for r in listed)
-    blocks: list[Block] = [lead, Remedies(items)]
+    blocks: list[Block] = [Lead(lead), Remedies(items)]
     if any(command for _, command in items):
-        where = f"Run beside {folder}, the folder of this design."
+        where = f"Commands run beside {folder}, the folder of this design."
         blocks.insert(1, SmallPrint(where if data.folder else "DIR is the folder of this design."))
     return blocks
 

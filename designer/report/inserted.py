@@ -18,7 +18,7 @@ _MARKS = "<!-- later results -->\n", "<!-- end of later results -->\n"
 _BETWEEN = re.compile(f"(?ms)^{_MARKS[0]}.*?^{_MARKS[1]}")
 _HTML = (
     ('<section id="made">\n', '<section id="scales">\n'),
-    ('<a href="#made">', '<a href="#scales">'),
+    ('<a href="#provenance">', '<a href="#scales">'),
 )
 _MARKDOWN = (f"## {MADE}\n", "## Scales and conditions\n")
 

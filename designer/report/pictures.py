@@ -57,8 +57,8 @@ AVOIDED = (
     "that help most."
 )
 INDICES = (
-    "First-order: what a coordinate explains alone; total: with all others. Thin lines: 95 % noise "
-    "of each, by the bootstrap."
+    "First-order: what a coordinate explains alone; total: with all others. Thin lines: the 95 % "
+    "noise of each."
 )
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
