@@ -145,6 +145,8 @@ class Bar:
     """Its interval; None where it has none."""
     svg: str = ""
     """The ``<svg>`` element of what it is of, as ``Markup``."""
+    link: str = ""
+    """Anchor of the section that says more of it, or ""."""
     warning: str = ""
     """What is wrong with it, or ""."""
 

@@ -170,6 +170,7 @@ def _bars(data: ReportData, portraits: Picture | Gallery | None) -> Bars | None:
             words.name(data.checked[i]) if of_one else name,
             "not studied",
             svg=small[i].svg if i < len(small) else "",
+            link="portraits",
             warning="not as wanted" if problem else "",
         )
         bars.append(bar if counted is None else _rated(bar, counted))

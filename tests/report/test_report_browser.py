@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
 from designer.base.page import Page as ReportPage, PageSection, table
 from designer.report.page_html import render_page
@@ -101,8 +101,9 @@ def nine(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
 
 def unfolded(page: Page) -> None:
     """Open every question, as a reader does one after the other."""
-    for summary in page.locator(".question:not([open]) > summary").all():
-        summary.click()
+    for question in page.locator(".question").all():
+        if question.get_attribute("open") is None:
+            question.locator(":scope > summary").click()
 
 
 TALL = "document.documentElement.scrollHeight"
@@ -131,10 +132,8 @@ def test_the_first_screen_has_the_answers(nine: Loaded) -> None:
     assert bars.count() == len(paper_report().checked) + 1
     for k in range(bars.count() - 1):
         assert bars.nth(k).locator("svg").is_visible()
-    full, part = (page.locator(".bar").nth(k).bounding_box() for k in (0, 0))
+    full, fill = (page.locator(one).first.bounding_box() for one in (".bar", ".bar i"))
     assert full is not None
-    assert part is not None
-    fill = page.locator(".bar i").first.bounding_box()
     rate = paper_report().yields[0]
     assert fill is not None
     assert rate is not None
@@ -189,15 +188,18 @@ def test_no_room_is_left_above_a_portrait(nine: Loaded) -> None:
       empty.className = "live";
       document.querySelector("#portraits .cards figure:last-child").prepend(empty);
     """)
-    last = page.locator("#portraits .cards figure").last
-    inside = last.evaluate("(figure) => figure.querySelector('svg').getBoundingClientRect().y "
-                           "- figure.getBoundingClientRect().y")  # fmt: skip
-    assert inside < 4
+    figures = page.locator("#portraits .cards figure")
+    assert _above(figures.last, "svg") < 4
     page.locator('[data-plot="portrait 0 0"].drawn canvas').first.wait_for()
-    first = page.locator("#portraits .cards figure").first
-    inside = first.evaluate("(figure) => figure.querySelector('canvas').getBoundingClientRect().y "
-                            "- figure.getBoundingClientRect().y")  # fmt: skip
-    assert inside < 4
+    assert _above(figures.first, "canvas") < 4
+
+
+def _above(figure: Locator, drawn: str) -> float:
+    """Pixels between the top of a card and what is drawn in it."""
+    outer, inner = figure.bounding_box(), figure.locator(drawn).first.bounding_box()
+    assert outer is not None
+    assert inner is not None
+    return inner["y"] - outer["y"]
 
 
 def column(page: Page, number: int) -> list[str]:

@@ -596,7 +596,7 @@ def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) 
     certificate = replace(whole.design.certificate, status="bound", lower_bound=0.004)
     design = replace(whole.design, errors=larger, certificate=certificate)
     page = words_of(changed(whole, design=design))
-    assert len(page.pictures()) == 2 * len(whole.checked) + 7
+    assert len(page.pictures()) == 3 * len(whole.checked) + 7
     assert "this design reaches 1.23 %" in page.text
     assert "stays below 0.4 %" in page.text
 
