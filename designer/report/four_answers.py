@@ -241,12 +241,10 @@ def _parts(data: ReportData) -> list[Block]:
     if cost is None or not cost.costs:
         return [Lead(lead), text]
     one = min(cost.costs, key=lambda c: abs(c.boards - ORDER))
-    lead = (
-        f"{sum(int(row['quantity']) for row in data.bom)} pieces, about {one.total:.0f} € a board."
-    )
+    lead = f"{sum(int(row['quantity']) for row in data.bom)} pieces, about {one.total:.0f}\u00a0€ a board."
     price = (
-        f"Estimated for an order of {one.boards}: parts {one.parts:.2f} €, bare board "
-        f"{one.bare_board:.2f} €, assembly {one.assembly:.2f} €. The list to order from is "
+        f"Estimated for an order of {one.boards}: parts {one.parts:.2f}\u00a0€, bare board "
+        f"{one.bare_board:.2f}\u00a0€, assembly {one.assembly:.2f}\u00a0€. The list to order from is "
         "bom.csv."
     )
     return [Lead(lead), text, price]

@@ -69,7 +69,7 @@ def built(data: ReportData) -> str:
     pieces = f"{sum(int(row['quantity']) for row in data.bom)} pieces"
     if data.board_cost is not None and data.board_cost.costs:
         one = min(data.board_cost.costs, key=lambda c: abs(c.boards - ORDER))
-        pieces += f", about {one.total:.0f} € a board at {one.boards}"
+        pieces += f", about {one.total:.0f}\u00a0€ a board at {one.boards}"
     board = data.board_file
     if board is None:
         return f"{pieces}."
