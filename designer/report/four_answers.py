@@ -241,11 +241,12 @@ def _parts(data: ReportData) -> list[Block]:
     if cost is None or not cost.costs:
         return [Lead(lead), text]
     one = min(cost.costs, key=lambda c: abs(c.boards - ORDER))
-    lead = f"{sum(int(row['quantity']) for row in data.bom)} pieces, about {one.total:.0f}\u00a0€ a board."
+    pieces = sum(int(row["quantity"]) for row in data.bom)
+    lead = f"{pieces} pieces, about {one.total:.0f}\u00a0€ a board."
     price = (
         f"Estimated for an order of {one.boards}: parts {one.parts:.2f}\u00a0€, bare board "
-        f"{one.bare_board:.2f}\u00a0€, assembly {one.assembly:.2f}\u00a0€. The list to order from is "
-        "bom.csv."
+        f"{one.bare_board:.2f}\u00a0€, assembly {one.assembly:.2f}\u00a0€. The list to order "
+        "from is bom.csv."
     )
     return [Lead(lead), text, price]
 
@@ -256,8 +257,8 @@ def _remedies(data: ReportData) -> list[Block]:
     if not listed:
         lead = "Nothing that this study shows."
         listed = [
-            Remedy("Check the rules of the design, then order boards.", "designer rules DIR"),
-            Remedy("Lay the tracks first.", "designer export DIR --routed"),
+            Remedy("Check the rules of the design.", "designer rules DIR"),
+            Remedy("Then lay the tracks and order boards.", "designer export DIR --routed"),
         ]
     folder = shlex.quote(data.folder) if data.folder else "DIR"
     items = tuple((r.text, r.command.replace("DIR", folder)) for r in listed)
