@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import takewhile
 from typing import Literal, TypeVar
 
 from markupsafe import Markup
@@ -102,6 +103,9 @@ class Picture:
     """What is wrong with what it shows, or ""."""
     plot: str = ""
     """Name of the plot that HTML draws in its place where scripts run, or ""."""
+    width: int = 0
+    """Pixels of a screen that it is at least as wide as in HTML, so that its lettering can be read;
+    0 leaves it to the page."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,43 @@ class Gallery:
     key: Picture
     """Their common legend; without ``svg`` where they need none."""
     pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A share with its interval, beside what it is of."""
+
+    name: str
+    """What it is of."""
+    text: str
+    """The share in words, or why there is none."""
+    more: str = ""
+    """Its interval in words, or ""."""
+    share: float | None = None
+    """The share, from 0 to 1; None where it is not known."""
+    interval: tuple[float, float] | None = None
+    """Its interval; None where it has none."""
+    svg: str = ""
+    """The ``<svg>`` element of what it is of, as ``Markup``."""
+    link: str = ""
+    """Anchor of the section that says more of it, or ""."""
+    warning: str = ""
+    """What is wrong with it, or ""."""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Shares side by side, in HTML alone."""
+
+    bars: tuple[Bar, ...]
+
+
+@dataclass(frozen=True)
+class Remedies:
+    """What is to be done, each with the command that does it."""
+
+    items: tuple[tuple[str, str], ...]
+    """(text, command); a command may be ""."""
 
 
 @dataclass(frozen=True)
@@ -164,6 +205,14 @@ class PageSection:
     """Name of the section in links."""
     entry: str = ""
     """What the table of contents calls it; "" where it calls it by its anchor."""
+    summary: str = ""
+    """What it comes to, in a line. HTML folds a section that has one and shows the line alone."""
+
+    @property
+    def linked(self) -> list[PageSection]:
+        """The sections within it that have an anchor, in their order; itself where it has none."""
+        inner = [s for block in self.blocks if isinstance(block, PageSection) for s in block.linked]
+        return inner or [self] * bool(self.anchor)
 
 
 @dataclass(frozen=True)
@@ -174,8 +223,8 @@ class Columns:
 
 
 Block = (
-    str | Table | Picture | Widget | Gallery | Items | Verbatim | FileLinks | PageSection | Columns
-    | None
+    str | Table | Picture | Widget | Gallery | Bars | Remedies | Items | Verbatim | FileLinks
+    | PageSection | Columns | None
 )  # fmt: skip
 
 
@@ -187,6 +236,21 @@ class Page:
     head: Sequence[Block]
     """What stands before the first section."""
     sections: Sequence[PageSection]
+
+    @property
+    def open(self) -> Sequence[PageSection]:
+        """The sections before the first that HTML folds: what is read first."""
+        return list(takewhile(lambda section: not section.summary, self.sections))
+
+    @property
+    def folded(self) -> Sequence[PageSection]:
+        """The first section that HTML folds, and those after it."""
+        return self.sections[len(self.open) :]
+
+    @property
+    def linked(self) -> list[PageSection]:
+        """The sections of the table of contents, in their order."""
+        return [one for section in self.sections for one in section.linked]
 
 
 def bullets(texts: Iterable[str]) -> Items:
@@ -245,13 +309,16 @@ def _block(block: Block, level: int) -> list[str]:
             return _picture(block)
         case Items():
             return ["\n".join(_item(head, text) for head, text in block.items)] * bool(block.items)
+        case Remedies():
+            return [text for item in block.items for text in _remedy(*item)]
         case Verbatim():
             return [_verbatim(" ".join(line.split()) for line in block.lines)]
         case FileLinks():
             return [f"Beside this page: {', '.join(f'[{n}]({n})' for n in block.names)}."]
         case PageSection():
             below = _texts(block.blocks, level + 1)
-            return [f"{'#' * level} {plain(block.title)}", *below] if below else []
+            summary = [str(plain(block.summary))] * bool(block.summary)
+            return [f"{'#' * level} {plain(block.title)}", *summary, *below] if below else []
         case Columns():
             return _texts(block.sections, level)
     return []
@@ -259,6 +326,10 @@ def _block(block: Block, level: int) -> list[str]:
 
 def _item(head: str, text: str) -> str:
     return f"- **{plain(head)}**: {plain(text)}" if head else f"- {plain(text)}"
+
+
+def _remedy(text: str, command: str) -> list[str]:
+    return [str(plain(text)), *[_verbatim([" ".join(command.split())])] * bool(command)]
 
 
 def _picture(picture: Picture) -> list[str]:

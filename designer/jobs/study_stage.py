@@ -232,7 +232,8 @@ class StudyStage:
             starts, board = design_files.starts(folder), kicad_files.own_board(folder)
             design = design_answer(folder)
             warnings, failed = tuple(design["warnings"]), tuple(design["failed_rules"])
-            self.data = ReportData(result, self.command, starts, board, warnings, failed)
+            name = folder.path.resolve().name
+            self.data = ReportData(result, self.command, starts, board, warnings, failed, name)
         else:
             self.data = self.data.of_study(result)
         html, text = (folder / f"{prefix}{name}" for name in REPORTS)

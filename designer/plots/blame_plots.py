@@ -19,6 +19,7 @@ from designer.base.figure_style import (
 )
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
+from designer.yields.worst_corner import NOISE
 
 PARTS_SHOWN = 16
 INDICES_SHOWN = 8
@@ -71,7 +72,8 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
 
 @styled
 def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
-    """Sobol indices of each response's margin: its largest coordinates, first-order and total."""
+    """Sobol indices of each response's margin: its largest coordinates, first-order and total, each
+    with its 95 % interval."""
     blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
     if not blamed:
         figure = new_figure(7.4, 1.2)
@@ -83,8 +85,15 @@ def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True)
     for axes in grid.flat[len(blamed) :]:
         axes.set_axis_off()
+    largest = max(
+        100.0 * (x.total + (NOISE * x.total_error if x.total_error > 0.0 else 0.0))
+        for _, b in blamed
+        for x in b.indices[:1]
+    )
+    end = next((end for end in (25.0, 50.0) if largest <= end), 100.0)
     for axes, (title, b) in zip(grid.flat, blamed, strict=False):
         _indices(axes, title, b)
+        axes.set_xlim(0.0, end)
     figure.supxlabel("share of the margin’s variance [%]", size=8.5)  # wider than one panel
     handles = [
         axes.barh([0], [0], color=_TOTAL, label="total index"),
@@ -99,9 +108,11 @@ def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
     place = range(len(top))
     axes.barh(place, [100.0 * max(x.total, 0.0) for x in top], color=_TOTAL, height=0.75)
     axes.barh(place, [100.0 * max(x.first, 0.0) for x in top], color=_FIRST, height=0.36)
+    # Each above or below the middle, so that both are seen where they overlap.
+    _noise(axes, [k - 0.28 for k in place], [(x.total, x.total_error) for x in top])
+    _noise(axes, [k + 0.09 for k in place], [(x.first, x.first_error) for x in top])
     name_rows(axes, [x.coordinate for x in top])
     axes.set_ylim(INDICES_SHOWN - 0.4, -0.6)
-    axes.set_xlim(0.0, 100.0)
     axes.set_title(title, size=8, color=INK, loc="left")
     axes.tick_params(axis="y", labelsize=7)
     axes.tick_params(axis="x", labelbottom=True)
@@ -112,6 +123,18 @@ def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
             0.98, 0.04, text, ha="right", va="bottom", size=6.5, color=MUTED,
             transform=axes.transAxes,
         )  # fmt: skip
+
+
+def _noise(axes: Axes, rows: Sequence[float], values: Sequence[tuple[float, float]]) -> None:
+    """The 95 % interval of each index, where its noise is known."""
+    known = [(row, v, NOISE * e) for row, (v, e) in zip(rows, values, strict=True) if e > 0.0]
+    if known:
+        places, middles, halves = zip(*known, strict=True)
+        low, high = (
+            [100.0 * max(v + sign * h, 0.0) for v, h in zip(middles, halves, strict=True)]
+            for sign in (-1.0, 1.0)
+        )
+        axes.hlines(places, low, high, color=INK, lw=0.9, zorder=3)
 
 
 def _rows(blames: Sequence[ResponseBlame]) -> tuple[list[str], list[str]]:

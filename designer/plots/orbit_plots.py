@@ -58,6 +58,34 @@ def phase_portrait(
 
 
 @styled
+def small_portrait(
+    checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
+) -> Figure:
+    """The same of the model and the exact circuit, a thumbnail without axes."""
+    figure = Figure(figsize=(1.4, 1.25))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    orbits = _orbits(checked)
+    curves = {
+        name: states[np.isfinite(states).all(axis=1)]
+        for name, trace in _to_draw(traces, orbits).items()
+        if name != "ngspice"
+        for states in [_moved(checked, trace, motion)]
+    }
+    every = np.concatenate([np.zeros((1, 2)), *curves.values()])
+    limits = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
+    shade_stops(axes, list(motion.stops), limits[0])
+    for name, states in curves.items():
+        shares = states / np.ptp(limits, axis=1)
+        at = _spaced(shares[:, 0], shares[:, 1], 0.01)
+        look = _look(name, orbits[name])
+        axes.plot(*states[at].T, **look | {"lw": 0.5 * look["lw"]})
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])
+    return figure
+
+
+@styled
 def time_traces(
     checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
 ) -> Figure:

@@ -58,6 +58,8 @@ class ReportData:
     """What is not good enough about the design, in sentences."""
     failed_rules: tuple[Mapping[str, str], ...] = ()
     """The design rules that fail on its circuit: ``id``, ``found``, ``limit`` and ``do``."""
+    folder: str = ""
+    """Name of the folder of the design; "" where it is in none."""
     drawn: dict[str, str] = field(default_factory=dict, init=False, compare=False, repr=False)
     """Pictures and plots that the design and its nominal responses decide, by name (``once``)."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from markupsafe import Markup
@@ -34,6 +34,7 @@ from designer.plots.system_equations import approximation_notes, equations_of, n
 from designer.report import (
     design_tables,
     equations as forms,
+    question_lines,
     response_tables,
     tolerance_tables,
     words,
@@ -45,6 +46,9 @@ from designer.spread.part_grades import better_grades_text
 from designer.yields.blame_analysis import Blame
 
 FORMAT = 1
+MADE = "What was it made with?"
+"""Title of the section that what later verbs answered stands before (``inserted``)."""
+WORDS = "What do the words mean?"
 
 Pictures = Mapping[str, Picture | Gallery]
 
@@ -89,32 +93,68 @@ GLOSSARY = (
 
 
 def design_page(data: ReportData, pictures: Pictures) -> Page:
-    """The page of a run. pictures : those of ``pictures.pictures``; none for Markdown."""
+    """The page of a run: the answers, then a folded section for each question. pictures : those of
+    ``pictures.pictures``; none for Markdown."""
     head: list[Block] = [_purpose(data)]
-    warm = [name for name in pictures if name.startswith("map ") and name.endswith(" temperature")]
+    lines = question_lines
     sections = [
         _not_good_enough(data),
-        answers(data),
-        PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
-        _responses(data),
-        _model(data, pictures.get("model")),
-        _dead_zones(data, pictures),
-        PageSection("Schematic", [pictures.get("schematic")], "schematic"),
-        PageSection("The board", [pictures.get("board")], "board"),
-        _parts(data),
-        _errors(data, pictures.get("errors")),
-        _yields(data, pictures),
-        _boards(data, pictures),
-        _blame(data, pictures),
-        _rare(data, pictures),
-        PageSection(
-            "Where to sit",
-            [
-                tolerance_tables.maps(data),
-                *(p for n, p in pictures.items() if n[:4] == "map " and n not in warm),
-            ],
-            "maps",
+        answers(data, pictures.get("small portraits")),
+        _question(
+            "Which response does each engine show?",
+            lines.shown(data),
+            "engines",
+            PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
+            _responses(data),
         ),
+        _question(
+            "How many boards work, and why are the others lost?",
+            lines.working(data),
+            "working",
+            _yields(data, pictures),
+            _boards(data, pictures),
+            _rare(data, pictures),
+            *_maps(data, pictures),
+        ),
+        _blame(data, pictures),
+        _question(
+            "What was chosen, and how good is it?",
+            lines.chosen(data),
+            "choice",
+            _model(data, pictures.get("model")),
+            _errors(data, pictures.get("errors")),
+            _dead_zones(data, pictures),
+            _values(data),
+            _scales(data),
+        ),
+        _question(
+            "How to build and start it?",
+            lines.built(data),
+            "build",
+            PageSection("Schematic", [pictures.get("schematic")], "schematic"),
+            PageSection("The board", [pictures.get("board")], "board"),
+            _parts(data),
+            *_starts(data),
+        ),
+        _question(MADE, lines.MADE_WITH, "made", _provenance(data)),
+        PageSection(WORDS, [Items(GLOSSARY, "terms")], "words", "", lines.WORDS),
+    ]
+    if not pictures:
+        head.append(Markup("The pictures stand in `report.html`."))
+    return Page(data.result.modelfile.title, head, [s for s in sections if any(s.blocks)])
+
+
+def _question(title: str, line: str, anchor: str, *sections: PageSection) -> PageSection:
+    """A question with what answers it. line : the answer in short."""
+    return PageSection(title, [s for s in sections if any(s.blocks)], anchor, "", line)
+
+
+def _maps(data: ReportData, pictures: Pictures) -> tuple[PageSection, PageSection]:
+    """Yields over settings, and over temperature."""
+    warm = [name for name in pictures if name.startswith("map ") and name.endswith(" temperature")]
+    others = [p for name, p in pictures.items() if name[:4] == "map " and name not in warm]
+    return (
+        PageSection("Where to sit", [tolerance_tables.maps(data), *others], "maps"),
         PageSection(
             "Warm and cold boards",
             [
@@ -124,13 +164,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
             ],
             "temperature",
         ),
-        _scales(data),
-        _provenance(data),
-        PageSection("Words", [Items(GLOSSARY, "terms")], "words"),
-    ]
-    if not pictures:
-        head.append(Markup("The pictures stand in `report.html`."))
-    return Page(data.result.modelfile.title, head, [s for s in sections if any(s.blocks)])
+    )
 
 
 def _purpose(data: ReportData) -> str:
@@ -147,9 +181,11 @@ def _not_good_enough(data: ReportData) -> PageSection:
     heads = ("rule", "found", "limit", "what to do")
     rows = ([rule[key] for key in ("id", "found", "limit", "do")] for rule in data.failed_rules)
     failing = table(heads, rows)
+    names = ", ".join(rule["id"] for rule in data.failed_rules)
+    rules = PageSection("Design rules that fail", [failing], "", "", f"{names}.")
     blocks: list[Block] = [
         bullets(data.warnings) if data.warnings else None,
-        None if failing is None else PageSection("Design rules that fail", [failing]),
+        None if failing is None else rules,
     ]
     return PageSection("What is not good enough", blocks, "warnings")
 
@@ -298,7 +334,6 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
             PageSection(f"{title[0].upper()}{title[1:]}", [SmallPrint(f"Yields {within}."), kinds])
         )
     blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
-    blocks.append(_one("How to reach a response", tolerance_tables.recipes(data)))
     return PageSection("Yields", blocks, "yields")
 
 
@@ -361,6 +396,7 @@ def _study_note(data: ReportData) -> str:
 
 def _blame(data: ReportData, pictures: Pictures) -> PageSection:
     limits, blame = tolerance_tables.limits(data), data.study.blame
+    indices = tolerance_tables.indices(data)
     if limits is None or blame is None:
         return PageSection("", [])
     lost = any(b.lost for b in blame.responses)
@@ -368,12 +404,19 @@ def _blame(data: ReportData, pictures: Pictures) -> PageSection:
     blocks: list[Block] = [SmallPrint(_blame_note(blame, lost=lost)), limits]
     if avoided is not None:
         blocks.append(PageSection("Losses avoided", [avoided, pictures.get("avoided")]))
-    blocks += [
-        _one("Whose spread moves the margin", pictures.get("indices")),
-        _one("Worst corners", tolerance_tables.corners(data)),
-    ]
-    title = "Which part is to blame" if lost else "What comes nearest to a loss"
-    return PageSection(title, blocks, "blame")
+    if indices is not None:
+        moved: list[Block] = [SmallPrint(INDICES_NOTE), indices, pictures.get("indices")]
+        blocks.append(PageSection("Whose spread moves the margin", moved))
+    blocks.append(_one("Worst corners", tolerance_tables.corners(data)))
+    title = "Which part is to blame?" if lost else "What comes nearest to a loss?"
+    return PageSection(title, blocks, "blame", "", question_lines.blamed(data))
+
+
+INDICES_NOTE = (
+    "Sobol indices of the margin, the largest of each response: the share of its variance that a "
+    "coordinate explains alone (first-order) and with all others (total), with the 95 % noise of "
+    "the estimate, by the bootstrap over base samples."
+)
 
 
 def _blame_note(blame: Blame, *, lost: bool) -> str:
@@ -395,16 +438,27 @@ def _parts(data: ReportData) -> PageSection:
     blocks: list[Block] = [
         _parts_note(data),
         PageSection("To buy", [design_tables.bom_table(data.bom)]),
-        *_bench(data.bench),
         *_cost(data.board_cost),
-        Columns(
-            (
-                PageSection("Values by role", [design_tables.part_table(data.design.circuit)]),
-                PageSection("Op-amp sections", [design_tables.opamp_table(data.design.circuit)]),
-            )
-        ),
+        *_bench(data.bench),
     ]
     return PageSection("Parts", blocks, "parts")
+
+
+def _values(data: ReportData) -> PageSection:
+    """What each part is there for."""
+    columns = Columns(
+        (
+            PageSection("Values by role", [design_tables.part_table(data.design.circuit)]),
+            PageSection("Op-amp sections", [design_tables.opamp_table(data.design.circuit)]),
+        )
+    )
+    return PageSection("What each part does", [columns], "roles")
+
+
+def _starts(data: ReportData) -> Iterator[PageSection]:
+    """How to reach each response, where that is known."""
+    if (recipes := tolerance_tables.recipes(data)) is not None:
+        yield PageSection("How to reach a response", [recipes], "starts")
 
 
 def _bench(sheet: BenchSheet | None) -> list[PageSection]:

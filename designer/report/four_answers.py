@@ -5,10 +5,22 @@ mend. Each answer has one line in bold and the sentences that it rests on.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from designer.base.page import Block, Columns, Lead, PageSection, SmallPrint, Verbatim
+from designer.base.page import (
+    Bar,
+    Bars,
+    Block,
+    Columns,
+    Gallery,
+    Lead,
+    PageSection,
+    Picture,
+    Remedies,
+    SmallPrint,
+)
 from designer.base.si_unit import value_text
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
@@ -131,15 +143,52 @@ ORDER = 10
 """Boards of the order whose price an answer names, where the catalogue knows that size."""
 
 
-def answers(data: ReportData) -> PageSection:
-    """The four answers."""
+def answers(data: ReportData, portraits: Picture | Gallery | None = None) -> PageSection:
+    """The four answers, below the share of the boards that show each response. portraits : a small
+    one of each response, in HTML."""
     sections = (
         PageSection("Does the circuit do what the model does?", _match(data)),
         PageSection("How many boards will work?", _yields(data)),
         PageSection("What is there to buy, and what does it cost?", _parts(data)),
-        PageSection("What is there to mend?", _remedies(data)),
     )
-    return PageSection("In short", [Columns(sections)], "answers")
+    mend = PageSection("What is there to mend?", _remedies(data))
+    blocks: list[Block] = [_bars(data, portraits), Columns(sections), Columns((mend,))]
+    return PageSection("In short", blocks, "answers")
+
+
+def _bars(data: ReportData, portraits: Picture | Gallery | None) -> Bars | None:
+    """Each response with its share of the boards; then all of them on one board."""
+    if not data.checked:
+        return None
+    small = portraits.pictures if isinstance(portraits, Gallery) else ()
+    names, yields = data.rated
+    bars = []
+    for i, (name, counted) in enumerate(zip(names, yields, strict=True)):
+        of_one = i < len(data.checked)
+        problem = words.problem(data.checked[i]) if of_one else ""
+        bar = Bar(
+            words.name(data.checked[i]) if of_one else name,
+            "not studied",
+            svg=small[i].svg if i < len(small) else "",
+            link="portraits",
+            warning="not as wanted" if problem else "",
+        )
+        bars.append(bar if counted is None else _rated(bar, counted))
+    return Bars(tuple(bars))
+
+
+def _rated(bar: Bar, counted: Yield) -> Bar:
+    """A bar with the yield that was counted."""
+    if not math.isfinite(counted.rate):
+        return replace(bar, text="no answer")
+    low, high = words.span(*counted.interval)
+    return replace(
+        bar,
+        text=f"{100 * counted.rate:.3g}\u00a0%",
+        more=words.limits(counted, f"({low} to {high})"),
+        share=counted.rate,
+        interval=None if counted.census else counted.interval,
+    )
 
 
 def _match(data: ReportData) -> list[Block]:
@@ -164,10 +213,11 @@ def _match(data: ReportData) -> list[Block]:
             f"{good} of {wanted} {'was' if good == 1 else 'were'} found with {engines} in "
             f"agreement; {rest} named below with what went wrong."
         )
-    return [Lead(lead), detail, _coefficients(data)]
+    return [Lead(lead), detail, coefficients(data)]
 
 
-def _coefficients(data: ReportData) -> str:
+def coefficients(data: ReportData) -> str:
+    """How well the coefficients are met, in a sentence."""
     design = data.design
     worst = design.errors.max_error
     if worst <= EXACT:
@@ -191,30 +241,31 @@ def _parts(data: ReportData) -> list[Block]:
     if cost is None or not cost.costs:
         return [Lead(lead), text]
     one = min(cost.costs, key=lambda c: abs(c.boards - ORDER))
-    lead = (
-        f"{sum(int(row['quantity']) for row in data.bom)} pieces, about {one.total:.0f} € a board."
-    )
+    pieces = sum(int(row["quantity"]) for row in data.bom)
+    lead = f"{pieces} pieces, about {one.total:.0f}\u00a0€ a board."
     price = (
-        f"Estimated for an order of {one.boards}: parts {one.parts:.2f} €, bare board "
-        f"{one.bare_board:.2f} €, assembly {one.assembly:.2f} €. The list to order from is "
-        "bom.csv."
+        f"Estimated for an order of {one.boards}: parts {one.parts:.2f}\u00a0€, bare board "
+        f"{one.bare_board:.2f}\u00a0€, assembly {one.assembly:.2f}\u00a0€. The list to order "
+        "from is bom.csv."
     )
     return [Lead(lead), text, price]
 
 
 def _remedies(data: ReportData) -> list[Block]:
     listed = remedies(data)
+    lead = f"{words.plural(len(listed), 'point')}, the weightiest first."
     if not listed:
-        return [
-            Lead("Nothing that this study shows."),
-            "Check the rules of the design, then order boards. DIR is the folder of this design.",
-            Verbatim(("designer rules DIR", "designer export DIR --routed")),
+        lead = "Nothing that this study shows."
+        listed = [
+            Remedy("Check the rules of the design.", "designer rules DIR"),
+            Remedy("Then lay the tracks and order boards.", "designer export DIR --routed"),
         ]
-    blocks: list[Block] = [Lead(f"{words.plural(len(listed), 'point')}, the weightiest first.")]
-    if any(remedy.command for remedy in listed):
-        blocks.append(SmallPrint("DIR is the folder of this design."))
-    for remedy in listed:
-        blocks += [remedy.text, Verbatim((remedy.command,)) if remedy.command else None]
+    folder = shlex.quote(data.folder) if data.folder else "DIR"
+    items = tuple((r.text, r.command.replace("DIR", folder)) for r in listed)
+    blocks: list[Block] = [Lead(lead), Remedies(items)]
+    if any(command for _, command in items):
+        where = f"Commands run beside {folder}, the folder of this design."
+        blocks.insert(1, SmallPrint(where if data.folder else "DIR is the folder of this design."))
     return blocks
 
 
@@ -234,10 +285,7 @@ def _yields(data: ReportData) -> list[Block]:
         return [Lead("Not known."), none]
     joint = data.study.all_on_one_board
     worst, least = min(decided, key=lambda row: row[1].rate)
-    headline = f"{_percent(least)} show {words.name(worst)}."
-    if joint is not None and math.isfinite(joint.rate):
-        all_ = f"{words.all_of(len(data.checked)).lower()} responses"
-        headline = f"{_percent(joint)} show {all_} on one board."
+    headline = working(data)
     out = []
     safe = sum(y.ok == y.samples for _, y in rows)
     if safe == len(rows):
@@ -265,6 +313,23 @@ def _yields(data: ReportData) -> list[Block]:
     if left:
         out.append(f"{words.plural(left, 'response')} could not be studied.")
     return [Lead(headline), f"{_boards(data, samples)} {' '.join(out)}"]
+
+
+def working(data: ReportData) -> str:
+    """The share of the boards that work, in a sentence; "" where it is not known."""
+    decided = [
+        (c, y)
+        for c, y in zip(data.checked, data.yields, strict=True)
+        if y is not None and math.isfinite(y.rate)
+    ]
+    if not decided:
+        return ""
+    joint = data.study.all_on_one_board
+    if joint is not None and math.isfinite(joint.rate):
+        all_ = f"{words.all_of(len(data.checked)).lower()} responses"
+        return f"{_percent(joint)} show {all_} on one board."
+    worst, least = min(decided, key=lambda row: row[1].rate)
+    return f"{_percent(least)} show {words.name(worst)}."
 
 
 def _boards(data: ReportData, samples: int) -> str:

@@ -7,6 +7,7 @@ variable, whose values for a light page, a dark page and paper stand in ``templa
 
 from __future__ import annotations
 
+import math
 import re
 from itertools import count
 
@@ -44,6 +45,10 @@ _REFERENCE = re.compile(r'((?:xlink:)?href="#|url\(#)([^")]+)')
 _GLYPH = re.compile(r'<path id="(DejaVuSans[\w-]*)"[^>]*/>')
 """A letter, drawn alike in every picture that has it."""
 _ROOT = re.compile(r"<svg\b([^>]*)>")
+LEAST_LETTERS = 9.5
+"""Pixels of a screen that the smallest letters of a drawing are to have."""
+_LETTERS = re.compile(r'\sfont-size="([\d.]+)')
+_BOX = re.compile(r'\sviewBox="[-\d.]+ [-\d.]+ ([\d.]+)')
 _SIZE = re.compile(r'\s(?:width|height|style|role|aria-label)="[^"]*"')
 
 
@@ -78,6 +83,15 @@ class InlineSvg:
         known = glyph[1] in self._glyphs
         self._glyphs.setdefault(glyph[1], prefix + glyph[1])
         return "" if known else glyph[0]
+
+
+def legible_width(svg: str) -> int:
+    """Pixels that a drawing with text has to be wide so that its smallest letters have
+    ``LEAST_LETTERS``; 0 where it has no text."""
+    letters, box = [float(size) for size in _LETTERS.findall(svg)], _BOX.search(svg)
+    if not letters or box is None:
+        return 0
+    return math.ceil(float(box[1]) * LEAST_LETTERS / min(letters))
 
 
 def _variable(match: re.Match[str]) -> str:

@@ -28,7 +28,7 @@ from designer.plots import (
 from designer.report import design_tables, words
 from designer.report.data import ReportData
 from designer.report.design_page import Pictures
-from designer.report.inline_svg import InlineSvg
+from designer.report.inline_svg import InlineSvg, legible_width
 from designer.report.plot_names import portrait_name, stop_name
 from designer.schematic import schematic_drawing
 
@@ -56,7 +56,10 @@ AVOIDED = (
     "Per cent of the lost boards that were asked again. Above the line groups, below it the parts "
     "that help most."
 )
-INDICES = "First-order: what a coordinate explains alone; total: with all others."
+INDICES = (
+    "First-order: what a coordinate explains alone; total: with all others. Thin lines: the 95 % "
+    "noise of each."
+)
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
 """From where each side is seen."""
@@ -86,6 +89,7 @@ def pictures(data: ReportData) -> Pictures:
         drawing = once("model", draw, _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     if data.checked:
+        out["small portraits"] = _small_portraits(data, once)
         out["portraits"] = _portraits(data, once)
         out |= _study_pictures(data, element)
     for number, stop in enumerate(data.stops):
@@ -114,12 +118,12 @@ def pictures(data: ReportData) -> Pictures:
         svg = once("errors", partial(study_plots.coefficient_chart, errors), shows)
         out["errors"] = Picture(svg=svg, plot="errors")
     circuit, pins = data.board
-    svg = page.element(
-        data.once("schematic", lambda: schematic_drawing.svg(circuit, numbers=pins)),
-        "Schematic: one stage a cell, nets joined by their names.",
-    )
+    drawn = data.once("schematic", lambda: schematic_drawing.svg(circuit, numbers=pins))
     out["schematic"] = Picture(
-        caption="Drawn from the circuit's parts; the same as schematic.svg.", svg=svg
+        caption="Drawn from the circuit's parts; the same as schematic.svg. What does not fit "
+        "scrolls.",
+        svg=page.element(drawn, "Schematic: one stage a cell, nets joined by their names."),
+        width=legible_width(drawn),
     )
     if data.board_file is not None:
         out["board"] = _board(data, data.board_file, page)
@@ -152,6 +156,18 @@ def _drawing_label(data: ReportData) -> str:
     end = f" between stops on springs K0 at {stops}" if model.k0 else ", without stops"
     damper = " and damper C2" if model.c else ""
     return f"The model: ground, spring K2{damper}, mass M2, spring K1 and damper C1, mass M1{end}."
+
+
+def _small_portraits(data: ReportData, once: DrawnOnce) -> Gallery:
+    """One portrait a response, of the motion in its first clearance."""
+    small = []
+    for response, c in enumerate(data.checked):
+        draw = partial(
+            orbit_plots.small_portrait, c, data.traces[response], data.motions(response)[0]
+        )
+        shows = f"Phase portrait of {words.name(c)}, small."
+        small.append(Picture(svg=once(f"small {response}", draw, shows)))
+    return Gallery("", Picture(), tuple(small))
 
 
 def _portraits(data: ReportData, once: DrawnOnce) -> Gallery:

@@ -139,7 +139,9 @@ def yield_table(data: ReportData) -> Table | None:
             reason = f"left out: {data.study.left_out[i]}"
             rows.append((words.name(c), *[words.NONE] * 6, reason))
         else:
-            rows.append((words.name(c), *_counts(counted), _reasons(data.study.answers_to(i))))
+            rows.append(
+                (words.name(c), *_counts(counted), ", ".join(reasons_of(data.study.answers_to(i))))
+            )
     if data.study.all_on_one_board is not None:
         rows.append(("all on one board", *_counts(data.study.all_on_one_board), ""))
     return table(columns, rows, range(1, 7))
@@ -154,16 +156,17 @@ def _counts(y: Yield) -> tuple[str, ...]:
     return (str(y.ok), str(y.lost), str(y.grazing), str(y.failed), rate, thousand)
 
 
-def _reasons(answers: Sequence[Answer]) -> str:
-    """Why boards do not show a response, most frequent first; figures in a reason do not count."""
+def reasons_of(answers: Sequence[Answer], most: int = REASONS_SHOWN) -> list[str]:
+    """Why boards do not show a response, most frequent first; figures in a reason do not count.
+    most : reasons that are named, the others are counted."""
     counts = reasons((a.verdict, a.reason) for a in answers)
     named = [(text.replace(": to ", " to "), n) for text, n in counts.items()]
     ranked = sorted(named, key=lambda item: (-item[1], item[0]))
-    phrases = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
-    rest = ranked[REASONS_SHOWN:]
+    phrases = [f"{text} ({n})" for text, n in ranked[:most]]
+    rest = ranked[most:]
     if rest:
         phrases.append(f"{words.plural(len(rest), 'other outcome')} ({sum(n for _, n in rest)})")
-    return ", ".join(phrases)
+    return phrases
 
 
 def ngspice_table(data: ReportData) -> Table | None:

@@ -21,7 +21,7 @@ from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.rare_losses import WIDEST, LossRegion, RareLosses, ToleranceMargin
 from designer.yields.two_engine_yield import Combined
-from designer.yields.worst_corner import Corner
+from designer.yields.worst_corner import NOISE, Corner, Index
 from designer.yields.yield_count import Yield, count
 from designer.yields.yield_maps import YieldMap
 
@@ -184,6 +184,26 @@ def _saved(subject: BlamedPart) -> str:
     if subject.caused:
         text += f", {subject.caused} of {subject.kept} ok boards lost"
     return text
+
+
+def indices(data: ReportData) -> Table | None:
+    """The largest Sobol indices of each margin, with their noise."""
+    rows = [(name, index) for name, blame in _blamed(data) for index in blame.indices[:PARTS_SHOWN]]
+    columns: dict[str, Callable[[tuple[str, Index]], str]] = {
+        "response": lambda row: row[0],
+        "coordinate": lambda row: row[1].coordinate,
+        "first-order": lambda row: _noisy(row[1].first, row[1].first_error),
+        "total": lambda row: _noisy(row[1].total, row[1].total_error),
+    }
+    return table_of(rows, columns, ("first-order", "total"))
+
+
+def _noisy(value: float, error: float) -> str:
+    """An index in per cent with its 95 % noise, where that is known."""
+    if not math.isfinite(value):
+        return words.NONE
+    noise = f" ± {100 * NOISE * error:.0f}" if math.isfinite(error) else ""
+    return f"{100 * value:.0f}{noise} %".replace("-", "−")
 
 
 def corners(data: ReportData) -> Table | None:

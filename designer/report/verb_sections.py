@@ -13,7 +13,6 @@ from designer.base.page import (
     Block,
     FileLinks,
     Items,
-    Lead,
     PageSection,
     SmallPrint,
     bullets,
@@ -31,7 +30,6 @@ Answer = Mapping[str, Any]
 def cure_section(answer: Answer, files: Sequence[str]) -> PageSection:
     """The cheapest cure. answer : ``cure.json`` (docs/contract.md). files : of it, for links."""
     blocks: list[Block] = [
-        Lead(_cure_lead(answer)),
         _upgrades(answer),
         SmallPrint(
             "Yields of the exact circuit on fresh boards, with their 95 % intervals. Prices are "
@@ -42,7 +40,7 @@ def cure_section(answer: Answer, files: Sequence[str]) -> PageSection:
         PageSection("Not built", [_refused(answer)]) if answer["refused"] else None,
         FileLinks(tuple(files)),
     ]
-    return PageSection("The cheapest cure", blocks, "cure")
+    return PageSection("The cheapest cure", blocks, "cure", "", _cure_lead(answer))
 
 
 def _cure_lead(answer: Answer) -> str:
@@ -108,14 +106,13 @@ def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
     waiting = [(r["id"], r["found"]) for r in by[NOT_RUN]]
     heads = ("rule", "figure", "found", "limit")
     blocks: list[Block] = [
-        Lead(_rules_lead(answer["counts"])),
         "No board was looked at." if board is None else f"The board that was looked at: {board}.",
         _titled("What fails", table((*heads, "what to do"), failing)),
         _titled("What was not run", table(("rule", "why"), waiting, names=1)),
         _titled("What holds", table(heads, holding)),
         FileLinks(tuple(files)),
     ]
-    return PageSection("Design rules", blocks, "rules")
+    return PageSection("Design rules", blocks, "rules", "", _rules_lead(answer["counts"]))
 
 
 def _rules_lead(counts: Mapping[str, int]) -> str:
@@ -136,7 +133,8 @@ def trade_section(answer: Answer, files: Sequence[str]) -> PageSection:
         _boards(answer["boards"]),
         FileLinks(tuple(files)),
     ]
-    return PageSection("Time and error of the engines", blocks, "trade")
+    line = "The cheapest way to ask each question of all responses."
+    return PageSection("Time and error of the engines", blocks, "trade", "", line)
 
 
 def _boards(boards: Sequence[Answer]) -> PageSection | None:
@@ -158,11 +156,11 @@ def bench_section(answers: Mapping[str, Answer]) -> PageSection:
         "advice": lambda row: (row[1]["advice"] or {}).get("words", ""),
     }
     blocks: list[Block] = [
-        Lead(f"Records that surely show what is wanted there: {sum(asked)} of {len(asked)}."),
         table_of(rows, columns),
         FileLinks(tuple(f"{place}/bench.html" for place in answers)),
     ]
-    return PageSection("On the bench", blocks, "bench")
+    line = f"Records that surely show what is wanted there: {sum(asked)} of {len(asked)}."
+    return PageSection("On the bench", blocks, "bench", "", line)
 
 
 def _titled(title: str, block: Block) -> PageSection | None:
@@ -221,7 +219,8 @@ COMMANDS: Mapping[str, str] = {
 def older_section(verb: str, files: Sequence[str]) -> PageSection:
     """In place of what an earlier version answered, with fewer figures than are shown now."""
     text = f"An earlier version made {files[0]}. `designer {COMMANDS[verb]}` makes it anew."
-    return PageSection(verb.capitalize(), [text, FileLinks(tuple(files))], verb)
+    blocks: list[Block] = [text, FileLinks(tuple(files))]
+    return PageSection(verb.capitalize(), blocks, verb, "", "Of an earlier version.")
 
 
 SECTIONS: Mapping[str, Callable[[Answer, Sequence[str]], PageSection]] = {

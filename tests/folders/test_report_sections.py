@@ -54,8 +54,9 @@ def studied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert folder.manifest is not None
     (path / "rules.json").rename(path / "stored.json")
     del folder.manifest.stages["rules"], folder.manifest.files["rules.json"]
-    scales = PageSection("Scales and conditions", ["One volt."], "scales")
-    page = Page("Small", [], [PageSection("Yields", ["All."], "yields"), scales])
+    origin = PageSection("Provenance", ["One seed."], "provenance")
+    made = PageSection("What was it made with?", [origin], "made", "", "One seed.")
+    page = Page("Small", [], [PageSection("Yields", ["All."], "yields"), made])
     for name, text in zip(REPORTS, (render_page(page), markdown(page)), strict=True):
         folder.manifest.files[name] = ("study", None)
         folder.rewrite(name, text)
@@ -75,6 +76,18 @@ def answered(path: Path, stage: Any, answer: dict[str, Any]) -> None:
     renew_report(folder)
 
 
+def test_a_report_of_an_earlier_version_shows_later_answers_too(path: Path) -> None:
+    scales = PageSection("Scales and conditions", ["One volt."], "scales")
+    page = Page("Old", [], [PageSection("Yields", ["All."], "yields"), scales])
+    for name, text in zip(REPORTS, (render_page(page), markdown(page)), strict=True):
+        Folder(path).rewrite(name, text)
+    answered(path, "cure", CURE)
+    html, text = reports(path)
+    assert re.findall(r'<a href="#(\w+)">', html) == ["yields", "cure", "scales"]
+    assert re.findall(r'<section id="(\w+)">', html) == ["yields", "cure", "scales"]
+    assert text.index("## The cheapest cure") < text.index("## Scales and conditions")
+
+
 def reports(path: Path) -> list[str]:
     return [(path / name).read_text("utf-8") for name in REPORTS]
 
@@ -90,14 +103,14 @@ def test_every_answer_stands_in_both_files(path: Path) -> None:
     answered(path, "rules", answer)
     html, text = reports(path)
     entries = re.findall(r'<a href="#(\w+)">', html)
-    assert entries == ["yields", "cure", "rules", "trade", "scales"]
-    assert re.findall(r'<section id="(\w+)">', html) == entries
+    assert entries == ["yields", "cure", "rules", "trade", "provenance"]
+    assert re.findall(r'<section id="(\w+)">', html) == [*entries[:-1], "made", "provenance"]
     assert [line for line in text.splitlines() if line[:3] == "## "] == [
         "## Yields",
         "## The cheapest cure",
         "## Design rules",
         "## Time and error of the engines",
-        "## Scales and conditions",
+        "## What was it made with?",
     ]
     for rule in answer["rules"]:
         assert f'<td class="short">{rule["id"]}</td>' in html
@@ -106,7 +119,7 @@ def test_every_answer_stands_in_both_files(path: Path) -> None:
     assert set(cheapest) <= set(text.splitlines())
     assert "99.3 % (98.3 to 99.7 %), 2 failed" in text
     assert "op-amp &lt;b>X&lt;/b>" in text
-    later = text[text.index("## The cheapest") : text.index("## Scales")]
+    later = text[text.index("## The cheapest") : text.index("## What was")]
     assert numbers(later) <= numbers(html[html.index("<body>") :])
     for name in (name for names in SHOWN.values() for name in names):
         assert f'<a href="{name}">{name}</a>' in html

@@ -35,7 +35,7 @@ def blamed(shares: dict[str, int]) -> ResponseBlame:
         BlamedPart(name, "group" if " " in name else "resistor", avoided, 10, 0, 0)
         for name, avoided in shares.items()
     )
-    indices = tuple(Index(f"R{k}", f"R{k}", 0.1, 0.5 / (k + 1)) for k in range(12))
+    indices = tuple(Index(f"R{k}", f"R{k}", 0.1, 0.5 / (k + 1), 0.03, 0.05) for k in range(12))
     return ResponseBlame(
         0, 10, subjects, indices, (), Prediction(50, 10, 1, 0), 0, 0, None, "something"
     )

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
 from designer.base.page import Page as ReportPage, PageSection, table
 from designer.report.page_html import render_page
 from designer.report.write import render_html
 from designer.verdicts.verdict import Verdict
-from tests.shared.report_data import changed, plain_report
+from tests.shared.report_data import changed, paper_report, plain_report
 
 pytestmark = pytest.mark.browser
 HOSTILE = "</script><script>document.body.dataset.bad = 1</script><img src=x onerror=alert(1)>"
@@ -89,6 +89,119 @@ def tables(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded
     return loaded(browser, html, tmp_path_factory.mktemp("tables") / "page.html")
 
 
+@pytest.fixture(scope="module")
+def nine(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Loaded:
+    """The paper's nine responses, in a folder, with something that is not good enough."""
+    warned = (
+        "The file states the saturation stage, and the other one keeps the responses more often."
+    )
+    data = replace(paper_report(), folder="paper", warnings=(warned,))
+    return loaded(browser, render_html(data), tmp_path_factory.mktemp("nine") / "report.html")
+
+
+def unfolded(page: Page) -> None:
+    """Open every question, as a reader does one after the other."""
+    for question in page.locator(".question").all():
+        if question.get_attribute("open") is None:
+            question.locator(":scope > summary").click()
+
+
+TALL = "document.documentElement.scrollHeight"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (400, 850)])
+def test_the_page_is_short_until_a_question_is_opened(
+    nine: Loaded, width: int, height: int
+) -> None:
+    page = nine.page
+    page.set_viewport_size({"width": width, "height": height})
+    assert page.locator(".question[open]").count() == 0
+    assert page.evaluate(TALL) < 6000
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_the_first_screen_has_the_answers(nine: Loaded) -> None:
+    """On a screen of 1280 by 900 nothing of them has to be scrolled to."""
+    page = nine.page
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.evaluate("scrollTo(0, 0)")
+    box = page.locator("#answers").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] <= 900
+    bars = page.locator(".bars li")
+    assert bars.count() == len(paper_report().checked) + 1
+    for k in range(bars.count() - 1):
+        assert bars.nth(k).locator("svg").is_visible()
+    full, fill = (page.locator(one).first.bounding_box() for one in (".bar", ".bar i"))
+    assert full is not None
+    rate = paper_report().yields[0]
+    assert fill is not None
+    assert rate is not None
+    assert fill["width"] == pytest.approx(rate.rate * full["width"], abs=1.0)
+    for command in page.locator(".remedies pre").all_inner_texts():
+        assert " paper" in command
+        assert "DIR" not in command
+
+
+def test_a_link_opens_what_it_leads_to(nine: Loaded) -> None:
+    page = nine.page
+    page.set_viewport_size({"width": 1280, "height": 900})
+    scales = page.locator("#scales h3")
+    assert not scales.is_visible()
+    page.get_by_role("link", name="Scales", exact=True).click()
+    scales.wait_for()
+    page.locator("#choice > details > summary").click()
+    assert not scales.is_visible()
+    page.get_by_role("link", name="Scales", exact=True).click()  # the same hash once more
+    scales.wait_for()
+    page.goto(page.url.partition("#")[0] + "#made")
+    page.locator("#provenance h3").wait_for()
+    page.goto(page.url.partition("#")[0])
+
+
+LETTERS = """
+Math.min(...[...document.querySelectorAll("#schematic svg text")].map((text) =>
+  parseFloat(text.getAttribute("font-size")) * text.ownerSVGElement.getScreenCTM().a))
+"""
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_schematic_can_be_read_at_its_own_size(nine: Loaded, width: int) -> None:
+    page = nine.page
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(page.url.partition("#")[0] + "#schematic")
+    page.locator("#schematic svg").wait_for()
+    assert page.evaluate(LETTERS) >= 9.0
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    box = page.locator("#schematic .scroll").bounding_box()
+    assert box is not None
+    assert box["height"] <= 900
+
+
+def test_no_room_is_left_above_a_portrait(nine: Loaded) -> None:
+    """Neither while its plot is drawn nor after."""
+    page = nine.page
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(page.url.partition("#")[0] + "#portraits")
+    page.evaluate("""
+      const empty = document.createElement("div");
+      empty.className = "live";
+      document.querySelector("#portraits .cards figure:last-child").prepend(empty);
+    """)
+    figures = page.locator("#portraits .cards figure")
+    assert _above(figures.last, "svg") < 4
+    page.locator('[data-plot="portrait 0 0"].drawn canvas').first.wait_for()
+    assert _above(figures.first, "canvas") < 4
+
+
+def _above(figure: Locator, drawn: str) -> float:
+    """Pixels between the top of a card and what is drawn in it."""
+    outer, inner = figure.bounding_box(), figure.locator(drawn).first.bounding_box()
+    assert outer is not None
+    assert inner is not None
+    return inner["y"] - outer["y"]
+
+
 def column(page: Page, number: int) -> list[str]:
     cells = page.locator(f"#buy tbody tr:visible td:nth-child({number + 1})")
     return cells.all_inner_texts()
@@ -145,6 +258,7 @@ Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [...root.references(
 
 def test_plots_are_drawn_with_the_orbits_own_values(report: Loaded) -> None:
     page, data = report.page, plain_report()
+    unfolded(page)
     for name in ("portrait 0 0", "portrait 1 0", "stop 0", "yields"):
         figure = page.locator(f'[data-plot="{name}"]')
         figure.scroll_into_view_if_needed()
@@ -159,6 +273,7 @@ def test_plots_are_drawn_with_the_orbits_own_values(report: Loaded) -> None:
 
 def test_a_board_is_called_up_by_the_keyboard(report: Loaded) -> None:
     page, data = report.page, plain_report()
+    unfolded(page)
     page.locator("#boards").scroll_into_view_if_needed()
     page.locator("#boards canvas").first.wait_for()
     page.get_by_label("Response", exact=True).select_option("1")
@@ -180,6 +295,9 @@ def test_a_board_is_called_up_by_the_keyboard(report: Loaded) -> None:
 
 def test_a_board_without_a_period_is_told_of_once(report: Loaded) -> None:
     page = report.page
+    unfolded(page)
+    page.locator("#boards").scroll_into_view_if_needed()
+    page.locator("#boards canvas").first.wait_for()
     page.get_by_label("Response", exact=True).select_option("0")
     number = page.get_by_label("Number of the board")
     number.fill("1")
@@ -194,6 +312,8 @@ BOARD = """() => Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [..
 
 
 def test_paper_has_the_pictures(report: Loaded, tmp_path: Path) -> None:
+    for question in report.page.locator(".question").all():  # paper has what is folded too
+        question.evaluate("(details) => details.open = false")
     report.page.emulate_media(media="print")
     pictures = report.page.locator("svg[role=img]")
     assert pictures.count() > 5
@@ -212,11 +332,13 @@ def test_nothing_is_complained_of(report: Loaded, tables: Loaded) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_rules_of_accessibility_hold(report: Loaded, scheme: str) -> None:
     report.page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+    unfolded(report.page)
     found = Axe().run(report.page).response["violations"]
     assert [(v["id"], v["nodes"][0]["html"]) for v in found] == []
 
 
 def test_the_page_is_as_wide_as_a_phone(report: Loaded) -> None:
+    unfolded(report.page)
     report.page.set_viewport_size({"width": 390, "height": 800})
     assert report.page.evaluate("document.documentElement.scrollWidth") == 390
     report.page.set_viewport_size({"width": 1200, "height": 900})

@@ -19,6 +19,7 @@ from designer.report.tolerance_tables import (
     boards,
     corners,
     differences,
+    indices,
     kinds,
     limits,
     maps,
@@ -96,7 +97,7 @@ def blamed(question: int, lost: int) -> ResponseBlame:
         question,
         lost,
         subjects if lost else (),
-        (Index("U3C.offset", "U3C", 0.2, 0.6), Index("R204", "R204", 0.1, 0.3)),
+        (Index("U3C.offset", "U3C", 0.2, 0.6, 0.02, 0.05), Index("R204", "R204", -0.01, 0.3)),
         (NearLimit("stability: a fold", 1.5),),
         Prediction(80, 20, 2, 3),
         8,
@@ -196,7 +197,7 @@ def test_without_a_loss_nobody_is_to_blame(full: ReportData) -> None:
     none = Blame((one, other), 100, 1, 500, 300, 1.0)
     text = render_markdown(changed(full, blame=none))
     assert "foretold by the margin" not in text
-    assert "## What comes nearest to a loss" in text
+    assert "## What comes nearest to a loss?" in text
     assert "No board was lost, so none was asked again." in text
     assert "Lost boards were asked" not in text
     assert "to blame" not in text
@@ -250,6 +251,10 @@ def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
     assert parts == "U3C: 6 of 10 (31 to 83 %)"
     assert rows_of(limits(full))[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
     assert rows_of(corners(full))[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
+    assert [row[1:] for row in rows_of(indices(full))[:2]] == [
+        ("U3C.offset", "20 ± 4 %", "60 ± 10 %"),  # 1.96 standard errors
+        ("R204", "−1 %", "30 %"),  # of an earlier version, that knew no noise
+    ]
     assert "500 attractors" in render_markdown(full)
 
 
@@ -277,9 +282,10 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     for heading in (
         "As built, tuned, tuned on the bench, reached and both engines together",
         "Where the engines differ", "How to reach a response",
-        "Which part is to blame", "Losses avoided", "Worst corners", "Where to sit",
+        r"Which part is to blame\?", "Losses avoided", "Worst corners", "Where to sit",
+        "Whose spread moves the margin",
     ):  # fmt: skip
-        assert len(re.findall(rf"<h[23]>{heading}</h[23]>", html)) == 1
+        assert len(re.findall(rf"<h[234]>{heading}</h[234]>", html)) == 1
         assert len(re.findall(rf"^##+ {heading}$", markdown, re.M)) == 1
     assert {"#blame", "#maps"} <= {a.get("href") for a in page.named("a")}
     assert "<b>x</b>" not in html

@@ -32,6 +32,7 @@ from designer.model.clearance import Sides
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.report import design_tables, words
 from designer.report.data import ReportData
+from designer.report.inline_svg import legible_width
 from designer.report.inserted import inserted_html, inserted_markdown
 from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
@@ -201,11 +202,70 @@ def test_links_lead_to_sections_and_ids_are_unique(html: str) -> None:
     page = Page(html)
     ids = [attrs["id"] for tag, attrs in page.tags if "id" in attrs and tag != "script"]
     assert len(ids) == len(set(ids))
-    assert {str(a["href"])[1:] for a in page.named("a")} == {a["id"] for a in page.named("section")}
-    used = {str(a["href"])[1:] for _, a in page.tags if "href" in a}
+    linked = {str(a["href"])[1:] for a in page.named("a")}
+    questions = set(re.findall(r'<section id="(\w+)">\n<details class="question">', html))
+    assert questions >= {"engines", "working", "choice", "build", "made"}
+    assert linked | questions == {a["id"] for a in page.named("section")}  # a part has an entry
+    assert questions - linked == {"engines", "working", "choice", "build", "made"}
+    used = {str(a["href"])[1:] for _, a in page.tags if "href" in a} | questions
     used |= set(re.findall(r"url\(#([^)]+)\)", html))
     assert used == set(ids)  # of each picture its own, and none that nothing needs
-    assert '<a href="#dc">DC curve</a>\n<a href="#schematic">Schematic</a>' in html
+    assert '<a href="#dc">DC curve</a>\n<a href="#roles">Roles</a>' in html
+
+
+def test_what_is_below_the_first_screen_is_folded_by_question(html: str) -> None:
+    """Before it stand the answers; each question says in a line what it comes to."""
+    body = html[html.index("<main>") :]
+    first, rest = body[: body.index("<nav ")], body[body.index("</nav>") :]
+    assert re.findall(r'<section id="(\w+)"', first) == ["answers"]
+    assert "<table" not in first
+    assert '<details class="question" open' not in rest
+    depth, unfolded = 0, 0
+    for tag in re.findall(r"<details|</details|<table|<svg", rest):
+        depth += {"<details": 1, "</details": -1}.get(tag, 0)
+        unfolded += tag in ("<table", "<svg") and not depth
+    assert unfolded == depth == 0
+    lines = re.findall(r"<summary><h2>(.*?)</h2>\n<p>(.*?)</p></summary>", rest)
+    assert [title for title, _ in lines] == [
+        "Which response does each engine show?",
+        "How many boards work, and why are the others lost?",
+        "What was chosen, and how good is it?",
+        "How to build and start it?",
+        "What was it made with?",
+        "What do the words mean?",
+    ]
+    assert lines[0][1] == "All 3 responses as wanted, in model, exact circuit and ngspice."
+    assert all(line for _, line in lines)
+
+
+def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
+    answers = [
+        replace(a, verdict=Verdict.LOST if (a.sample, a.question) == (1, 2) else Verdict.OK)
+        for a in whole.study.answers
+    ]
+    html = render_html(changed(whole, answers=tuple(answers)))
+    bars = html[html.index('<ul class="bars">') : html.index('<div class="columns">')]
+    assert bars.count("<li") == len(whole.checked) + 1  # and all of them on one board
+    assert re.findall(r'<i style="width: ([\d.]+)%">', bars) == ["100.0", "100.0", "75.0", "75.0"]
+    ends = [(float(a), float(b)) for a, b in re.findall(r"left: ([\d.]+)%; width: ([\d.]+)%", bars)]
+    assert ends[2] == pytest.approx((30.06, 95.44 - 30.06), abs=0.1)  # Wilson's of 3 of 4
+    assert bars.count("<svg ") == len(whole.checked)
+    assert "(30 to 95)" in bars
+
+
+def test_commands_have_the_name_of_the_folder(whole: ReportData) -> None:
+    data = replace(whole, folder="a rig; <b>")
+    html, text = render_html(data), render_markdown(data)
+    assert "designer tolerance &#39;a rig; &lt;b&gt;&#39; --samples 1000" in html
+    assert "    designer tolerance 'a rig; <b>' --samples 1000\n" in text
+    assert "DIR" not in text
+
+
+def test_the_lettering_of_a_drawing_is_legible() -> None:
+    text = '<text font-size="6.5">a</text><text x="1" font-size="10">b</text>'
+    svg = f'<svg width="9pt" viewBox="-3.5 0 900 40">{text}</svg>'
+    assert legible_width(svg) == 1316  # 9.5 pixels for 6.5 units
+    assert legible_width('<svg viewBox="0 0 1 1"><path/></svg>') == 0
 
 
 def test_pictures_follow_the_page(html: str) -> None:
@@ -263,7 +323,7 @@ def test_no_line_ends_inside_an_n_p_q(html: str) -> None:
 def test_what_is_wide_scrolls_in_a_box_of_its_own(html: str) -> None:
     """Tables and wide pictures; the page itself is never wider than the screen."""
     assert re.findall(r'(?<!<div class="scroll">)<table', html) == []
-    wide = re.findall(r'<figure class="wide"[^>]*>(.{24})', html)
+    wide = re.findall(r'<figure class="wide(?: broad)?"[^>]*>(.{24})', html)
     assert len(wide) >= 3
     assert set(wide) == {'<div class="scroll"><svg'}
     css = html[html.index("<style>") : html.index("</style>")]
@@ -296,8 +356,8 @@ def test_every_image_says_what_it_shows(whole: ReportData, html: str) -> None:
     page = Page(html)
     assert all(len(label) > 20 for label in page.pictures())
     assert (
-        len(page.pictures()) == 2 * len(whole.checked) + 6
-    )  # model, legend, dead zone, yields, margins, schematic
+        len(page.pictures()) == 3 * len(whole.checked) + 6
+    )  # small, portrait and trace of each; model, legend, dead zone, yields, margins, schematic
 
 
 @pytest.mark.parametrize("kind", ["html", "markdown"])
@@ -347,19 +407,23 @@ def test_the_same_data_give_the_same_bytes(whole: ReportData, html: str, tmp_pat
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_later_sections_stand_before_the_scales_and_go_without_a_trace(
+def test_later_sections_stand_before_what_it_was_made_with_and_go_without_a_trace(
     whole: ReportData, html: str
 ) -> None:
-    section = PageSection("Later", ["A <later> answer."], "later")
+    section = PageSection("Later", ["A <later> answer."], "later", "", "It <came> to this.")
     page, text = (
         inserted_html(html, [section]),
         inserted_markdown(render_markdown(whole), [section]),
     )
     anchors = re.findall(r'<section id="(\w+)">', page)
-    assert anchors == re.findall(r'<a href="#(\w+)">', page)
-    assert anchors[anchors.index("later") + 1] == "scales"
+    assert anchors[anchors.index("later") + 1] == "made"
+    entries = re.findall(r'<a href="#(\w+)">', page)
+    assert entries[entries.index("later") + 1] == "provenance"
     assert "<p>A &lt;later&gt; answer.</p>" in page
-    places = [text.index(f"## {title}\n") for title in ("Yields", "Later", "Scales and conditions")]
+    assert "<h2>Later</h2>\n<p>It &lt;came&gt; to this.</p></summary>" in page
+    places = [
+        text.index(f"## {title}\n") for title in ("Yields", "Later", "What was it made with?")
+    ]
     assert places == sorted(places)
     assert inserted_html(page, [section]) == page
     assert inserted_html(page, []) == html
@@ -381,7 +445,7 @@ def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     plain, hostile = Page(html), Page(render_html(data))
     assert hostile.text.count(HOSTILE) == 5  # title, heading, summary, BOM, command
     assert {tag for tag, _ in plain.tags} == {tag for tag, _ in hostile.tags}
-    assert "49" not in hostile.text[: hostile.text.index("Portraits")]
+    assert "49" not in hostile.text[: hostile.text.index("In short")]
     markdown = render_markdown(data)
     shown = [line for line in markdown.splitlines() if not line.startswith("    ")]
     assert not any("<" in line or "`x`" in line for line in shown)
@@ -532,7 +596,7 @@ def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) 
     certificate = replace(whole.design.certificate, status="bound", lower_bound=0.004)
     design = replace(whole.design, errors=larger, certificate=certificate)
     page = words_of(changed(whole, design=design))
-    assert len(page.pictures()) == 2 * len(whole.checked) + 7
+    assert len(page.pictures()) == 3 * len(whole.checked) + 7
     assert "this design reaches 1.23 %" in page.text
     assert "stays below 0.4 %" in page.text
 

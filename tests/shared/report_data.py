@@ -13,15 +13,24 @@ from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.paper_cases import synthesised
 
 
-@cache
 def plain_report() -> ReportData:
     """Two responses of the paper's case, three boards, no layers."""
+    return paper_report(0, 2)
+
+
+@cache
+def paper_report(*responses: int) -> ReportData:
+    """These responses of the paper's case, all nine where none is named, three boards, no
+    layers."""
     made = synthesised()
-    design, found = made.design, made.model_responses[0:3:2]
-    modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
+    design, every = made.design, range(len(made.model_responses))
+    found = tuple(made.model_responses[i] for i in responses or every)
+    wanted = tuple(made.modelfile.responses[i] for i in responses or every)
+    modelfile = replace(made.modelfile, responses=wanted)
     checked = checked_design.check(design, found, None)
     plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
-    study = Study(checked, plan, (0, 1), {}, tuple(block(plan, range(3), 2)))
+    answers = tuple(block(plan, range(3), 2))
+    study = Study(checked, plan, tuple(range(len(found))), {}, answers)
     return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
 
 

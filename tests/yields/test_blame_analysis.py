@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import sobol_indices, uniform
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
@@ -29,7 +30,7 @@ from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
 from designer.yields.blame_replay import PROBE, extent_of
 from designer.yields.margins import Limit, Margin, Prediction, crossings
 from designer.yields.stored_parts import StoredParts
-from designer.yields.worst_corner import Index, sobol, worst_corners
+from designer.yields.worst_corner import Index, saltelli, sobol, worst_corners
 from tests.shared import paper_cases
 
 NO_SPREAD = Spread(0.0, 0.0, 0.0, 0.0, saturation=0.0)
@@ -92,6 +93,64 @@ def test_sobol_indices_of_the_least_of_two_equal_limits() -> None:
     for name in ("R4", "R5"):
         assert found[name].first == pytest.approx(0.4, abs=0.04)
         assert found[name].total == pytest.approx(0.6, abs=0.04)
+
+
+def test_indices_and_their_noise_are_those_of_scipy_and_of_a_slow_bootstrap() -> None:
+    """Of the Ishigami function, whose indices are known in closed form."""
+    kept: list[tuple[Array, Array, Array]] = []
+
+    def ishigami(cube: Array) -> Array:
+        x, y, z = np.pi * (2.0 * cube - 1.0)
+        values: Array = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+        return values[None]
+
+    def method(f_A: Array, f_B: Array, f_AB: Array) -> tuple[Array, Array]:
+        kept.append((f_A, f_B, f_AB))
+        first, total = saltelli(f_A, f_B, f_AB, np.ones((1, f_A.shape[1])))
+        return first[..., 0], total[..., 0]
+
+    even: Any = uniform()
+    methods: tuple[Any, Any] = (method, "saltelli_2010")
+    found, theirs = (
+        sobol_indices(
+            func=ishigami, n=512, dists=[even] * 3, rng=np.random.default_rng(4), method=one
+        )
+        for one in methods
+    )
+    np.testing.assert_allclose(found.first_order, theirs.first_order, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(found.total_order, theirs.total_order, rtol=1e-10, atol=1e-12)
+    ((a, b, ab),) = kept
+    generator = np.random.default_rng(1)
+    picks = generator.integers(0, 512, (200, 512))
+    counts = np.array([np.bincount(row, minlength=512) for row in picks], dtype=float)
+    slow = np.array([_indices_of(a[0, row], b[0, row], ab[:, 0, row]) for row in picks])
+    for fast, each in zip(saltelli(a, b, ab, counts), np.moveaxis(slow, 1, 0), strict=True):
+        np.testing.assert_allclose(fast[0], each.T, rtol=1e-9, atol=1e-12)
+    exact = np.array([[0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]])
+    off = np.array([theirs.first_order, theirs.total_order]) - exact
+    assert (np.abs(off) < 3.0 * slow.std(axis=0)).all()
+
+
+def _indices_of(a: Array, b: Array, ab: Array) -> list[list[float]]:
+    """The estimators one by one."""
+    variance = np.concatenate([a, b]).var()
+    return [
+        [float(np.mean(b * (one - a)) / variance) for one in ab],
+        [float(np.mean((one - a) ** 2) / (2.0 * variance)) for one in ab],
+    ]
+
+
+def test_the_noise_of_an_index_shrinks_with_the_base_and_covers_the_truth() -> None:
+    margin = margin_of({"R4": (3.0,), "R5": (1.0,), "U1A.offset": (2.0,)})[0]
+    few, many = indices(margin, 128), indices(margin, 2048)
+    for name, share in {"R4": 9 / 14, "R5": 1 / 14, "U1A.offset": 4 / 14}.items():
+        for found in (few[name], many[name]):
+            assert abs(found.first - share) < 4.0 * found.first_error + 0.02
+            assert abs(found.total - share) < 4.0 * found.total_error + 0.02
+        assert 2.5 < few[name].total_error / many[name].total_error < 6.0  # 4 by the square root
+        assert 0.0 < many[name].first_error < 0.1
+    assert few["C1"].total_error < 1e-9
+    assert indices(margin, 128) == few
 
 
 def test_a_margin_without_limits_has_no_indices_and_is_never_negative() -> None:

@@ -110,7 +110,7 @@
     return title;
   }
 
-  const headings = document.querySelectorAll("h1, h2, h3");
+  const headings = document.querySelectorAll("h1, h2, h3, h4");
   for (const box of document.querySelectorAll(".scroll")) {
     const title = heading(box, headings);
     box.tabIndex = 0; // what is wider than the page scrolls by the keyboard too
@@ -123,6 +123,23 @@
     [...table.tHead.rows[0].cells].forEach((head, column) => sortable(table, head, column));
     box.before(tools(table, title));
   }
+
+  // A link opens what it leads to.
+  function reveal() {
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (!target) return;
+    for (let each = target; each; each = each.parentElement) if (each.tagName === "DETAILS") each.open = true;
+    const own = target.querySelector(":scope > details");
+    if (own) own.open = true;
+    target.scrollIntoView();
+  }
+  addEventListener("hashchange", reveal);
+  addEventListener("click", (event) => {
+    // The same link once more changes no hash.
+    const link = event.target.closest?.("a[href]");
+    if (link && location.hash && link.getAttribute("href") === location.hash) reveal();
+  });
+  reveal();
 
   // What is folded is printed open.
   const folded = [...document.querySelectorAll("details")];
