@@ -70,7 +70,7 @@ def test_no_page_of_the_site_asks_another_host(site: Path) -> None:
 
 @pytest.mark.parametrize("name", ["command-line", "model-file-keys"])
 def test_a_page_that_the_code_makes_is_stored_as_it_is_now(name: str, site: Path) -> None:
-    """A clone holds these pages, so that links to them lead somewhere; the build writes them anew."""
+    """A clone holds these pages, so that links lead somewhere; the build writes them anew."""
     command = ["git", "status", "--porcelain", "--", f"docs/reference/{name}.md"]
     changed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert changed.stdout == "", "commit the page that `make site` has written"
