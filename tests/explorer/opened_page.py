@@ -11,6 +11,8 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 WAIT = 60_000.0
 """Milliseconds that a picture may take on a machine that is busy with all other tests."""
+APART = 2.0
+"""Pixels that lie between two labels at least."""
 WATCH = """
   window.written = new Map();
   const { clearRect, fillText } = CanvasRenderingContext2D.prototype;
@@ -71,12 +73,12 @@ class DrawnText:
     height: float
 
     def meets(self, other: DrawnText) -> bool:
-        """Whether the boxes overlap."""
+        """Whether the boxes overlap, or lie so near that they read as one text."""
         return (
-            self.left < other.right
-            and other.left < self.right
-            and self.top < other.bottom
-            and other.top < self.bottom
+            self.left < other.right + APART
+            and other.left < self.right + APART
+            and self.top < other.bottom + APART
+            and other.top < self.bottom + APART
         )
 
     @property

@@ -155,6 +155,7 @@ def test_the_keyboard_stops_at_nothing_without_a_name(
     [
         ("paper", ""),
         ("paper", "?omega=0.62&b=0.0003"),
+        ("paper", "?omega=0.199461&b=0.0681039"),  # a label at the corner of the diagram
         ("rig", ""),
         ("rig", "?omega=42.7256600888"),
         ("three-masses", "?shown=2"),
@@ -165,6 +166,23 @@ def test_no_label_of_a_plot_is_cut_or_meets_another(
 ) -> None:
     page = of_width(browser, addresses[model] + place, width)
     check_labels(page, 3)
+    page.close()
+
+
+def test_labels_of_the_map_are_whole_on_a_phone(
+    browser: Browser, addresses: dict[str, str]
+) -> None:
+    map_over = "?map=omega~60~120~carriage-ground.damping~3~12"
+    page = of_width(browser, addresses["rig"] + map_over, 400)
+    page.wait_for_selector("#map-box:not([hidden])")
+    labels = check_labels(page, 4)
+    assert "carriage-ground.damping [N s/m]" in labels
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 400
+    page.focus("#map")
+    page.keyboard.press("ArrowRight")
+    told = page.inner_text("#map-at")
+    assert " Hz, carriage-ground.damping = " in told
+    assert " N s/m: " in told
     page.close()
 
 

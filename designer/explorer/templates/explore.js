@@ -73,7 +73,11 @@
   for (const each of [document.querySelector("header"), by("state")]) {
     new ResizeObserver(measureHead).observe(each);
   }
-  window.addEventListener("resize", () => { by("facts").style.minHeight = ""; });
+  let width = innerWidth; // a phone changes the height alone whenever its address bar hides
+  window.addEventListener("resize", () => {
+    if (width !== innerWidth) by("facts").style.minHeight = "";
+    width = innerWidth;
+  });
   const short = (text) => {
     const value = Number(text);
     return Number.isFinite(value) && text.length > 9 ? String(Number(value.toPrecision(7))) : text;
