@@ -22,6 +22,9 @@ def test_the_parts_and_the_yield_are_those_of_the_verbs() -> None:
     names = {part.name for part in design.design.circuit.resistors}
     assert names < rows.keys()
     assert rows["exact circuit"] == "1-2-2"
+    (swing,) = (each for each in design.design.checks if each.name == "swing_v")
+    assert rows["swing"] == f"{swing.found:.3g} V (at most {swing.limit:.3g} V)"
+    assert rows["signal level ratio"].count(" V") == 0
     yields = [message for message in messages if message["kind"] == "yield"]
     assert [message["samples"] for message in yields] == list(range(10, 210, 10))
     study = tolerance(design, samples=40, rung="exact", blame=False, jobs=1).study
