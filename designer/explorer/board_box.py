@@ -110,7 +110,7 @@ def expected(value: object) -> str:
     return value
 
 
-def _condition(check: ConditionCheck) -> tuple[str, str]:
+def condition_row(check: ConditionCheck) -> tuple[str, str]:
     """A side condition, its value and its limit in the unit that its name ends in."""
     words = check.name.split("_")
     unit = UNITS.get(words[-1], "")
@@ -135,7 +135,7 @@ def _rows(synthesis: Synthesis, response: str) -> list[tuple[str, str]]:
         ),
         ("largest error", f"{100.0 * design.errors.max_error:.2g} % ({design.certificate.status})"),
     ]
-    rows += [_condition(each) for each in design.checks]
+    rows += [condition_row(each) for each in design.checks]
     if setting.second is not None:
         ahead = setting.excitation.second_phase_deg
         rows.insert(
