@@ -28,7 +28,7 @@ from designer.yields.yield_count import count
 PIECE = 10
 """Boards between two messages."""
 UNITS = {"hz": "Hz", "v": "V", "a": "A", "ohm": "Ω"}
-"""Last words of the names of side conditions."""
+"""Last words of what side conditions limit."""
 Choose = Callable[[ModelFile], Synthesis]
 """Chooses parts for a model file that wants one response."""
 
@@ -111,13 +111,10 @@ def expected(value: object) -> str:
 
 
 def condition_row(check: ConditionCheck) -> tuple[str, str]:
-    """A side condition, its value and its limit in the unit that its name ends in."""
-    words = check.name.split("_")
-    unit = UNITS.get(words[-1], "")
-    found, limit = (
-        quantity_text(value, unit, 3) if unit else f"{value:.3g}"
-        for value in (check.found, check.limit)
-    )
+    """A side condition, its value and its limit in the unit that its quantity ends in."""
+    words = check.quantity.split("_")
+    unit, values = UNITS.get(words[-1], ""), (check.found, check.limit)
+    found, limit = (quantity_text(v, unit, 3) if unit else f"{v:.3g}" for v in values)
     side = "at least" if check.least else "at most"
     held = "" if check.holds else ", not kept"
     return " ".join(words[:-1] if unit else words), f"{found} ({side} {limit}{held})"

@@ -38,12 +38,11 @@ INK, FAINT, STROBE, IMPACT = "#0072b2", "#999999", "#d55e00", "#009e73"
 NOW = "#767676"
 """Of the line at the present ω: no period of the diagram has this colour."""
 BORDERS = {"left": 72, "right": 24, "top": 10, "bottom": 50}
-"""Pixels around a frame: room for labels, also for those at its corners, before the first are
-known. What is wider makes its own room."""
+"""Pixels around a frame: room for labels, also at its corners, before the first are known."""
 TICKS = 5
 """About how many ticks an axis has."""
 APART = 8
-"""Pixels between two labels of an axis; the second of a closer pair is left out."""
+"""Pixels between labels; the second of a closer pair is left out."""
 
 
 def sources() -> dict[str, ColumnDataSource]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.si_unit import prefixed, value_text
+from designer.base.si_unit import prefixed
 from designer.dynamics.attractors import ENGINE_ERROR, settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -213,9 +213,9 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
     if orbit.n:
         rows += _impact_rows(orbit, place)
     if np.isfinite(orbit.penetration):
-        rows.append(("shallowest contact", _length(orbit.penetration, place, 3)))
+        rows.append(("shallowest contact", _together([orbit.penetration], "m", place, 3)))
     if np.isfinite(orbit.miss):
-        rows.append(("nearest miss", _length(orbit.miss, place, 3)))
+        rows.append(("nearest miss", _together([orbit.miss], "m", place, 3)))
     return rows
 
 
@@ -233,25 +233,20 @@ def _impacts_text(rate: str, velocities: Array, place: ModelPlace) -> str:
     count = len(velocities)
     if not count:
         return "no impact"
-    listed, between = velocities, ", "
-    if count > LISTED:
-        listed, between = velocities[[0, -1]], " to "
+    few = count <= LISTED
+    listed, between = (velocities, ", ") if few else (velocities[[0, -1]], " to ")
     words = "1 impact" if count == 1 else f"{count} impacts"
     return f"{words}, {rate}\u00a0=\u00a0{_together(listed, 'm/s', place, 3, between)}"
 
 
 def _together(
-    values: Sequence[float] | Array, unit: str, place: ModelPlace, digits: int, between: str
+    values: Sequence[float] | Array, unit: str, place: ModelPlace, digits: int, between: str = ""
 ) -> str:
     """Values in one unit, which suits the largest of them."""
     factor, name = 1.0, ""
     if place.in_si:
         factor, name = prefixed(max(abs(float(value)) for value in values), unit)
     return f"{between.join(f'{value / factor:.{digits}g}' for value in values)} {name}".rstrip()
-
-
-def _length(value: float, place: ModelPlace, digits: int) -> str:
-    return value_text(value, "m", digits) if place.in_si else f"{value:.{digits}g}"
 
 
 def multipliers_text(multipliers: Sequence[complex] | np.ndarray) -> str:
