@@ -10,11 +10,12 @@ from functools import cached_property
 from designer.base.defaults import SAMPLES, SEED
 from designer.base.environment import spawn_context
 from designer.base.errors import InputError
+from designer.base.si_unit import quantity_text
 from designer.base.units import format_quantity
 from designer.centering import stage_choice
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
-from designer.circuit.design import settings
+from designer.circuit.design import ConditionCheck, settings
 from designer.dynamics.orbit import OrbitStatus
 from designer.explorer.place import ModelPlace
 from designer.explorer.saved_model import PinnedResponse, saved_text
@@ -26,6 +27,8 @@ from designer.yields.yield_count import count
 
 PIECE = 10
 """Boards between two messages."""
+UNITS = {"hz": "Hz", "v": "V", "a": "A", "ohm": "Ω"}
+"""Last words of what side conditions limit."""
 Choose = Callable[[ModelFile], Synthesis]
 """Chooses parts for a model file that wants one response."""
 
@@ -107,6 +110,16 @@ def expected(value: object) -> str:
     return value
 
 
+def condition_row(check: ConditionCheck) -> tuple[str, str]:
+    """A side condition, its value and its limit in the unit that its quantity ends in."""
+    words = check.quantity.split("_")
+    unit, values = UNITS.get(words[-1], ""), (check.found, check.limit)
+    found, limit = (quantity_text(v, unit, 3) if unit else f"{v:.3g}" for v in values)
+    side = "at least" if check.least else "at most"
+    held = "" if check.holds else ", not kept"
+    return " ".join(words[:-1] if unit else words), f"{found} ({side} {limit}{held})"
+
+
 def _rows(synthesis: Synthesis, response: str) -> list[tuple[str, str]]:
     design = synthesis.design
     (setting,) = settings(design, synthesis.model_responses)
@@ -119,12 +132,7 @@ def _rows(synthesis: Synthesis, response: str) -> list[tuple[str, str]]:
         ),
         ("largest error", f"{100.0 * design.errors.max_error:.2g} % ({design.certificate.status})"),
     ]
-    for each in design.checks:
-        limit = "at least" if each.least else "at most"
-        held = "" if each.holds else ", not kept"
-        rows.append(
-            (each.name.replace("_", " "), f"{each.found:.3g} ({limit} {each.limit:.3g}{held})")
-        )
+    rows += [condition_row(each) for each in design.checks]
     if setting.second is not None:
         ahead = setting.excitation.second_phase_deg
         rows.insert(

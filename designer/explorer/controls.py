@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from designer.base.si_unit import quantity_text
+from designer.base.si_unit import quantity_text, value_text
 from designer.base.units import parse_quantity
 from designer.explorer.place import OMEGA, ModelPlace, first_place
 from designer.model.mechanics import MechanicalModel, frequency_range
@@ -78,6 +78,19 @@ def length_unit(modelfile: ModelFile) -> tuple[str, float]:
     clearances = modelfile.model.second_order().clearances
     gaps = [abs(stop.gap) for clearance in clearances for _, stop in clearance.sides]
     return _shown_in(max(gaps, default=0.0) or 1e-3, "m")
+
+
+def units_note(modelfile: ModelFile) -> str:
+    """What the numbers of the page without a unit are."""
+    model, si = modelfile.model, modelfile.si
+    if in_si(si, model):
+        return "Numbers without a unit are ratios."
+    if si is not None:
+        hertz, length = value_text(si.hertz(1.0), "Hz"), value_text(si.length_scale, "m")
+        return f"All numbers are dimensionless: ω = 1 is {hertz}, a displacement of 1 is {length}."
+    if "b" in model.units:
+        return "All numbers are dimensionless."
+    return "Numbers are in the units of the model file, which names none."
 
 
 def _shown_in(value: float, unit: str) -> tuple[str, float]:

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from designer.base.html_templates import page_templates
 from designer.base.script_policy import script_source
 from designer.explorer import plots
-from designer.explorer.controls import Control, controls, length_unit
+from designer.explorer.controls import Control, controls, length_unit, units_note
 from designer.explorer.omega_strip import PERIODS
 from designer.explorer.place import OMEGA, first_place
 from designer.explorer.response_view import shown_motions
@@ -79,8 +79,10 @@ def _render(
     motions = shown_motions(first_place(modelfile).model.second_order())
     if recording is not None:
         motions = motions[: len(recording["views"][0]["motions"])]
-    items = plots.items(omega) | (plots.map_item() if recording is None else {})
     unit, scale = length_unit(modelfile)
+    items = plots.items(omega, unit, motions[0].motion.symbol)
+    if recording is None:
+        items |= plots.map_item()
     data = _script_text(
         {
             "plots": items,
@@ -96,7 +98,8 @@ def _render(
             title=modelfile.title,
             motions=[motion.label for motion in motions],
             stem=stem_for(modelfile),
-            plots=plots.TITLES.items(),
+            plots=plots.TITLES,
+            units=units_note(modelfile),
             groups=_groups(shown),
             axes=each,
             upward=next(control.name for control in each if control.name != OMEGA),

@@ -6,7 +6,7 @@ from typing import Any
 
 from bokeh.core.types import ID
 from bokeh.embed import json_item
-from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, Range1d
+from bokeh.models import BasicTicker, ColumnDataSource, DataRange1d, HoverTool, NoOverlap, Range1d
 from bokeh.plotting import figure
 
 from designer.explorer.controls import Control
@@ -25,7 +25,7 @@ COLUMNS = {
     "strobes": ("x", "v"),
     "impacts": ("t", "x", "v"),
     "stops": ("at",),
-    "strip": ("omega", "x", "colour"),
+    "strip": ("omega", "x", "colour", "period"),
     "now": ("at",),
     "cells": ("left", "right", "bottom", "top", "colour"),
     "borders": ("xs", "ys", "colour"),
@@ -35,6 +35,14 @@ COLUMNS = {
 """Columns of each source of data, by its name."""
 INK, FAINT, STROBE, IMPACT = "#0072b2", "#999999", "#d55e00", "#009e73"
 """Of Okabe and Ito: seen on light and on dark, and told apart by most."""
+NOW = "#767676"
+"""Of the line at the present ω: no period of the diagram has this colour."""
+BORDERS = {"left": 72, "right": 24, "top": 10, "bottom": 50}
+"""Pixels around a frame: room for labels, also at its corners, before the first are known."""
+TICKS = 5
+"""About how many ticks an axis has."""
+APART = 8
+"""Pixels between labels; the second of a closer pair is left out."""
 
 
 def sources() -> dict[str, ColumnDataSource]:
@@ -45,12 +53,17 @@ def sources() -> dict[str, ColumnDataSource]:
     }
 
 
-def items(omega: Control) -> dict[str, Any]:
+def items(omega: Control, unit: str, least: str) -> dict[str, Any]:
     """What ``Bokeh.embed.embed_item`` takes, for each of ``PLOTS``, a document each.
 
-    omega : the slider of ω, whose unit an axis names.
+    omega : the slider of ω, whose unit an axis names. unit : that of displacements, "" for none.
+    least : the symbol of the displacement whose least values the diagram has.
     """
-    made = (_portrait(sources()), _trace(sources()), _strip(sources(), omega))
+    made = (
+        _portrait(sources(), unit),
+        _trace(sources()),
+        _strip(sources(), omega, in_unit(f"least {least}", unit)),
+    )
     return {name: json_item(plot, ID(name)) for name, plot in zip(PLOTS, made, strict=True)}
 
 
@@ -59,10 +72,15 @@ def map_item() -> dict[str, Any]:
     return {MAP: json_item(_map(sources()), ID(MAP))}
 
 
-def _empty(height: int, tools: str, **more: Any) -> figure:
+def in_unit(words: str, unit: str) -> str:
+    """What an axis is called."""
+    return f"{words} [{unit}]" if unit else words
+
+
+def _empty(tools: str, **more: Any) -> figure:
+    """A plot as large as its place on the page."""
     plot = figure(
-        height=height,
-        sizing_mode="stretch_width",
+        sizing_mode="stretch_both",
         tools=tools,
         active_scroll=None,
         toolbar_location="above",
@@ -73,49 +91,53 @@ def _empty(height: int, tools: str, **more: Any) -> figure:
     plot.toolbar.autohide = True
     plot.background_fill_color = None
     plot.border_fill_color = None
-    plot.min_border_left = 58
+    plot.update(**{f"min_border_{side}": pixels for side, pixels in BORDERS.items()})
+    for axis in plot.axis:
+        axis.major_label_policy = NoOverlap(min_distance=APART)
+        axis.ticker = BasicTicker(desired_num_ticks=TICKS)
     return plot
 
 
-def _portrait(data: dict[str, ColumnDataSource]) -> figure:
-    plot = _empty(400, "pan,box_zoom,wheel_zoom,save,reset")
+def _portrait(data: dict[str, ColumnDataSource], unit: str) -> figure:
+    plot = _empty("pan,box_zoom,wheel_zoom,save,reset")
     plot.vspan(x="at", source=data["stops"], color=FAINT, line_dash="dashed", line_width=1)
     plot.line("x", "v", source=data["trace"], color=INK, line_width=1.6)
     plot.scatter("x", "v", source=data["impacts"], color=IMPACT, size=8, marker="triangle")
     strobes = plot.scatter("x", "v", source=data["strobes"], color=STROBE, size=7)
-    plot.add_tools(HoverTool(renderers=[strobes], tooltips=[("strobe", "@x, @v")]))
+    words = f"@x {unit}, @v {unit}/s" if unit else "@x, @v"
+    plot.add_tools(HoverTool(renderers=[strobes], tooltips=[("strobe", words)]))
     plot.xaxis.axis_label, plot.yaxis.axis_label = "x", "x′"
     return plot
 
 
 def _trace(data: dict[str, ColumnDataSource]) -> figure:
-    plot = _empty(
-        190, "xpan,xbox_zoom,xwheel_zoom,save,reset", x_range=DataRange1d(range_padding=0.01)
-    )
+    plot = _empty("xpan,xbox_zoom,xwheel_zoom,save,reset", x_range=DataRange1d(range_padding=0.01))
     plot.hspan(y="at", source=data["stops"], color=FAINT, line_dash="dashed", line_width=1)
     plot.line("t", "x", source=data["trace"], color=INK, line_width=1.6)
     plot.scatter("t", "x", source=data["impacts"], color=IMPACT, size=8, marker="triangle")
-    plot.xaxis.axis_label, plot.yaxis.axis_label = "drive periods", "x"
+    plot.xaxis.axis_label, plot.yaxis.axis_label = in_unit("time", "drive periods"), "x"
     return plot
 
 
-def _strip(data: dict[str, ColumnDataSource], omega: Control) -> figure:
+def _strip(data: dict[str, ColumnDataSource], omega: Control, least: str) -> figure:
     plot = _empty(
-        200,
         "xpan,xbox_zoom,save,reset",
         x_range=Range1d(start=omega.scale * omega.low, end=omega.scale * omega.high),
     )
-    plot.scatter("omega", "x", source=data["strip"], color="colour", size=2.5, line_color=None)
-    plot.vspan(x="at", source=data["now"], color=STROBE, line_width=1)
-    plot.xaxis.axis_label = f"{omega.label} [{omega.unit}]" if omega.unit else "ω"
-    plot.yaxis.axis_label = "least x"
+    points = plot.scatter(
+        "omega", "x", source=data["strip"], color="colour", size=3.5, line_color=None
+    )
+    plot.vspan(x="at", source=data["now"], color=NOW, line_width=1.5)
+    # The period in words too: nobody tells ten colours of small dots apart.
+    tooltips = [(omega.label, f"@omega {omega.unit}"), ("period", "@period")]
+    plot.add_tools(HoverTool(renderers=[points], tooltips=tooltips, limit=1))
+    plot.xaxis.axis_label = in_unit(omega.label, omega.unit)
+    plot.yaxis.axis_label = least
     return plot
 
 
 def _map(data: dict[str, ColumnDataSource]) -> figure:
-    plot = _empty(
-        360, "save", x_range=Range1d(start=0.0, end=1.0), y_range=Range1d(start=0.0, end=1.0)
-    )
+    plot = _empty("save", x_range=Range1d(start=0.0, end=1.0), y_range=Range1d(start=0.0, end=1.0))
     plot.quad(
         left="left",
         right="right",

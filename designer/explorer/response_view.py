@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.si_unit import value_text
+from designer.base.si_unit import prefixed
 from designer.dynamics.attractors import ENGINE_ERROR, settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -29,6 +29,8 @@ from designer.model.relative_motion import (
 
 STEPS = 4_000_000
 """Steps that one picture may take, a fifth of ``step_budget.SETTLING``: under a second."""
+LISTED = 4
+"""Impacts on a stop whose velocities are written one by one; of more the least and the greatest."""
 
 
 @dataclass(frozen=True)
@@ -202,20 +204,49 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
         rows += [("period", f"{orbit.n} of the drive"), ("symmetric", symmetric)]
         rows.append(("multipliers", multipliers_text(orbit.multipliers)))
         rows.append(("largest |μ|", f"{orbit.radius:.4g}"))
-    rows.append((f"λ max{' [1/s]' if place.in_si else ''}", exponent_text(orbit)))
+    per_second = " 1/s" if place.in_si and np.isfinite(orbit.lyapunov) else ""
+    rows.append(("λ max", f"{exponent_text(orbit)}{per_second}"))
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):
-            rows.append((name, f"{_length(low, place, 4)} … {_length(high, place, 4)}"))
+            rows.append((name, _together([low, high], "m", place, 4, " to ")))
+    if orbit.n:
+        rows += _impact_rows(orbit, place)
     if np.isfinite(orbit.penetration):
-        rows.append(("shallowest contact", _length(orbit.penetration, place, 3)))
+        rows.append(("shallowest contact", _together([orbit.penetration], "m", place, 3)))
     if np.isfinite(orbit.miss):
-        rows.append(("nearest miss", _length(orbit.miss, place, 3)))
+        rows.append(("nearest miss", _together([orbit.miss], "m", place, 3)))
     return rows
 
 
-def _length(value: float, place: ModelPlace, digits: int) -> str:
-    return value_text(value, "m", digits) if place.in_si else f"{value:.{digits}g}"
+def _impact_rows(orbit: Orbit, place: ModelPlace) -> Iterator[tuple[str, str]]:
+    """For each stop how many impacts it has in the orbit's period, and with what velocities."""
+    system = place.model.second_order()
+    for k, motion in enumerate(relative_motions(system)):
+        of = f" of {system.clearances[k].name}" if len(system.clearances) > 1 else ""
+        for side, _, velocities in motion.impacts(orbit):
+            name = f"{'upper' if side > 0 else 'lower'} stop{of}"
+            yield name, _impacts_text(motion.rate, np.sort(velocities), place)
+
+
+def _impacts_text(rate: str, velocities: Array, place: ModelPlace) -> str:
+    count = len(velocities)
+    if not count:
+        return "no impact"
+    few = count <= LISTED
+    listed, between = (velocities, ", ") if few else (velocities[[0, -1]], " to ")
+    words = "1 impact" if count == 1 else f"{count} impacts"
+    return f"{words}, {rate}\u00a0=\u00a0{_together(listed, 'm/s', place, 3, between)}"
+
+
+def _together(
+    values: Sequence[float] | Array, unit: str, place: ModelPlace, digits: int, between: str = ""
+) -> str:
+    """Values in one unit, which suits the largest of them."""
+    factor, name = 1.0, ""
+    if place.in_si:
+        factor, name = prefixed(max(abs(float(value)) for value in values), unit)
+    return f"{between.join(f'{value / factor:.{digits}g}' for value in values)} {name}".rstrip()
 
 
 def multipliers_text(multipliers: Sequence[complex] | np.ndarray) -> str:

@@ -6,7 +6,8 @@ import pytest
 
 from designer import InputError, parse_model_file, synthesise, tolerance
 from designer.centering.stage_choice import synthesise as choose
-from designer.explorer.board_box import PartsProcess, board_box, expected
+from designer.circuit.design import ConditionCheck
+from designer.explorer.board_box import PartsProcess, board_box, condition_row, expected
 from designer.explorer.place import read_place
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
@@ -29,6 +30,13 @@ def test_the_parts_and_the_yield_are_those_of_the_verbs() -> None:
     (counted,) = study.yields
     assert counted is not None
     assert (yields[3]["samples"], yields[3]["ok"]) == (40, counted.ok)
+
+
+def test_a_side_condition_is_told_in_its_unit() -> None:
+    load = ConditionCheck("load", "load_ohm", 2000.0, 2540.0, "U1", least=True)
+    assert condition_row(load) == ("load", "2.54 kΩ (at least 2 kΩ)")
+    level = ConditionCheck("level", "signal_level_ratio", 3.0, 3.5)
+    assert condition_row(level) == ("signal level ratio", "3.5 (at most 3, not kept)")
 
 
 def test_what_no_circuit_makes_is_said() -> None:

@@ -9,25 +9,20 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from designer import read_model_file
+from tests.explorer.opened_page import WAIT, chromium, opened
 from tests.explorer.served import EXAMPLES, served
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 pytestmark = pytest.mark.browser
-WAIT = 60_000.0
-"""Milliseconds that a picture may take on a machine that is busy with all other tests."""
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
-        )
-        yield chromium
-        chromium.close()
+    with chromium() as each:
+        yield each
 
 
 @pytest.fixture(scope="module")
@@ -36,16 +31,6 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with served(EXAMPLES / "paper.toml", folder, "--port", "0") as place:
         yield place
     assert list(folder.iterdir()) == []
-
-
-def opened(browser: Browser, address: str, **options: object) -> Page:
-    """A page whose first picture is drawn, and which has no error."""
-    page = browser.new_page(**options)  # type: ignore[arg-type]
-    page.set_default_timeout(WAIT)
-    page.on("pageerror", lambda error: pytest.fail(str(error)))
-    page.goto(address)
-    page.wait_for_selector("html[data-drawn]")
-    return page
 
 
 def summary(page: Page, text: str) -> None:

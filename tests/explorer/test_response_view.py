@@ -12,12 +12,13 @@ from designer import InputError, read_model_file, simulate
 from designer.dynamics.attractors import settle
 from designer.explorer import omega_strip
 from designer.explorer.place import first_place, read_place
-from designer.explorer.response_view import multipliers_text, respond, shown_motions
+from designer.explorer.response_view import facts, multipliers_text, respond, shown_motions
 from designer.explorer.wire import column, text_of
 from designer.model.driven import model_flow
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PAPER = read_model_file(EXAMPLES / "paper.toml")
+RIG = read_model_file(EXAMPLES / "rig.toml")
 THREE = read_model_file(EXAMPLES / "three-masses.toml")
 
 
@@ -47,6 +48,40 @@ def test_impacts_lie_on_the_stops_and_on_the_trace() -> None:
         assert np.interp(time, view.time, view.displacement) == pytest.approx(place, abs=1e-3)
         assert np.interp(time, view.time, view.velocity) == pytest.approx(speed, abs=1e-2)
     assert len(view.impacts) == view.orbit.p + view.orbit.q
+
+
+def test_impacts_are_told_stop_by_stop_with_the_velocities_of_simulate() -> None:
+    place = read_place(THREE, {"omega": 1.2})
+    figures = dict(facts(respond(place).orbit, place))
+    (expected,) = simulate(THREE, [1.2], starts=1)
+    orbit = expected.orbit
+    for name, clearance, side, rate in (
+        ("upper stop of A", 0, 1, "x₁′"),
+        ("lower stop of A", 0, -1, "x₁′"),
+        ("upper stop of B", 1, 1, "x₃′"),
+    ):
+        here = (orbit.impact_clearances == clearance) & (orbit.impact_sides == side)
+        (velocity,) = orbit.impact_velocities[here]
+        assert figures[name] == f"1 impact, {rate}\u00a0=\u00a0{velocity:.3g}"
+    assert "lower stop of B" not in figures
+
+
+def test_many_impacts_are_told_by_their_range_and_none_as_none() -> None:
+    figures = {}
+    for omega in (0.24, 0.05):
+        place = read_place(PAPER, {"omega": omega, "b": 5.0 if omega == 0.05 else 0.25})
+        figures[omega] = dict(facts(respond(place).orbit, place))
+    assert figures[0.24]["upper stop"].startswith("7 impacts, x₁′\u00a0=\u00a00.")
+    assert " to " in figures[0.24]["upper stop"]
+    assert figures[0.05]["upper stop"] == figures[0.05]["lower stop"] == "no impact"
+
+
+def test_figures_of_a_rig_have_units_and_those_of_one_row_the_same() -> None:
+    place = first_place(RIG)
+    figures = dict(facts(respond(place).orbit, place))
+    assert figures["x₁ (carriage)"] == "-2.613 to 2.613 mm"
+    assert figures["λ max"].endswith(" 1/s")
+    assert figures["upper stop"].endswith(" mm/s")
 
 
 def test_a_mass_on_a_moving_base_is_shown_as_it_moves_and_in_its_clearance() -> None:

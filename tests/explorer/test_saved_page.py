@@ -9,17 +9,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
-from designer import InputError, explore
+from designer import InputError, explore, read_model_file
 from designer.base.progress import Progress
 from designer.explorer import saved_page, saved_page as branch_recording
+from designer.explorer.explorer_page import recorded_page
 from designer.explorer.place import ModelPlace
 from designer.explorer.response_view import respond
-from designer.explorer.saved_page import BranchRecording, places, record, yields
+from designer.explorer.saved_page import (
+    BranchRecording,
+    RecordedYields,
+    message_of,
+    places,
+    record,
+    yields,
+)
 from designer.explorer.wire import short_column
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
+from tests.explorer import opened_page as live
+from tests.explorer.opened_page import chromium
+from tests.explorer.served import EXAMPLES
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 OMEGAS = (0.82, 0.85, 0.88, 1.55, 1.6)
@@ -130,6 +141,17 @@ def saved(
     return path
 
 
+@pytest.fixture(scope="module")
+def rig_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A saved page with SI values, at four drive frequencies."""
+    rig = read_model_file(EXAMPLES / "rig.toml")
+    omegas = [2.0 * math.pi * hertz for hertz in (13.4, 13.6, 14.0, 14.2)]
+    message = message_of(record(rig, omegas, 1, Progress()), RecordedYields("none here"))
+    path = tmp_path_factory.mktemp("rig") / "rig.html"
+    path.write_text(recorded_page(rig, message), encoding="utf-8")
+    return path
+
+
 def opened(page: Page, path: Path) -> list[str]:
     """What the page asked for or complained of since it was opened."""
     heard: list[str] = []
@@ -145,11 +167,8 @@ def opened(page: Page, path: Path) -> list[str]:
 @pytest.mark.parametrize("width", [390, 1300])
 def test_the_file_works_without_a_server(saved: Path, width: int) -> None:
     assert saved.stat().st_size < 3_000_000
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=["--no-sandbox"]
-        )
-        page = chromium.new_page(viewport={"width": width, "height": 844})
+    with chromium() as browser:
+        page = browser.new_page(viewport={"width": width, "height": 844})
         assert opened(page, saved) == []
         assert page.inner_text("h1") == TITLE
         assert page.inner_text("#summary").startswith("1-2-2")
@@ -172,4 +191,33 @@ def test_the_file_works_without_a_server(saved: Path, width: int) -> None:
         results = Axe().run(page)
         assert results.violations_count == 0, results.generate_report()
         assert page.evaluate("() => document.documentElement.scrollWidth") <= width
-        chromium.close()
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [400, 800, 1280])
+def test_the_file_of_a_rig_stands_as_the_live_page_and_has_its_units(
+    rig_page: Path, width: int
+) -> None:
+    with chromium() as browser:
+        page = live.opened(browser, rig_page.as_uri(), viewport={"width": width, "height": 844})
+        labels = live.check_labels(page, 3)
+        assert {"x₁ [mm]", "x₁′ [mm/s]", "drive frequency [Hz]", "least x₁ [mm]"} <= labels
+        plot, figures, slider = (
+            page.locator(each).bounding_box() for each in ("#portrait", "#facts", ".slider")
+        )
+        assert plot is not None
+        assert figures is not None
+        assert slider is not None
+        beside = figures["x"] >= plot["x"] + plot["width"]
+        assert beside == (width == 1280)
+        page.focus(".slider")
+        page.keyboard.press("ArrowRight")
+        for each in ("#portrait", ".slider"):
+            box = page.locator(each).bounding_box()
+            assert box is not None
+            assert box["y"] >= 0.0
+            assert box["y"] + box["height"] <= 844.0
+        assert page.inner_text("#facts").count(" mm") >= 3
+        fixed = page.locator("#controls dl dd").all_inner_texts()
+        assert {"500 g", "2 kN/m", "6 N s/m", "1 mm", "18 kN/m"} <= set(fixed)
+        assert " Hz (" in page.inner_text("#windows li:first-child")

@@ -73,7 +73,7 @@ REACH = {
     "bifurcation": 33_300,
     "reproduce": 55_700,
     "rules": 58_600,
-    "explore": 56_400,
+    "explore": 56_700,
     "bench": 60_800,
     "trade": 63_000,
     "export": 64_500,

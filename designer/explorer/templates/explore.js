@@ -42,6 +42,7 @@
     // What the server makes the number of: with its unit, so that 36 Hz stays 36 Hz.
     c.asText = (shown) => (c.scale === 1 || shown === "" || !Number.isFinite(Number(shown)) ? shown
       : recording ? String(Number(shown) / c.scale) : `${shown} ${c.unit}`);
+    c.told = (value) => `${d.label} = ${c.round(value)} ${c.unit}`.trim();
     c.round = (value) => String(Number((value * c.scale).toPrecision(6)));
     c.show = (text) => {
       c.text = text;
@@ -66,6 +67,17 @@
     return c;
   });
   const named = Object.fromEntries(controls.map((c) => [c.name, c]));
+  // What stays at the top: the head, or on a phone the part of it that does not scroll away.
+  const measureHead = () => root.style.setProperty("--head",
+    `${document.querySelector("header").offsetHeight || by("state").offsetHeight}px`);
+  for (const each of [document.querySelector("header"), by("state")]) {
+    new ResizeObserver(measureHead).observe(each);
+  }
+  let width = innerWidth; // a phone changes the height alone whenever its address bar hides
+  window.addEventListener("resize", () => {
+    if (width !== innerWidth) by("facts").style.minHeight = "";
+    width = innerWidth;
+  });
   const short = (text) => {
     const value = Number(text);
     return Number.isFinite(value) && text.length > 9 ? String(Number(value.toPrecision(7))) : text;
@@ -149,6 +161,8 @@
       by("tried").textContent = "";
       document.querySelector("#others ul").replaceChildren();
       table(list, message.facts);
+      // Fewer figures leave their room: what stands below shall not jump while a slider is moved.
+      by("facts").style.minHeight = `${by("facts").offsetHeight}px`;
       by("choose").disabled = by("pin").disabled;
       for (const name of ["portrait", "trace"]) {
         by(name).setAttribute("aria-label", `${name}: ${message.summary}`);
@@ -169,10 +183,11 @@
       stripOf = message.id;
       const data = unpacked(message.data);
       const colours = [...data.period].map((n) => (n < 0 ? OPEN : PERIODS[n] ?? PERIODS[0]));
+      const periods = [...data.period].map((n) => (n < 0 ? "not settled" : n ? String(n) : "none"));
       const along = data.omega.map((omega) => omega * named.omega.scale);
       const least = data.x.map((x) => x * page.length.scale);
       stripData = { omega: joined(stripData.omega, along), x: joined(stripData.x, least),
-        colour: stripData.colour.concat(colours) };
+        colour: stripData.colour.concat(colours), period: stripData.period.concat(periods) };
       later();
     },
     others(message) {
@@ -234,6 +249,7 @@
           by(`map-${key}-${end}`).value = mapShown(key, message[key][end]);
         }
         by(`map-${key}`).value = message[key].name;
+        mapUnits();
         const range = views.map.model[`${key}_range`];
         range.setv({ start: mapDrawn(key, +message[key].low), end: mapDrawn(key, +message[key].high) });
       }
@@ -444,8 +460,8 @@
     const { columns, rows } = mapOf;
     const response = responseAt(Math.round(mapPart("y", y) * (rows - 1)),
       Math.round(mapPart("x", x) * (columns - 1)));
-    const [across, up] = [named[mapOf.x.name].round(x), named[mapOf.y.name].round(y)];
-    by("map-at").textContent = `${mapOf.x.label} = ${across}, ${mapOf.y.label} = ${up}: ${response}`;
+    const [across, up] = [named[mapOf.x.name].told(x), named[mapOf.y.name].told(y)];
+    by("map-at").textContent = `${across}, ${up}: ${response}`;
   };
   const goToPoint = (x, y) => {
     named[mapOf.x.name].go(x);
@@ -479,8 +495,12 @@
     fill("cursor", { x: [mapDrawn("x", cursor[0])], y: [mapDrawn("y", cursor[1])] });
     tellAt(...cursor);
   };
+  const mapUnits = () => {
+    for (const key of ["x", "y"]) by(`map-${key}-unit`).textContent = named[by(`map-${key}`).value]?.unit ?? "";
+  };
   const wireMap = () => {
     const place = by("map");
+    mapUnits();
     onStillClick(place, (event) => {
       const point = mapOf && pointOf(event);
       if (point) goToPoint(...point);
@@ -494,6 +514,7 @@
     for (const key of ["x", "y"]) {
       by(`map-${key}`).addEventListener("change", () => {
         for (const end of ["low", "high"]) by(`map-${key}-${end}`).value = "";
+        mapUnits();
         if (map) again(typedMap());
       });
       for (const end of ["low", "high"]) {
@@ -521,7 +542,7 @@
     out.set(b, a.length);
     return out;
   };
-  const empty = () => ({ omega: new Float32Array(0), x: new Float32Array(0), colour: [] });
+  const empty = () => ({ omega: new Float32Array(0), x: new Float32Array(0), colour: [], period: [] });
   let stripData = empty(), stripOf = 0, timer = 0;
   const later = () => { // a piece comes every few milliseconds; nobody sees so many pictures
     timer ||= setTimeout(() => { timer = 0; fill("strip", stripData); }, 120);
@@ -555,7 +576,6 @@
     axisLabel(views.portrait.model, "below", message.axes.x + (unit && ` [${unit}]`));
     axisLabel(views.portrait.model, "left", message.axes.v + (unit && ` [${unit}/s]`));
     axisLabel(views.trace.model, "left", message.axes.x + (unit && ` [${unit}]`));
-    axisLabel(views.strip.model, "left", "least x" + (unit && ` [${unit}]`));
   };
   const axisLabel = (plot, place, text) => {
     const axis = plot[place][0];
@@ -584,7 +604,9 @@
   };
   const goThere = (view, name, event) => {
     const area = view.el.getBoundingClientRect();
-    const x = view.frame.x_scale.invert(event.clientX - area.left);
+    const [across, down] = [event.clientX - area.left, event.clientY - area.top];
+    if (!view.frame.bbox.contains(across, down)) return; // but on the tools, or a label
+    const x = view.frame.x_scale.invert(across);
     if (!Number.isFinite(x) || x <= 0) return;
     named[name].go(x / named[name].scale);
     want();
@@ -595,6 +617,19 @@
       const made = await Bokeh.embed.embed_item(item, name);
       views[name] = made.get_by_id?.(item.root_id) ?? [...made][0];
     }
+    // A finger on a plot moves the page, until a tool is chosen; and no stop of the Tab key is
+    // without a name.
+    for (const view of Object.values(views)) {
+      view.canvas_view.events_el.tabIndex = -1;
+      if (!matchMedia("(pointer: coarse)").matches) continue;
+      for (const tool of view.model.toolbar.tools) if (tool.active) tool.active = false;
+    }
+    const phone = matchMedia("(max-width: 699px)");
+    const tools = () => { // on a phone the plot has their room
+      for (const view of Object.values(views)) view.model.toolbar_location = phone.matches ? null : "above";
+    };
+    phone.addEventListener("change", tools);
+    tools();
     onStillClick(by("strip"), (event) => goThere(views.strip, "omega", event));
     if (!recording) wireMap();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", colour);
