@@ -15,6 +15,7 @@ from designer.check import checked_design
 from designer.circuit.design import Design, GeneratorSetting, settings
 from designer.dynamics.drive_shape import Shape, wave
 from designer.dynamics.orbit import SETTLED
+from designer.model.clearance import Clearance
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import state_names
 from designer.model.model import SiScales
@@ -156,18 +157,26 @@ def scales_csv(modelfile: ModelFile, design: Design, responses: Sequence[ModelRe
 def _thresholds(design: Design) -> list[tuple[str, float]]:
     """Where contact begins [V], as a distance from rest. Several clearances have a row for each
     stop, on the scale of the mass that moves in it; one has a row, or two where its middle is off
-    rest."""
+    rest. Where several displacements make up that in a clearance, the others are at 0."""
     scales, system = design.errors.scales, design.model.second_order()
     clearances = system.dead_zones[: len(system.clearances)]
+
+    def where(clearance: Clearance) -> str:
+        alone = clearance.other is None and not clearance.combination
+        return f"of v{2 * clearance.mass + 1}" + ("" if alone else " with the others at 0")
+
     if len(clearances) > 1:
         return [
-            (f"threshold of contact, {c.name}, {SIDES[side]} stop, of v{2 * c.mass + 1}", volts)
+            (f"threshold of contact, {c.name}, {SIDES[side]} stop, {where(c)}", volts)
             for number, c in enumerate(clearances)
             for side, volts in design.thresholds(number).items()
         ]
-    rows = [("threshold of contact", scales.threshold)] if clearances else []
-    if clearances and abs(scales.offcentre) > 1e-9:
-        rows.append(("threshold of contact, lower stop", scales.threshold_lower))
+    if not clearances:
+        return []
+    ends = "" if where(clearances[0]) == "of v1" else f", {where(clearances[0])}"
+    rows = [(f"threshold of contact{ends}", scales.threshold)]
+    if abs(scales.offcentre) > 1e-9:
+        rows.append((f"threshold of contact, lower stop{ends}", scales.threshold_lower))
     return rows
 
 

@@ -424,7 +424,7 @@ class PictureData:
 class BifurcationResult:
     """What the verb ``bifurcation`` answers."""
 
-    answer: dict[str, Any]
+    answer: dict[str, Any] = field(repr=False)
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""
@@ -518,7 +518,8 @@ class BifurcationResult:
 
     def points(self) -> pd.DataFrame:
         """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
-        return frame(self.answer.get("points", ()))
+        columns = "parameter", "kind", "value", "before", "after", "response"
+        return frame(self.answer.get("points", ()), columns)
 
     def _repr_html_(self) -> str:
         names = ("from", "to", "response", "symmetric")

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from designer.model.si_units import Reader
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SimulationResult:
     """What the verb ``simulate`` answers. It is a sequence of the responses too."""
 
@@ -52,6 +52,10 @@ class SimulationResult:
         """A row for each orbit: each response, its twin and the others that coexist with it, in
         model units."""
         return frame(row for s in self.simulated for row in s.rows())
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{s.orbit.response} at ω = {s.omega:g}" for s in self)
+        return f"<SimulationResult: {shown}>"
 
     def __iter__(self) -> Iterator[Simulated]:
         return iter(self.simulated)
