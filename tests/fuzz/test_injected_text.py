@@ -188,7 +188,7 @@ def test_hostile_text_is_text_in_every_file(
 def test_any_hostile_text_is_text_in_every_file(
     harmless: dict[str, Counter[str]], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    @settings(max_examples=8, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=3, suppress_health_check=list(HealthCheck))
     @given(hostile_text)
     def each(title: str) -> None:
         check(title, harmless, tmp_path_factory.mktemp("hostile"))

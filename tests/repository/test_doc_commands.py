@@ -42,7 +42,12 @@ SMALLER = {
     "--samples 100 --out out/rig": "--samples 4 --out out/rig",
     **{
         f"--out out/{name}": f"--out out/{name} --samples 4 --no-blame"
-        for name in ("double-well-board", "chaos", "gears", "two-shakers", "restitution")
+        for name in ("double-well-board", "chaos", "two-shakers")
+    },
+    # to the end in tests/synthesis/test_combinations.py and tests/synthesis/test_damped_stops.py
+    **{
+        f"run examples/{name}.toml": f"synthesise examples/{name}.toml"
+        for name in ("gears", "restitution")
     },
 }
 FILLED = {
