@@ -20,6 +20,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from designer.base.atomic_write import appearing
 from designer.base.errors import InputError
 from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes, reading
+from designer.base.progress import quiet
 from designer.base.seal import BLANK, intact, sealed
 
 Entry = TypeVar("Entry")
@@ -40,10 +41,6 @@ UNSEALED = "written without a checksum, computed again"
 def nobody(_name: str, _content: bytes) -> bool:
     """Vouches for nothing."""
     return False
-
-
-def quiet(_text: str) -> None:
-    """Tells nobody."""
 
 
 class EntryCodec(Protocol[Entry]):

@@ -36,7 +36,7 @@ where blame or maps take time after that."""
 
 
 class _Quiet:
-    """Takes an answer and shows nobody; by its name in the help of a function."""
+    """Takes an answer or a note and tells nobody; by its name in the help of a function."""
 
     def __call__(self, answer: object) -> None:
         """Does nothing."""
@@ -46,7 +46,7 @@ class _Quiet:
 
 
 quiet = _Quiet()
-"""What shows an answer where nothing else was given."""
+"""What shows an answer, or takes a note, where nothing else was given."""
 LOG = logging.getLogger("designer")
 EVERY = 20.0
 """s between two lines about the steps of a stage."""

@@ -15,7 +15,8 @@ from typing import Any
 from designer.base.atomic_write import PART
 from designer.base.errors import InputError
 from designer.base.guarded_reading import parse_json, read_bytes
-from designer.base.keyed_store import SEAL, KeyedStore, Note, quiet
+from designer.base.keyed_store import SEAL, KeyedStore, Note
+from designer.base.progress import quiet
 from designer.base.seal import BLANK, intact
 
 FOLDER = "cases"

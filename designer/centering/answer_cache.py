@@ -16,7 +16,8 @@ from typing import Any
 from designer.base.atomic_write import write
 from designer.base.errors import InputError
 from designer.base.guarded_reading import UNREADABLE, read_bytes
-from designer.base.keyed_store import DAMAGED, UNSEALED, Note, quiet, read_line, sealed_line
+from designer.base.keyed_store import DAMAGED, UNSEALED, Note, read_line, sealed_line
+from designer.base.progress import quiet
 
 FORMAT = 2
 

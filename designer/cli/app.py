@@ -81,6 +81,7 @@ _EVERY: tuple[inspect.Parameter, ...] = tuple(
 )
 """The options of every verb, after its own."""
 HELP = ("-h", "--help")
+"""The spellings that ask for a help page."""
 SOURCE = "model"
 """Name of a parameter that is a model file or a design folder."""
 

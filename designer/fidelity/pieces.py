@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.guarded_reading import UNREADABLE
-from designer.base.keyed_store import Lines, Note, quiet
+from designer.base.keyed_store import Lines, Note
 from designer.base.plain_json import plain
+from designer.base.progress import quiet
 from designer.base.record_check import checked_record
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rung_errors import RungError, Truth

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from designer.base.design_folder import DESIGN, REPORTS, Folder
 from designer.base.errors import InputError
-from designer.base.keyed_store import Note, quiet
+from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, file_hash, read_json
 from designer.base.page import PageSection
+from designer.base.progress import quiet
 
 SHOWN: Mapping[StageName, Sequence[str]] = {
     "cure": ("cure.json", "cure-front.csv", "cure-front.svg"),

@@ -21,8 +21,9 @@ from zipfile import ZipFile
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
+from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody
 from designer.base.parquet_entry import MOST_BYTES
+from designer.base.progress import quiet
 from designer.base.record_check import checked_record
 from designer.base.seal import BLANK
 from designer.dynamics.orbit import Orbit, OrbitStatus

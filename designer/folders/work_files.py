@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
+from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody
 from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.progress import quiet
 
 FORMAT = 1
 Made = TypeVar("Made")

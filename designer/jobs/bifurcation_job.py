@@ -381,12 +381,16 @@ class _Finished:
     def read(self, *place: Any) -> Any:
         found = self.store.read(*place)
         if found is None:
-            expected = "every block of the finished work: --overwrite makes it anew"
-            raise InputError(self.store.files.root, self.store.name(*place), MISSING, expected)
+            raise self._gone(MISSING, self.store.name(*place))
         return found
 
     def write(self, *_: Any) -> None:
-        raise AssertionError("a finished work is only read")
+        """Asked for where a block's values cannot be those of the work."""
+        raise self._gone("values of another work", "a block")
+
+    def _gone(self, found: object, name: str) -> InputError:
+        expected = "every block of the finished work: --overwrite makes it anew"
+        return InputError(self.store.files.root, name, found, expected)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -28,9 +28,9 @@ class FileNumbers:
     si: SiScales | None
     """SI values of the model's units; None where they are not known."""
 
-    def change(self, data: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    def change(self, data: dict[str, Any], changes: Mapping[str, Any], keys: Sequence[str]) -> None:
         """Give parameters other values in a file's data: a number, a text with a unit, or None to
-        leave a number of an element out.
+        leave a number of an element out. keys : of the top level, which an error names too.
 
         Raises
         ------
@@ -39,7 +39,8 @@ class FileNumbers:
         model, numbers = self.model, dict[str, float]()
         for name, value in changes.items():
             if name not in model.parameters:
-                raise InputError(None, name, repr(value), one_of(name, model.parameters))
+                known = one_of(name, (*keys, *model.parameters))
+                raise InputError(None, name, repr(value), f"a parameter or a key: {known}")
             if not isinstance(model, LumpedSystem):
                 numbers[name] = self._number(name, value)
             elif name == "b":

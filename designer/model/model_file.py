@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
 from designer.base.json_schema import DIALECT, either, of_tables
-from designer.base.schema import FileTable, checked, line, one_of, such, whole_number
+from designer.base.schema import FileTable, checked, line, such, whole_number
 from designer.base.si_unit import drive_text
 from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
@@ -135,13 +135,10 @@ class ModelFile:
                 for name, value in of_keys.items():
                     put_at(data, name, value)
                 file = self.rewritten(data)
-            for name in of_numbers.keys() - file.model.parameters.keys():
-                known = one_of(name, (*sorted(keys), *file.model.parameters))
-                raise InputError(
-                    None, name, repr(of_numbers[name]), f"a parameter or a key: {known}"
-                )
-            file.numbers.change(data, of_numbers)
-            return self.rewritten(data)
+            if not of_numbers:
+                return file
+            file.numbers.change(data, of_numbers, sorted(keys))
+            return file.rewritten(data)
 
     @property
     def data(self) -> dict[str, Any]:

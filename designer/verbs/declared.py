@@ -149,8 +149,9 @@ class Verb:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "declared", inspect.signature(self.function))
+        names = self._names
         plain = [
-            parameter.replace(annotation=_type(parameter.annotation, self._names))
+            parameter.replace(annotation=_type(parameter.annotation, names))
             for parameter in self.declared.parameters.values()
         ]
         self.function.__signature__ = self.declared.replace(parameters=plain)  # type: ignore[attr-defined]

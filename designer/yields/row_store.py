@@ -18,8 +18,9 @@ from typing import Any, Generic, TypeVar, get_type_hints
 import pyarrow as pa
 
 from designer.base.atomic_write import appearing
-from designer.base.keyed_store import KeyedStore, Vouch, nobody, quiet
+from designer.base.keyed_store import KeyedStore, Vouch, nobody
 from designer.base.parquet_entry import MOST_ROWS, ParquetForm, Rows
+from designer.base.progress import quiet
 from designer.base.record_check import checked_record
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
