@@ -256,12 +256,20 @@ Bokeh.documents.flatMap((d) => d.roots()).flatMap((root) => [...root.references(
 """
 
 
+SEEN_AND_DRAWN = """(name) => {
+  const figure = document.querySelector(`[data-plot="${name}"]`);
+  figure.scrollIntoView();  // at each look: a plot drawn above moves this one away
+  return figure.matches(".drawn");
+}
+"""
+
+
 def test_plots_are_drawn_with_the_orbits_own_values(report: Loaded) -> None:
     page, data = report.page, plain_report()
     unfolded(page)
     for name in ("portrait 0 0", "portrait 1 0", "stop 0", "yields"):
         figure = page.locator(f'[data-plot="{name}"]')
-        figure.scroll_into_view_if_needed()
+        page.wait_for_function(SEEN_AND_DRAWN, arg=name)
         page.locator(f'[data-plot="{name}"].drawn canvas').first.wait_for()
         assert figure.locator(":scope > .live").get_attribute("aria-label")
         assert not figure.locator("svg[role=img]").first.is_visible()
