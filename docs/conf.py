@@ -2,11 +2,22 @@
 
 Pages are Markdown that reads well in a repository too. What only the code knows is written when
 the site is built: the keys of the model file from their JSON Schema, the command line from its
-help, the Python functions from their docstrings. Warnings are errors.
+help, the Python functions from their docstrings, and each number that names its source.
+Warnings are errors.
+
+A number of a page names its source in a comment right behind it, which no reader sees::
+
+    200<!--=base.defaults.SAMPLES-->               a value of the package ``designer``
+    5<!--=yields.tolerance_study.GROWTH:.0%-->     in a format of Python, without its %
+    0.20<!--=reports/a/b.json#rows.0.error:.2f-->  a value of a report
+
+The build puts the value of the source in the place of the number.
 """
 
 from __future__ import annotations
 
+import json
+import pkgutil
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -37,6 +48,10 @@ smartquotes_action = "qe"  # an option keeps its two hyphens
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 
+_NUMBER = re.compile(
+    r"(?P<stands>-?\d+(?: \d{3})*(?:\.\d+)?(?:e-?\d+)?)"
+    r"(?P<comment><!--=(?P<source>[^\s:>]+)(?::(?P<form>[^\s>]+))?-->)"
+)
 _OUTSIDE = re.compile(r"\[([^\]]+)\]\(\.\./([^)]+)\)")
 _REFERENCE = re.compile(r"#/\$defs/(\w+)")
 _HELP = {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
@@ -45,6 +60,7 @@ _HELP = {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
 
 def setup(site: Sphinx) -> None:
     site.connect("builder-inited", _write_pages)
+    site.connect("builder-inited", _write_numbers)
     site.connect("source-read", _name_files_of_the_repository)
 
 
@@ -59,6 +75,36 @@ def _write_pages(site: Sphinx) -> None:
         page, text = Path(site.srcdir, "reference", f"{name}.md"), "\n".join(lines) + "\n"
         if not page.exists() or page.read_text("utf-8") != text:  # else Sphinx reads it again
             page.write_text(text, "utf-8")
+
+
+def _write_numbers(site: Sphinx) -> None:
+    """The numbers whose source a page names, in the pages that are written by hand."""
+    for page in Path(site.srcdir).glob("*.md"):
+        text = page.read_text("utf-8")
+        filled, found = _NUMBER.subn(lambda one: _number(**one.groupdict()) + one["comment"], text)
+        if found != text.count("<!--="):
+            raise ValueError(f"{page.name}: a source that follows no number")
+        if filled != text:
+            page.write_text(filled, "utf-8")
+
+
+def _number(source: str, form: str | None, **_: str) -> str:
+    """The value of a source as a page writes it.
+
+    Raises:
+        ValueError, KeyError: the source is not there, or is no number.
+    """
+    if source.startswith("reports/"):
+        file, _, keys = source.partition("#")
+        value = json.loads((Path(__file__).parents[1] / file).read_text("utf-8"))
+        for key in keys.split("."):
+            value = value[int(key) if isinstance(value, list) else key]
+    else:
+        value = pkgutil.resolve_name(f"designer.{source}")
+    if form is None:
+        form = "_" if value >= 10_000 else "g"
+    written = format(value, form).replace("_", " ").removesuffix("%")
+    return re.sub(r"e[+]?(-?)0*", r"e\1", written)
 
 
 def _commands() -> Iterator[str]:

@@ -8,21 +8,14 @@ from pathlib import Path
 import pytest
 
 from designer.base import defaults, design_folder
-from designer.base.progress import SILENCE
 from designer.bifurcations import parameter_map
 from designer.board.bom_layouts import file_of
-from designer.centering import ngspice_check, operating_points
 from designer.cli import command_line
 from designer.dynamics.steady_state import TransientSettings
 from designer.folders import board_files
 from designer.folders.study_cache import CACHE
-from designer.jobs import bifurcation_request, trade_job
-from designer.model import mechanics, si_units
+from designer.jobs import trade_job
 from designer.model.board_table import BoardSpec
-from designer.spice import numerics_gate
-from designer.verdicts import cross_check, ngspice_runs
-from designer.verdicts.verdict import BLOCK
-from designer.yields import blame_replay, layers, tolerance_study, worst_corner
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTRACT = (DOCS / "contract.md").read_text("utf-8")
@@ -74,56 +67,6 @@ def test_the_defaults_of_the_library_are_those_of_the_commands() -> None:
 
     assert TradeExtent().boards == defaults.TRADE_BOARDS
     assert (Options().samples, Options().seed) == (defaults.SAMPLES, defaults.SEED)
-
-
-SAID: list[tuple[str, str, object]] = [
-    ("contract.md", r"exact circuit, in blocks of (\d+)", BLOCK),
-    ("contract.md", r"about samples, in blocks of (\d+)", layers.CHUNK),
-    ("contract.md", r"their rows, in blocks of (\d+)\b", layers.SEARCH),
-    ("contract.md", r"`omega` is from ([\d.]+) to", mechanics.SLOWEST),
-    ("contract.md", r"`omega` is from [\d.]+ to (\d+)\.", mechanics.FASTEST),
-    ("contract.md", r"above (\d+) times the model's highest", si_units.FAR_ABOVE),
-    ("contract.md", r"at least every (\w+) seconds", {10.0: "ten"}[SILENCE]),
-    ("trade.md", r"spread \((\d+) of each response if", defaults.TRADE_BOARDS),
-    ("tolerance.md", r"`--samples N` says it, (\d+) if", defaults.SAMPLES),
-    ("tolerance.md", r"of the first (\d+) boards of each", cross_check.OWN_SAMPLES),
-    ("tolerance.md", r"- the first (\d+) boards of each", cross_check.NOMINAL_SAMPLES),
-    ("tolerance.md", r"the (\d+) boards that are nearest", cross_check.BOUNDARY_SAMPLES),
-    ("tolerance.md", r"up to (\d+) periods are run", ngspice_runs.MOST_PERIODS),
-    ("tolerance.md", r"in blocks of (\d+) until", BLOCK),
-    ("tolerance.md", r"ngspice are added (\d+) at a time", tolerance_study.MORE_NOMINAL),
-    ("tolerance.md", r"asked about (\d+) boards of each", tolerance_study.MOST_NOMINAL),
-    ("tolerance.md", r"(\d+) % of what is there", round(100 * tolerance_study.GROWTH)),
-    ("ngspice.md", r"A way of more than (\d+) periods", ngspice_runs.MOST_PERIODS),
-    ("ngspice.md", r"more steps than ([\d ]+) periods", ngspice_runs.MOST_AGAIN),
-    ("ngspice.md", r"`discarded_periods`\), at most (\d+)", numerics_gate.MOST_DISCARDED),
-    ("blame.md", r"The first (\d+) lost boards of a response", blame_replay.LOST),
-    ("blame.md", r"of up to (\d+) boards that were ok", blame_replay.KEPT),
-    ("blame.md", r"on (\d+) base samples", worst_corner.CUBE),
-    ("design-search.md", r"scanned with (\d+) boards", operating_points.SCAN),
-    ("design-search.md", r"again with (\d+), and around", operating_points.SOME),
-    ("design-search.md", r"with (\d+) boards as long as", operating_points.MANY),
-    ("design-search.md", r"about those of (\d+) boards", ngspice_check.LISTENED),
-    ("bifurcations.md", r"At each value (\d+) drive periods", TransientSettings().settle),
-    ("bifurcations.md", r"and (\d+) are shown \(`--keep`\)", TransientSettings().keep),
-    ("bifurcations.md", r"from rest, (\d+) periods left out", parameter_map.COURSE.settle),
-    ("bifurcations.md", r"left out and (\d+) looked at", parameter_map.COURSE.keep),
-    ("bifurcations.md", r"deflections, (\d+) × ", bifurcation_request.BASIN_STEPS),
-    ("bifurcations.md", r"has (\d+) million points at most", bifurcation_request.MOST_CELLS / 1e6),
-]
-"""Page, what it says (the number in a group), and what the code has."""
-
-
-@pytest.mark.parametrize(("page", "pattern", "value"), SAID)
-def test_a_number_in_the_docs_is_the_code_s(page: str, pattern: str, value: object) -> None:
-    text = re.sub(r"\s+", " ", (DOCS / page).read_text("utf-8"))
-    found = re.findall(pattern, text)
-    assert found, f"{page} does not say it so any more"
-    for said in found:
-        if isinstance(value, str):
-            assert said == value
-        else:
-            assert float(said.replace(" ", "")) == value
 
 
 @pytest.mark.parametrize(
