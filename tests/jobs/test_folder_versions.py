@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from designer.base.version import __version__
 from designer.cli import entry as cli
 from designer.folders import design_source
 from designer.folders.design_source import read_design
@@ -22,6 +23,7 @@ from tests.shared.stopped_work import work_stopped
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 STORED = sorted((Path(__file__).parent / "folders").glob("*/*.zip"))
+OF_THIS_VERSION = [path for path in STORED if path.parent.name == __version__]
 STUDY = "--rung exact --map grade"
 VERBS = {
     "export": "export {}",
@@ -70,7 +72,26 @@ def document(path: Path) -> dict[str, Any]:
 
 
 def test_every_format_of_model_files_is_stored() -> None:
-    assert {path.stem for path in STORED} == {"format-1", "format-2"}
+    """Of each version; ``scripts/store-folders`` stores this one's when its number changes."""
+    for version in {path.parent for path in STORED} | {STORED[0].parents[1] / __version__}:
+        assert {path.stem for path in version.glob("*.zip")} == {"format-1", "format-2"}
+
+
+@pytest.mark.parametrize("archive", OF_THIS_VERSION, ids=lambda path: path.stem)
+def test_a_study_is_answered_as_it_was(
+    archive: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """By the version that made it, where nothing that decides a study is another since."""
+    stored = unpacked(archive, tmp_path / "design")
+    inputs = document(stored / "manifest.json")["stages"]["design"]["inputs"]
+    for module in (design_source, stage_runner, study_job):
+        monkeypatch.setattr(module, "design_inputs", lambda *_: inputs)
+    written = document(stored / "tolerance.json")
+    assert cli.status(["tolerance", str(stored), *STUDY.split(), "--json"]) in (0, 1)
+    assert json.loads(capfd.readouterr().out)["responses"] == written["responses"]
 
 
 def test_the_design_and_the_rows_are_those_that_were_written(stored: Path) -> None:
@@ -97,18 +118,6 @@ def test_every_verb_reads_it(
         assert "--overwrite" in capfd.readouterr().err
         command.append("--overwrite")
     assert cli.status(command) == 130, capfd.readouterr().err
-
-
-def test_a_study_is_answered_as_it_was(
-    stored: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """By this version, where nothing that decides a study is another since."""
-    inputs = document(stored / "manifest.json")["stages"]["design"]["inputs"]
-    for module in (design_source, stage_runner, study_job):
-        monkeypatch.setattr(module, "design_inputs", lambda *_: inputs)
-    written = document(stored / "tolerance.json")
-    assert cli.status(["tolerance", str(stored), *STUDY.split(), "--json"]) in (0, 1)
-    assert json.loads(capfd.readouterr().out)["responses"] == written["responses"]
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "design.json", "model.toml"])
