@@ -5,7 +5,8 @@ A limit of ``yields.margins`` is nominal + Σ slope·ξ; a board is ok while eve
 Its variance is the sum of what the parts contribute, so with the quantile z of the form's own
 distribution (of boards that are drawn: sums of uniform and normal numbers have no common one) the
 demand "P(limit > 0) is at least the target" reads: variance ≤ (nominal/z)², linear in the choice of
-grades. z depends a little on the choice, so it is taken again of each choice that is found.
+grades. z depends a little on the choice, so it is taken again of each choice that is found. Beyond
+the share that the drawn boards show it goes on as a normal distribution's does.
 
 ``trimmer_ways`` has the responses on boards whose trimmers are set: how many boards show them, and
 their margins as functions of what is drawn alone. A trimmer that is set is set for every response,
@@ -23,25 +24,31 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from designer.base.arrays import Array
 from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch
 from designer.centering.cure_couplings import couplings, finest
-from designer.centering.cure_measure import VerdictCache, questions_of
+from designer.centering.cure_measure import VerdictCache, is_rare, questions_of
 from designer.centering.cure_milp import CureProgram, Demand, Option, Slot
 from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
 from designer.centering.cure_ways import FEW, SAMPLES, ResponseSurvey, ResponseWay, foretold
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
-from designer.spread.board_quantities import column
+from designer.spread.board_quantities import between, column
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
-from designer.verdicts.verdict import StudyPlan
+from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
 from designer.yields import margins
 from designer.yields.margins import Margin
 from designer.yields.trimmed_yield import HIGH, LOW, DcTrim, trimmed_boards
 
+SHOWN = 4
+"""Of the boards drawn, the fewest by which a share is read off."""
+WIDER, ENOUGH_LOST = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0), 0.05
+"""How much farther off boards are that show where a response is lost that hardly one of them loses
+as they are, and the share of them that has to lose it."""
 FITTED = 1000
 """Boards from which is learnt what moves the wiper."""
 
@@ -234,8 +241,8 @@ class LinearModel:
                 continue
             nearer = 1.0 - factors.get((way.response, w), 1.0) ** 0.5
             away = np.array([nearer * limit.distance for limit in way.margin.limits])
-            fine = (way.margin.each(boards) > away).all(axis=1) if len(away) else np.ones(1)
-            out.append(float(fine.mean()))
+            form = (way.margin.each(boards) - away).min(axis=1) if len(away) else np.ones(1)
+            out.append(share_above(form))
         return tuple(out)
 
     def quantiles(self, target: float, boards: Boards) -> dict[tuple[int, int, int], float]:
@@ -317,7 +324,26 @@ def _quantile(form: Array, target: float) -> float:
     size = float(form.std())
     if size == 0.0:
         return 1e-6
-    return max(-float(np.quantile(form, 1.0 - target)) / size, 1e-6)
+    return max(-tail_quantile(form, 1.0 - target) / size, 1e-6)
+
+
+def tail_quantile(form: Array, share: float) -> float:
+    """The value that ``share`` of a form's distribution lies below, by drawn values (N,); below a
+    share of ``SHOWN`` of them by a normal distribution through their median and that share."""
+    shown = SHOWN / len(form)
+    if share >= shown:
+        return float(np.quantile(form, share))
+    middle, lowest = np.median(form), np.quantile(form, shown)
+    return float(middle + (lowest - middle) * ndtri(share) / ndtri(shown))
+
+
+def share_above(form: Array) -> float:
+    """The share of a form's distribution above 0, as ``tail_quantile`` has it."""
+    below = int((form <= 0.0).sum())
+    middle, lowest = np.median(form), np.quantile(form, min(SHOWN / len(form), 0.5))
+    if below > SHOWN or lowest >= middle:
+        return 1.0 - below / len(form)
+    return float(ndtr(middle / (lowest - middle) * ndtri(SHOWN / len(form))))
 
 
 def picture(
@@ -388,27 +414,30 @@ def picture(
         for w, way in enumerate(row)
         if (unchanged and w == 0) or not (out or _needs_no_picture(way, rows, target))
     ]
-    return pictured(bare, which, jobs, progress)
+    return pictured(bare, which, target, jobs, progress)
 
 
 def _needs_no_picture(
     way: ResponseWay, rows: Sequence[Sequence[ResponseWay]], target: float
 ) -> bool:
     """Whether a way is taken as it was seen, or not at all. The trimmer is, where it is enough for
-    every response."""
+    every response. That no board was lost of the few that were looked at says nothing of a rare
+    loss."""
     if way.kind == TRIMMER:
         every = [w.rate for row in rows for w in row if w.kind == TRIMMER]
         return min(every) >= target
-    return way.certain or way.hopeless or way.kind == TRIM
+    return (way.certain and not is_rare(target)) or way.hopeless or way.kind == TRIM
 
 
 def pictured(
     model: LinearModel,
     which: Sequence[tuple[int, int]],
+    target: float,
     jobs: int,
     progress: Callable[[], None] = lambda: None,
 ) -> LinearModel:
-    """The same with margins of these ways (response, way)."""
+    """The same with margins of these ways (response, way). target : the yield that is wanted; where
+    losses are to be rare, they are sought on boards that are farther off."""
     synthesis = model.branch.synthesis
     circuit = synthesis.design.circuit
     spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)
@@ -426,21 +455,14 @@ def pictured(
             )
         else:
             boards = draw_many(circuit, spread, model.seed, range(SAMPLES))
-            answers = []
+            new_margins = []
             for question in questions:
-                answers.append(foretold(boards, question, jobs))
+                asked, answers = _with_losses(boards, question, is_rare(target), jobs)
                 progress()
-            new_margins = list(
-                margins.margins(
-                    circuit,
-                    questions,
-                    boards,
-                    answers,
-                    count=CROSSINGS,
-                    jobs=jobs,
-                    progress=progress,
-                )
-            )
+                new_margins += margins.margins(
+                    circuit, [question], boards, [answers], asked=asked, count=CROSSINGS,
+                    jobs=jobs, progress=progress,
+                )  # fmt: skip
         margin_of.update(zip(some, new_margins, strict=True))
     ways = tuple(
         tuple(
@@ -450,6 +472,20 @@ def pictured(
         for r, row in enumerate(model.ways)
     )
     return replace(model, ways=ways)
+
+
+def _with_losses(
+    boards: Boards, question: Question, rare: bool, jobs: int
+) -> tuple[Boards, list[Answer]]:
+    """These boards and what becomes of them; where losses are rare, the same boards farther off
+    from the nominal one, as far as some of them lose the response."""
+    asked, answers = boards, foretold(boards, question, jobs)
+    for wider in WIDER[1:] if rare else ():
+        if sum(a.verdict is Verdict.LOST for a in answers) >= ENOUGH_LOST * len(answers):
+            break
+        asked = between(boards, np.full(len(boards), wider))
+        answers = foretold(asked, question, jobs)
+    return asked, answers
 
 
 def _ratios(

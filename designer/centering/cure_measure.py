@@ -1,10 +1,11 @@
 """The studies of a cure: fresh boards, as many as it takes to tell on which side of the target a
-yield is. They are stored, so that interrupted work goes on."""
+yield is. Where so few may be lost that counting does not tell, they are drawn where they are lost
+(``yields.rare_losses``). All are stored, so that interrupted work goes on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from designer.model.tuning_bands import Bands
 from designer.spread.part_rules import spread_of
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
+from designer.yields.rare_losses import rare_losses
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
 from designer.yields.tuned_yield import benched_block
@@ -32,6 +34,24 @@ TAG = 0xC04E
 """Sets the boards of a cure apart from those of a study with the same seed."""
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
+_RARE = "rare"
+"""In the place of a block's number: what was estimated of a study."""
+
+
+@dataclass(frozen=True)
+class RareShare:
+    """The share of boards that lose a response, from boards drawn where they are lost."""
+
+    lost: float
+    """The estimate."""
+    low: float
+    """Lower end of its 95 % interval."""
+    high: float
+    """Upper end; where no board was lost, ``unseen``."""
+    unseen: float
+    """A region that no search met may hold this share at most, by 95 %."""
+    boards: int
+    """Boards that were asked."""
 
 
 def study_seed(seed: int, number: int) -> int:
@@ -66,11 +86,11 @@ class VerdictCache:
 
     def __init__(
         self,
-        studies: Mapping[str, Mapping[str, str]] | None = None,
+        studies: Mapping[str, Mapping[str, Any]] | None = None,
         save: Callable[[dict[str, Any]], None] = lambda _: None,
     ) -> None:
         self._known = {
-            study: {place: letters for place, letters in blocks.items() if _are_verdicts(letters)}
+            study: {place: found for place, found in blocks.items() if _is_stored(place, found)}
             for study, blocks in (studies or {}).items()
         }
         self._save = save
@@ -105,9 +125,27 @@ class VerdictCache:
         self._save({"format": 1, "studies": self._known})
         return letters, True
 
+    def rare(self, plan: StudyPlan, jobs: int, progress: Callable[[], None]) -> RareShare:
+        """How many boards of a plan of one question lose the response, estimated once."""
+        study = self._known.setdefault(study_hash(plan, "samples"), {})
+        if _RARE not in study:
+            found = rare_losses(plan, 0, jobs=jobs, progress=progress)
+            boards = found.boards + found.pilots
+            share = RareShare(found.lost, found.low, found.high, found.unseen, boards)
+            study[_RARE] = asdict(share)
+            self._save({"format": 1, "studies": self._known})
+        return RareShare(**study[_RARE])
 
-def _are_verdicts(letters: object) -> bool:
-    return isinstance(letters, str) and set(letters) <= set(_LETTERS.values())
+
+def _is_stored(place: str, found: object) -> bool:
+    if place == _RARE:
+        names = {field.name for field in fields(RareShare)}
+        numbers = isinstance(found, Mapping) and all(
+            isinstance(value, int | float) and 0.0 <= value < float("inf")
+            for value in found.values()
+        )
+        return numbers and isinstance(found, Mapping) and set(found) == names
+    return isinstance(found, str) and set(found) <= set(_LETTERS.values())
 
 
 @dataclass(frozen=True)
@@ -118,21 +156,34 @@ class MeasuredYield:
     """Counts of boards and of those that keep the response."""
     target: float
     """The yield that is wanted."""
+    rare: RareShare | None = None
+    """What was estimated beyond the counts."""
 
     @property
     def rate(self) -> float:
         """The yield; 0 where nothing was decided."""
+        if self.rare is not None:
+            return 1.0 - self.rare.lost
         return self.counts.rate if self.counts.samples > self.counts.failed else 0.0
 
     @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the yield's 95 % interval."""
+        if self.rare is not None:
+            return 1.0 - self.rare.high, 1.0 - self.rare.low
+        return self.counts.interval
+
+    @property
     def reached(self) -> bool:
-        """The whole interval is at the target or above."""
-        return self.counts.interval[0] >= self.target
+        """The whole interval is at the target or above, or no board was lost of those that were
+        drawn towards the losses."""
+        none_lost = self.rare is not None and self.rare.lost == 0.0
+        return none_lost or self.interval[0] >= self.target
 
     @property
     def missed(self) -> bool:
         """The whole interval is below the target."""
-        return self.counts.interval[1] < self.target
+        return self.interval[1] < self.target
 
     @property
     def decided(self) -> bool:
@@ -141,8 +192,9 @@ class MeasuredYield:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        low, high = self.counts.interval
-        y = self.counts
+        low, high = self.interval
+        y, rare = self.counts, self.rare
+        more = {} if rare is None else {"rare": asdict(rare)}
         return {
             "ok": y.ok,
             "lost": y.lost,
@@ -152,7 +204,14 @@ class MeasuredYield:
             "rate": y.rate,
             "low": low,
             "high": high,
+            **more,
         }
+
+
+def is_rare(target: float) -> bool:
+    """Whether so few boards may be lost that no count of ``MOST`` shows that the target is reached,
+    though none of them is lost."""
+    return not MeasuredYield(Yield(MOST, 0, 0, 0), target).reached
 
 
 def measure(
@@ -201,7 +260,8 @@ def measure_together(
     """The yields of several responses that all have to reach the target.
 
     One block of boards each. Once a response has missed the target the choice is out, whatever
-    becomes of the others: only those that miss it are asked on more boards, for their share.
+    becomes of the others: only those that miss it are asked on more boards, for their share. Where
+    the target is rare (``is_rare``), the share of what none of the block has lost is estimated.
 
     plans : each with what its boards are trimmed by (``VerdictCache.block``), None: as built; None
     where there is no response to ask for, which misses.
@@ -212,8 +272,13 @@ def measure_together(
             out = None in plans or any(m.missed for m in measured)
             if most > BLOCK and out and not measured[k].missed:
                 continue
-            if study is not None:
-                plan, trim = study
+            if study is None:
+                continue
+            plan, trim = study
+            if most > BLOCK and is_rare(target) and not measured[k].missed:
+                assert trim is None, "boards that are trimmed are counted"
+                measured[k] = replace(measured[k], rare=book.rare(plan, jobs, progress))
+            else:
                 measured[k] = measure(
                     plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
                     progress=progress,

@@ -59,7 +59,7 @@ def front_chart(cure: Cure) -> Figure:
 def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[float]) -> float:
     """The points of the front over ``along``; the lowest yield that is drawn [%]."""
     rates = [100.0 * t.worst.rate for t in front]
-    ends = [t.worst.counts.interval for t in front]
+    ends = [t.worst.interval for t in front]
     bars = [
         [max(r - 100.0 * low, 0.0) for r, (low, _) in zip(rates, ends, strict=True)],
         [max(100.0 * high - r, 0.0) for r, (_, high) in zip(rates, ends, strict=True)],

@@ -55,7 +55,7 @@ def front_csv(cure: Cure) -> str:
     """The front of yield against price: the yield is that of the worst response."""
     rows = []
     for t in cure.front:
-        low, high = t.worst.counts.interval
+        low, high = t.worst.interval
         rows.append(
             {
                 "price_euro": f"{t.price:.4g}",

@@ -16,14 +16,15 @@ import numpy as np
 
 from designer.base.defaults import cores
 from designer.base.progress import Progress, best_so_far, seeking
-from designer.centering.cure_branch import TRIMMER, CureBranch, Refused, branches
+from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch, Refused, branches
 from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import LinearModel, picture, pictured
+from designer.centering.cure_linear_model import LinearModel, picture, pictured, tail_quantile
 from designer.centering.cure_measure import (
     FIRST,
     MOST,
     MeasuredYield,
     VerdictCache,
+    is_rare,
     measure,
     measure_together,
     plan_of,
@@ -75,9 +76,11 @@ def find_cure(
 ) -> Cure:
     """Search, in memory.
 
-    target : yield that the whole 95 % interval of every response is to reach. budget : most that
-    upgrades may cost [euro]. trim : half-width of the band of the generator's DC offset. without :
-    kinds of upgrades that are not wanted (``cure_branch.KINDS``). book : verdicts that are known.
+    target : yield that the whole 95 % interval of every response is to reach. Where so few may be
+    lost that counting does not tell (``is_rare``), losses are estimated, of boards as built: none
+    is trimmed. budget : most that upgrades may cost [euro]. trim : half-width of the band of the
+    generator's DC offset. without : kinds of upgrades that are not wanted (``cure_branch.KINDS``).
+    book : verdicts that are known.
 
     Raises
     ------
@@ -87,6 +90,8 @@ def find_cure(
     progress = Progress() if progress is None else progress
     book = VerdictCache() if book is None else book
     threads = cores() if jobs is None else jobs
+    if is_rare(target):
+        without, trim = without | {TRIM, TRIMMER}, 0.0
     search = _Search(base, target, budget, trim, without, seed, threads, book, progress)
     with seeking("cure"):
         return search.run()
@@ -135,15 +140,32 @@ class _Search:
             name = f"round {number + 1}"
             trial = self._trial(which, pick, predicted, 2 + number, name)
             if trial.reached:
-                # Boards were drawn until the target was reached, which favours it. The verdict is
-                # that of other boards, of a number fixed beforehand.
-                again = 2 + ROUNDS + number
-                trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
+                trial = self._confirmed(which, pick, predicted, number, name)
             rounds.append(trial)
             if trial.reached:
                 return self._answer(before, rounds, True, "measured on fresh boards")
             self._learn(which, pick, trial)
         return self._answer(before, rounds, False, f"not within {ROUNDS} rounds")
+
+    def _confirmed(
+        self,
+        which: int,
+        pick: Sequence[int],
+        predicted: tuple[float, ...],
+        number: int,
+        name: str,
+    ) -> Trial:
+        """The verdict on a choice that was measured to be enough.
+
+        Boards were drawn until the target was reached, which favours it. The verdict is that of
+        other boards, of a number fixed beforehand; where the target is rare, these only refute, and
+        an estimate with another seed decides."""
+        again = 2 + ROUNDS + number
+        trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
+        if not is_rare(self.target) or any(m.missed for m in trial.measured):
+            return trial
+        again += ROUNDS
+        return self._trial(which, pick, predicted, again, f"{name}, with another seed")
 
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
@@ -347,14 +369,14 @@ class _Search:
             w = pick[len(model.parts) + r]
             if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
                 step = self.progress.stage(f"linear picture, {model.branch.name}: response {r + 1}")
-                model = pictured(model, [(r, w)], self.jobs, step)
+                model = pictured(model, [(r, w)], self.target, self.jobs, step)
                 self.pictures[which] = model
                 way = model.ways[r][w]
             if way.margin is None or not way.margin.limits:
                 self.spoiled.add((which, r, w))
                 continue
             # The upper end of the interval: the search approaches the cheapest choice from below.
-            key, rate = (which, r, w), m.counts.interval[1]
+            key, rate = (which, r, w), m.interval[1]
             self.shrink[key] = min(self.shrink.get(key, 1.0), _shrink_factor(way, boards, rate))
 
     def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
@@ -452,7 +474,7 @@ def _shrink_factor(way: ResponseWay, boards: Boards, rate: float) -> float:
     assert way.margin is not None
     form = way.margin.of(boards)
     middle = float(np.median(form))
-    reach = middle - float(np.quantile(form, min(1.0 - rate, 0.5)))
+    reach = middle - tail_quantile(form, min(1.0 - rate, 0.5))
     if middle <= 0.0 or reach >= middle:
         return 1.0
     return max((reach / middle) ** 2, 1.0 / LARGEST_STEP**2)
@@ -460,5 +482,9 @@ def _shrink_factor(way: ResponseWay, boards: Boards, rate: float) -> float:
 
 def _share(measured: MeasuredYield) -> str:
     """A yield with its 95 % interval, in words."""
-    low, high = measured.counts.interval
+    low, high = measured.interval
+    if measured.rare is not None:
+        rare = measured.rare
+        ends = f"({1e6 * rare.low:.3g} to {1e6 * rare.high:.3g})"
+        return f"{1e6 * rare.lost:.3g} of a million lost {ends}"
     return f"{measured.rate:.4f} ({low:.4f} to {high:.4f})"

@@ -13,7 +13,8 @@ def text(answer: Mapping[str, Any]) -> str:
 
     answer : the JSON object of ``cure_json``.
     """
-    percent = f"{100.0 * answer['target']:g} %"
+    percent = f"{100.0 * answer['target']:.8g} %"
+    digits = 4 if answer["target"] < 0.999 else 8
     lines = []
     if answer["reached"]:
         lines.append(f"every response at {percent} or better for {answer['price']:.2f} euro:")
@@ -28,7 +29,7 @@ def text(answer: Mapping[str, Any]) -> str:
         for r, (promised, m) in enumerate(
             zip(trial["predicted"], trial["measured"], strict=True), start=1
         ):
-            lines.append(f"  response {r}: promised {promised:.4f}, measured {_yield(m)}")
+            lines.append(f"  response {r}: promised {promised:.{digits}f}, measured {_yield(m)}")
     lines += ["", "price     worst response          upgrades"]
     for trial in answer["front"]:
         worst = min(trial["measured"], key=lambda m: (_rate(m), m["low"]))
@@ -62,5 +63,8 @@ def _rate(m: Mapping[str, Any]) -> float:
 def _yield(m: Mapping[str, Any]) -> str:
     if m["rate"] is None:
         return "not shown"
+    if rare := m.get("rare"):
+        low, high = 1e6 * rare["low"], 1e6 * rare["high"]
+        return f"{1e6 * rare['lost']:.3g} of a million lost ({low:.3g} to {high:.3g})"
     text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
     return text + (f", {m['failed']} failed" if m["failed"] else "")

@@ -31,7 +31,7 @@ class Trial:
     @property
     def worst(self) -> MeasuredYield:
         """Of the response that the fewest boards show."""
-        return min(self.measured, key=lambda m: (m.rate, m.counts.interval))
+        return min(self.measured, key=lambda m: (m.rate, m.interval))
 
     @property
     def reached(self) -> bool:

@@ -25,7 +25,7 @@ from designer.base.progress import Progress
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
 from designer.centering.cure_branch import KINDS, cured, kind_named
-from designer.centering.cure_measure import VerdictCache
+from designer.centering.cure_measure import VerdictCache, is_rare
 from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
@@ -48,7 +48,7 @@ CURE, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
 """How the studies are written: each by its hash, which says all that decides it."""
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
-RULES = 5
+RULES = 6
 """Raised whenever the same inputs are to give another answer."""
 
 
@@ -86,6 +86,7 @@ def cure(
     folder: Path | str,
     *,
     yield_: float | None = None,
+    ppm: float | None = None,
     budget: float | None = None,
     without: Collection[str] = (),
     out: Path | str | None = None,
@@ -98,18 +99,22 @@ def cure(
     """The verb ``search --yield``: the cheapest cure of a design folder, which is written there.
 
     ``yield_`` : of every wanted response, as built (trimmed where the cure says so): the lower end
-    of its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by the
-    catalogue's price classes. without : kinds of upgrades that are not wanted; a hyphen may stand
-    for a space. out : folder for the cured design. What is not given is that of the folder's own
-    cure, if there is one; with ``overwrite`` its budget and its kinds are not taken over.
+    of its 95 % interval on fresh boards. ppm : the same as the boards of a million that may lose a
+    response; losses that are too rare to be counted are estimated (``rare_losses``). budget : most
+    that the upgrades may cost, in euro by the catalogue's price classes. without : kinds of
+    upgrades that are not wanted; a hyphen may stand for a space. out : folder for the cured design.
+    What is not given is that of the folder's own cure, if there is one; with ``overwrite`` its
+    budget and its kinds are not taken over.
 
     Raises
     ------
-    InputError : no yield is given and the folder has no cure; the yield or the budget is none; an
-        unknown kind; the folder is no design folder, or holds a cure of other inputs, or ``out``
-        holds a design, and nothing is said about what to do.
+    InputError : no yield is given and the folder has no cure, or it is given twice; the yield or
+        the budget is none; an unknown kind; the folder is no design folder, or holds a cure of
+        other inputs, or ``out`` holds a design, and nothing is said about what to do.
     """
     path = Path(folder)
+    if ppm is not None:
+        yield_ = _yield_of(ppm, yield_)
     limits = () if overwrite else ("budget", "without")
     defaults: dict[str, Any] = {}
     if is_design_folder(path):
@@ -153,6 +158,11 @@ def cure_into(
         Folder(out)  # refuses a place where something else stands
     base = read_design(path, progress=progress)
     need_responses(base.modelfile)
+    listed = base.modelfile.measured
+    if listed is not None and listed.labels and is_rare(target):
+        expected = "no list of measured boards, which are as many as there are"
+        found = f"{len(listed.labels)} boards"
+        raise InputError(base.modelfile.source, "spread.measured", found, expected)
     with errors_in(base.modelfile):
         need_periods(base.modelfile.responses)
     folder = Folder(path)
@@ -268,6 +278,16 @@ def _write_design(
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         with other_process(options.workers) as other:
             write_design(folder, synthesis, stages, options, progress, other)
+
+
+def _yield_of(ppm: float, yield_: float | None) -> float:
+    """The yield where so many boards of a million may be lost."""
+    if yield_ is not None:
+        raise InputError(None, "--ppm", ppm, "no --yield beside it: both say what may be lost")
+    if not 0.01 <= ppm < 1e6:
+        expected = "boards of a million that may be lost, from 0.01, such as 10"
+        raise InputError(None, "--ppm", ppm, expected)
+    return 1.0 - 1e-6 * ppm
 
 
 def _checked(target: float, budget: float | None, without: Collection[str]) -> frozenset[str]:

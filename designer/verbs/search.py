@@ -35,6 +35,10 @@ def search(
     yield_: Annotated[
         float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
     ] = None,
+    ppm: Annotated[
+        float | None,
+        option("--ppm", "N", "Cure this design folder: boards of a million that may be lost."),
+    ] = None,
     budget: Annotated[
         float | None, option("--budget", "PRICE", "The most that a cure may cost.")
     ] = None,
@@ -59,7 +63,7 @@ def search(
     resume: Resume = False,
     progress: Progress | None = None,
 ) -> JobOutcome | CureResult:
-    """Find the design of the highest yield; with --yield, the cheapest cure of a design folder.
+    """Find the design of the highest yield; with --yield or --ppm, the cheapest cure of a folder.
 
     A model file is searched, and written into ``out``. A design folder is cured, as ``cure`` does
     it.
@@ -82,6 +86,7 @@ def search(
         return cure_job.cure(
             path,
             yield_=yield_,
+            ppm=ppm,
             budget=budget,
             without=without,
             out=out,
@@ -96,7 +101,7 @@ def search(
     from designer.jobs.options import Options, stated_options
 
     expected = "a design folder to cure; a model file gets its highest yield"
-    _refuse({"--yield": yield_, "--budget": budget, "--without": without}, expected)
+    _refuse({"--yield": yield_, "--ppm": ppm, "--budget": budget, "--without": without}, expected)
     words = {"samples": samples, "seed": seed}
     options = Options(jobs=jobs, overwrite=overwrite, resume=resume, rung=rung or "auto")
     options = replace(options, **{"samples": SEARCH_SAMPLES} | stated_options(words))

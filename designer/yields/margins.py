@@ -153,6 +153,7 @@ def margins(
     boards: Boards,
     answers: Sequence[Sequence[Answer]],
     *,
+    asked: Boards | None = None,
     count: int = CROSSINGS,
     only: Collection[tuple[int, int]] | None = None,
     jobs: int = 1,
@@ -162,18 +163,21 @@ def margins(
     """The margin of each question; without limits where no n-p-q is wanted.
 
     boards : drawn of the spread; answers : of each question, what became of board ``sample``.
+    asked : the boards that the answers speak of, where it is others than ``boards``, such as boards
+    farther off, of which more are lost: standard deviations are those of ``boards`` all the same.
     count : crossings sought for each question. only : of those the ones that are sought, as
     (question, sample); all of them if None. progress : called once an attractor or followed
     orbit. parts : the known ones, and where the others go.
     """
     differing = quantities(circuit, boards)
+    asked = boards if asked is None else asked
     parts = StoredParts() if parts is None else parts
     lost = [
         pair
         for pair in lost_boards(answers, count)
         if questions[pair[0]].periodic and (only is None or pair in only)
     ]
-    crossed = _stored_crossings(boards, lost, questions, parts, jobs, progress)
+    crossed = _stored_crossings(asked, lost, questions, parts, jobs, progress)
     nominal = replace(Boards.of(circuit, [nominal_board(circuit)]), bandwidth=boards.bandwidth)
     probes = _probes(nominal, differing)
     limits: list[list[Limit]] = []
@@ -186,14 +190,14 @@ def margins(
         limits.append(list(counted(parts, f"nominal {number}", progress, compute)))
     for crossing in crossed:
         question = questions[crossing.question]
-        compute_one = partial(_crossing_limit, crossing, question, boards, differing, jobs)
+        compute_one = partial(_crossing_limit, crossing, question, asked, boards, differing, jobs)
         name = f"limit {crossing.question} {crossing.board}"
         limit = counted(parts, name, progress, compute_one)
         if limit is not None:
             limits[crossing.question].append(limit)
     out = []
     for number, row in enumerate(answers):
-        margin = _foretelling(Margin(differing, tuple(limits[number])), boards, row)
+        margin = _foretelling(Margin(differing, tuple(limits[number])), asked, row)
         sought = [c for c in crossed if c.question == number]
         out.append(replace(margin, sought=len(sought), there=sum(c.there for c in sought)))
     return tuple(out)
@@ -380,6 +384,7 @@ def _nominal_limits(
 def _crossing_limit(
     crossing: Crossing,
     question: Question,
+    asked: Boards,
     boards: Boards,
     differing: tuple[Quantity, ...],
     jobs: int,
@@ -388,7 +393,7 @@ def _crossing_limit(
     """The limit that ends the response on the way to this board; None where none is seen."""
     if crossing.there or crossing.inside == 0.0:
         return None
-    lost = boards.take([crossing.board, crossing.board])
+    lost = asked.take([crossing.board, crossing.board])
     shares = np.array([BACK * crossing.inside, crossing.inside])
     near = between(lost, shares)
     base = _Base(near.take([0]), question, crossing.orbit)
@@ -407,7 +412,7 @@ def _crossing_limit(
     if first is None:
         return None
     slopes = _gradients(base, [first[1]], _probes(base.board, differing), jobs, progress)[0]
-    row = boards.take([crossing.board])
+    row = asked.take([crossing.board])
     way = np.array([float((column(row, q)[0] - q.nominal) / q.sigma) for q in differing])
     limit = _limit(first[1], -end * float(np.sum(slopes * way)), slopes, differing, boards)
     return None if limit is None else replace(limit, board=crossing.board)

@@ -10,13 +10,15 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from designer.base.defaults import StudyEngine
 from designer.base.errors import InputError
@@ -26,7 +28,7 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.centering import cure_measure, cure_search
 from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import LinearModel
+from designer.centering.cure_linear_model import LinearModel, share_above, tail_quantile
 from designer.centering.cure_measure import MeasuredYield, VerdictCache, measure, measure_together
 from designer.centering.cure_milp import cheapest
 from designer.centering.cure_plots import front_chart
@@ -37,8 +39,9 @@ from designer.centering.cure_table import text
 from designer.centering.cure_trial import Cure
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.cure_ways import ResponseWay, best_place
+from designer.circuit.netlist import Circuit
 from designer.jobs import rung_choice
-from designer.jobs.cure_job import CURE, STUDIES, cure_into
+from designer.jobs.cure_job import CURE, STUDIES, cure, cure_into
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
@@ -122,6 +125,22 @@ def test_the_quantile_is_that_of_the_drawn_form() -> None:
     assert 1.6 < z < 1.9  # a normal form's is 1.88; one uniform part's 1.63
 
 
+def test_beyond_what_boards_show_a_tail_is_a_normal_s() -> None:
+    """SciPy's normal distribution is the truth; what boards show is read off them."""
+    form = np.random.default_rng(5).normal(size=4000)
+    for share in (1e-4, 1e-5, 1e-6):
+        z = norm.ppf(share)
+        assert tail_quantile(form, share) == pytest.approx(z, rel=0.06)
+        # A shift by z leaves this share below 0: to 0.2 of a standard deviation.
+        assert norm.isf(1.0 - share_above(form - z)) == pytest.approx(-z, abs=0.2)
+    for share in (0.001, 0.01, 0.3):
+        assert tail_quantile(form, share) == np.quantile(form, share)
+        shifted = form - np.quantile(form, share)
+        assert share_above(shifted) == pytest.approx(1.0 - share, abs=5e-4)
+    assert share_above(np.ones(1)) == 1.0
+    assert share_above(-np.ones(9)) == 0.0
+
+
 def truth(nominal: float, otherwise: bool = False) -> Any:
     """What a study measures where the limit is known: boards are ok where it is positive."""
 
@@ -150,6 +169,7 @@ def searched(
     real: Any,
     budget: float | None = None,
     progress: Progress | None = None,
+    target: float = TARGET,
 ) -> Cure:
     """The search with this picture, where ``real`` is what studies measure."""
     taken = (lambda *_, **__: picture) if isinstance(picture, LinearModel) else picture
@@ -158,7 +178,55 @@ def searched(
     monkeypatch.setattr(cure_measure, "measure", real)  # as measure_together calls it
     monkeypatch.setattr(cure_search, "questions_of", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(cure_search, "branches", lambda *_: iter([branch()]))
-    return find_cure(one_response(), TARGET, budget=budget, seed=1, jobs=1, progress=progress)
+    return find_cure(one_response(), target, budget=budget, seed=1, jobs=1, progress=progress)
+
+
+RARE_TARGET = 1.0 - 3e-4
+DRAWN = 100_000
+
+
+def share_lost(circuit: Circuit, spread: Spread, seed: int, nominal: float) -> float:
+    """How many boards lose the limit that is known, by counting many."""
+    boards = draw_many(circuit, spread, seed, range(DRAWN))
+    return float((known_margin(nominal).of(boards) <= 0.0).mean())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nominal", [12.0, 14.0])
+def test_a_rare_loss_is_cured_for_the_least_price(
+    monkeypatch: pytest.MonkeyPatch, nominal: float
+) -> None:
+    """Against each choice, of which many boards are counted; no choice is taken on plain boards
+    that are too few to tell, and the last estimate is of boards that no other had."""
+    asked: list[int] = []
+
+    def counted(plan: StudyPlan, *_: object, **__: object) -> Any:
+        asked.append(plan.seed)
+        lost = share_lost(plan.circuit, plan.spread, plan.seed, nominal)
+        error = 2.0 * (lost / DRAWN) ** 0.5
+        ends = {"low": max(lost - error, 0.0), "high": lost + error}
+        return SimpleNamespace(lost=lost, **ends, unseen=1e-3, boards=DRAWN, pilots=0)
+
+    def few(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
+        lost = share_lost(plan.circuit, plan.spread, plan.seed, nominal)
+        return MeasuredYield(Yield(250 - round(250 * lost), round(250 * lost), 0, 0), target)
+
+    monkeypatch.setattr(cure_measure, "rare_losses", counted)
+    found = searched(monkeypatch, known_picture(nominal), few, target=RARE_TARGET)
+    assert found.reached
+    (measured,) = found.best.measured
+    assert measured.rare is not None
+    assert measured.rare.high <= 1.0 - RARE_TARGET
+    assert len(set(asked)) == len(asked) >= 2
+    seen = known_picture(nominal)
+    enough = [
+        pick
+        for pick in itertools.product(range(2), repeat=len(seen.parts))
+        if share_lost(*seen.spread((*pick, 0)), 11, nominal) <= 1.0 - RARE_TARGET
+    ]
+    program = seen.program({(0, 0, 0): 1.0}, {})
+    assert found.best.price == pytest.approx(min(program.price((*p, 0)) for p in enough))
+    assert "of a million lost" in text(cure_json(found, {}, 0.0))
 
 
 @pytest.mark.slow
@@ -291,12 +359,51 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
         assert blocks == [250]
 
 
-def coins(monkeypatch: pytest.MonkeyPatch, asked: list[tuple[int, range]]) -> None:
-    """Boards of which a known share is ok: 0.3 of seed 1, 0.96 of seed 4, 0.999 of any other."""
+def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What was estimated is kept; what is kept and damaged is estimated anew."""
+    asked: list[tuple[int, range]] = []
+    estimated: list[int] = []
+
+    def few(plan: StudyPlan, *_: object, **__: object) -> Any:
+        estimated.append(plan.seed)
+        ends = {"low": 2e-6, "high": 8e-6 if plan.seed == 5 else 8e-5}
+        return SimpleNamespace(lost=5e-6, **ends, unseen=1e-3, boards=2000, pilots=500)
+
+    monkeypatch.setattr(cure_measure, "rare_losses", few)
+    coins(monkeypatch, asked, 1.0)
+    kept: dict[str, Any] = {}
+    fine, other, out = (
+        (replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (5, 6, 1)
+    )
+    book = VerdictCache(save=kept.update)
+    good, open_ = measure_together([fine, other], 1.0 - 1e-5, book)
+    assert good.reached
+    assert good.rate == 1.0 - 5e-6
+    assert not open_.reached
+    assert not open_.missed
+    assert estimated == [5, 6]
+    stored = json.loads(json.dumps(kept))["studies"]
+    assert measure_together([fine, other], 1.0 - 1e-5, VerdictCache(stored)) == (good, open_)
+    assert estimated == [5, 6]
+    for damage in ({"lost": "x"}, {**asdict(good.rare), "high": float("nan")}, [], None):
+        strange = {s: {**known, "rare": damage} for s, known in stored.items()}
+        assert measure_together([fine], 1.0 - 1e-5, VerdictCache(strange)) == (good,)
+    assert estimated == [5, 6, 5, 5, 5, 5]
+    lost, waits = measure_together([out, fine], 1.0 - 1e-5, VerdictCache())
+    assert lost.missed
+    assert waits.rare is None
+
+
+def coins(
+    monkeypatch: pytest.MonkeyPatch, asked: list[tuple[int, range]], usual: float = 0.999
+) -> None:
+    """Boards of which a known share is ok: 0.3 of seed 1, 0.96 of seed 4, ``usual`` of others."""
 
     def block(plan: StudyPlan, indices: range, jobs: int) -> list[Any]:
         asked.append((plan.seed, indices))
-        share = {1: 0.3, 4: 0.96}.get(plan.seed, 0.999)
+        share = {1: 0.3, 4: 0.96}.get(plan.seed, usual)
         fine = np.random.default_rng(plan.seed).random(8000) < share
         return [_Row("ok" if fine[i] else "lost") for i in indices]
 
@@ -417,6 +524,10 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
         with pytest.raises(InputError) as refused:
             cure_into(design, **cast(Any, arguments))
         assert refused.value.field == field
+    for words in ({"ppm": 0.0}, {"ppm": 1e6}, {"ppm": float("nan")}, {"ppm": 10, "yield_": 0.9}):
+        with pytest.raises(InputError) as refused:
+            cure(design, **cast(Any, words))
+        assert refused.value.field == "--ppm"
     assert sorted(p.name for p in design.iterdir()) == before
 
 
