@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base.blame_noise import lacks_noise
 from designer.base.si_unit import drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
@@ -176,10 +177,16 @@ def _boards(answer: Mapping[str, Any]) -> None:
 
 
 def blame_status(answer: Mapping[str, Any]) -> None:
-    """One line about a blame that is not whole; none where it is."""
+    """One line about a blame that is not whole, or whose indices an earlier version stored
+    without their noise; none else."""
     status = answer.get("blame") or {}
     if status.get("reason"):
         say(f"Blame {status['status']}: {status['reason']}")
+    if lacks_noise(answer):
+        say(
+            "Blame: the noise of the Sobol indices was not stored; designer tolerance DIR --blame "
+            "--resume works it out"
+        )
 
 
 def _further(answer: Mapping[str, Any]) -> None:

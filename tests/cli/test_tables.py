@@ -21,6 +21,16 @@ def test_a_spread_of_the_model_file_is_said(capsys: pytest.CaptureFixture[str]) 
     assert "7 samples, spread of the model file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("noise", "said"), [({"total_error": 0.01}, 0), ({}, 1)])
+def test_noise_that_an_earlier_version_did_not_store_is_said_once(
+    noise: dict[str, float], said: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    indices = [{"first": 0.1, "total": 0.2, **noise}, {"first": None, "total": None}]
+    response = {"blame": {"indices": indices}}
+    tables.blame_status({"blame": {"reason": ""}, "responses": [response, response]})
+    assert capsys.readouterr().err.count("--blame --resume") == said
+
+
 @pytest.mark.parametrize(("narrow", "said"), [(True, "boards: reached"), (False, "NOT reached")])
 def test_whether_the_width_was_reached(
     narrow: bool, said: str, capsys: pytest.CaptureFixture[str]
