@@ -91,6 +91,21 @@ def test_writes_pictures_and_data_with_their_origin(
     assert _tree(out) == written
 
 
+def test_a_smaller_map_takes_the_place_of_a_larger_one(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The rows of the larger one are of another map. They go, and none is called damaged."""
+    ends, quick = ("--from", "1.4", "--to", "1.5"), ("--periods", "20", "--keep", "4")
+    words = (model, *ends, *quick, "--out", tmp_path / "out")
+    _asked(capfd, *words, "--steps", "4", "--map", "b", "0.2", "0.3", "3")
+    again = ("--steps", "3", "--map", "b", "0.2", "0.3", "2", "--overwrite")
+    assert entry.status(["bifurcation", *map(str, (*words, *again)), "--json"]) == 0
+    said = capfd.readouterr()
+    assert "damaged" not in said.err
+    assert sum(_strict(said.out)["counts"].values()) == 6
+    assert len(list((tmp_path / "out" / "map.parquet").iterdir())) == 2
+
+
 def test_files_of_others_are_left_alone(
     model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
