@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -76,6 +76,20 @@ Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
 """What is in the JSON object, what it cost, and what makes the pictures and tables."""
 
 
+@overload
+def _store(plan: SweepPlan, files: WorkFiles) -> SweepStore: ...
+@overload
+def _store(plan: MapPlan | BasinPlan, files: WorkFiles) -> GridStore: ...
+@overload
+def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore: ...
+def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore:
+    """Where the blocks of a plan's work are kept, to write them and to read them."""
+    if isinstance(plan, SweepPlan):
+        return SweepStore(files, plan.parameter)
+    kind = "map" if isinstance(plan, MapPlan) else "basins"
+    return GridStore(files, kind, plan.x, plan.xs, plan.y, plan.ys)
+
+
 class BifurcationWork:
     """What is to be computed, and what decides it."""
 
@@ -116,7 +130,7 @@ class BifurcationWork:
         plan = self.plan
         assert isinstance(plan, SweepPlan)
         name = plan.parameter
-        store = None if folder is None else SweepStore(self.files(folder), name)
+        store = None if folder is None else _store(plan, self.files(folder))
         blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
         step = self.progress.stage(f"sweep over {name}", blocks)
         self.made = sweep.run(plan, self.jobs, store, step)
@@ -126,9 +140,7 @@ class BifurcationWork:
         """The map or the basins likewise."""
         plan, kind = self.plan, self.request.kind
         assert not isinstance(plan, SweepPlan)
-        store = None
-        if folder is not None:
-            store = GridStore(self.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
+        store = None if folder is None else _store(plan, self.files(folder))
         step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
         if isinstance(plan, MapPlan):
             self.made = made = parameter_map.run(plan, self.jobs, store, step)
@@ -415,13 +427,12 @@ class PictureData:
         if self.made is not None:
             return self.made
         assert kept is not None
+        finished = _Finished(_store(plan, kept))
         if isinstance(plan, SweepPlan):
-            return sweep.run(plan, 1, _Finished(SweepStore(kept, plan.parameter)))
-        kind = "map" if isinstance(plan, MapPlan) else "basins"
-        grid = _Finished(GridStore(kept, kind, plan.x, plan.xs, plan.y, plan.ys))
+            return sweep.run(plan, 1, finished)
         if isinstance(plan, MapPlan):
-            return parameter_map.run(plan, 1, grid)
-        return basins.run(plan, 1, grid)
+            return parameter_map.run(plan, 1, finished)
+        return basins.run(plan, 1, finished)
 
 
 @dataclass(frozen=True)
