@@ -572,16 +572,15 @@ def requested(
         answer["cost"]["seconds"] = time.perf_counter() - began
         data = PictureData(plan, work.made, None)
         return BifurcationResult(answer, False, None, request.ends, data)
-    folder = Folder(out)
+    folder, kind = Folder(out), request.kind
     inputs = {
-        "model": modelfile.sha256,
+        "model": _model_hash(modelfile, folder, kind),
         "version": __version__,
         "subject": "circuit" if request.circuit else "model",
         "work": work.hash,
     }
     if request.circuit:
         inputs["catalogue"] = load_catalog().hash
-    kind = request.kind
     stages: Stages = {kind: (inputs, _names(kind, work))}
     asked = {"model": modelfile.text, "work": work.decides}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume, asked=asked)
@@ -599,6 +598,14 @@ def requested(
 
 
 # ---------------------------------------------------------------------------------------------
+
+
+def _model_hash(modelfile: ModelFile, folder: Folder, kind: StageName) -> str:
+    """What says of the model file which work a folder has: no motion depends on what is expected
+    of one. Folders of earlier versions say it by the file's text."""
+    stages = {} if folder.manifest is None else folder.manifest.stages
+    said = stages[kind].inputs.get("model") if kind in stages else None
+    return modelfile.sha256 if said == modelfile.sha256 else modelfile.motions_sha256
 
 
 def _subject(
