@@ -259,11 +259,13 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
 
 
 def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[dict[str, object]]:
-    """The windows of a sweep, and the ends of the periodic ones where these were looked for."""
+    """The windows of a sweep; where they were looked for, families and ends of periodic ones."""
     out = []
     for number, window in enumerate(swept.windows):
         row = with_si(window.as_dict(), unit)
         ends = None if found is None else found.ends[number]
+        if found is not None:
+            row["family"] = found.families[number]
         if ends is not None:
             keys = zip(("from_end", "to_end"), ends, strict=True)
             row |= {key: with_si(end.as_dict(), unit) for key, end in keys}
