@@ -75,7 +75,9 @@ def _name(step: SteadyMotion) -> tuple[str, bool | None]:
 
 def _change(a: SteadyMotion, b: SteadyMotion) -> float:
     """Of the least displacement in a period, its smallest and its largest value, from one step to
-    the next; in parts of the larger size."""
+    the next; in parts of the larger size. 0 where a step has none, as a block of a stranger may."""
+    if not (len(a.minima) and len(b.minima)):
+        return 0.0
     ends = np.array([[step.minima.min(), step.minima.max()] for step in (a, b)])
     size = float(np.abs(ends).max())
     return float(np.abs(ends[1] - ends[0]).max()) / size if size else 0.0
