@@ -215,6 +215,8 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     si = answer.get("si_unit")
     chaos = any("lyapunov" in w for w in widest)
     followed = any("from_end" in w for w in widest)
+    members = Counter(w["family"] for w in windows if w.get("family")).values()
+    families = any(count > 1 for count in members)
     table(
         "Windows",
         (
@@ -224,15 +226,20 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
+                **({"family": _family(w)} if families else {}),
                 **(_located(w, answer["unit"], si, in_si=in_si) if followed else {}),
                 **({f"λ{' [1/s]' if unit else ''}": _exponents(w)} if chaos else {}),
             }
             for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
         ),
     )
+    if families:
+        say("windows of one family show one motion that goes on from each to the next")
     left_out = {end["reason"] for w in widest for end in _not_sought(w)}
     if left_out:
         say(f"-: the ends of a window are not looked for where {' or '.join(sorted(left_out))}")
+    if _narrow(windows):
+        say("more --steps, or --from and --to close about a narrow window, find its ends")
     if len(windows) > len(widest):
         say(f"and {len(windows) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
@@ -394,6 +401,18 @@ def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) 
     own = {f"{end}{unit}": f"{window[end]:.6g}" for end in names}
     other = {f"{end} [{si}]": _si(window, end, si) for end in names} if si else {}
     return {**other, **own} if in_si else {**own, **other}
+
+
+def _family(window: Mapping[str, Any]) -> str:
+    """The number of a periodic window's family."""
+    return "-" if window["family"] is None else str(window["family"])
+
+
+def _narrow(windows: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether ends were not looked for because too few steps show a window."""
+    from designer.bifurcations.window_ends import LEAST_STEPS
+
+    return any(_not_sought(w) and w["steps"] < LEAST_STEPS for w in windows)
 
 
 def _not_sought(window: Mapping[str, Any]) -> list[Mapping[str, Any]]:
