@@ -99,7 +99,8 @@ def simulate(
         option("--rung", None, "The op-amps' model, with --engine ngspice."),
     ] = "ideal",
     starts: Annotated[
-        int, option("--starts", "N", "Initial states that are drawn: the attractors' shares.")
+        int,
+        option("--starts", "N", "Initial states that are drawn: the attractors' shares; 0: none."),
     ] = DRAWN_STARTS,
     seed: Seed = SEED,
     start: Annotated[
