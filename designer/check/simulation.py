@@ -579,11 +579,13 @@ def _alike(a: Orbit, b: Orbit) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:
-    """With its exponent measured to a bound and, over 200 periods, its extremes where the orbit is
-    not periodic and has none."""
+    """With its exponent measured to a bound and, over 200 periods, its extremes and largest impacts
+    where the orbit is not periodic and has none."""
     orbit = attractors.with_exponent(flow, orbit)
     if len(orbit.extremes) or not len(orbit.start):
         return orbit
     with flow.within(Budget(step_budget.SETTLING)):
         run_ = flow.run(orbit.start, 200, measure=True)
-    return orbit if run_.status is not FlowStatus.DONE else replace(orbit, extremes=run_.extremes)
+    if run_.status is not FlowStatus.DONE:
+        return orbit
+    return replace(orbit, extremes=run_.extremes, spans=run_.spans, speeds=run_.speeds)

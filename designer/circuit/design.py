@@ -216,13 +216,20 @@ class Design:
 
     def in_model_units(self, orbit: Orbit, volts: Array) -> Orbit:
         """An orbit of a board, in volts and seconds, in model units. volts : as of ``volts``."""
-        seconds, graze = self.errors.scales.seconds, orbit.graze
+        seconds, graze, spans = self.errors.scales.seconds, orbit.graze, orbit.spans
+        speeds = orbit.speeds
         if len(graze):
             graze = graze / self._clearance_volts(volts[0::2])[:, None]
+        if len(spans):
+            spans = spans / self._clearance_volts(volts[0::2])[:, None]
+        if len(speeds):
+            speeds = speeds / self._clearance_volts(volts[1::2])[:, None]
         return replace(
             orbit,
             start=orbit.start / volts if len(orbit.start) else orbit.start,
             extremes=orbit.extremes / volts[:, None] if len(orbit.extremes) else orbit.extremes,
+            spans=spans,
+            speeds=speeds,
             impact_times=orbit.impact_times / seconds,
             impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
             lyapunov=orbit.lyapunov * seconds,
