@@ -90,6 +90,18 @@ def quantity_text(value: float, unit: str, digits: int = DIGITS) -> str:
     return spaced_quantity(value, unit, digits).replace("\u00a0", " ")
 
 
+def span_text(low: float, high: float, unit: str, si: Unit | None = None) -> str:
+    """A range of plain numbers as they were taken: "from 20 to 40 rad/s (3.183 Hz to 6.366 Hz)",
+    "from 0.3 mm to 0.5 mm", "from 1.2 to 1.8". unit : of the numbers, "" without. si : the unit
+    that they are shown in too."""
+    if si is not None and si.own_si and unit != "rad/s":
+        unit = si.name
+    if unit in PREFIXED:
+        return f"from {quantity_text(low, unit)} to {quantity_text(high, unit)}"
+    plain = f"from {low:.6g} to {high:.6g}" + (f" {unit}" if unit else "")
+    return plain if si is None else f"{plain} ({si.text(low)} to {si.text(high)})"
+
+
 def value_text(value: float, unit: str, digits: int = DIGITS) -> str:
     """An SI value for a table: "54.11 Hz", "0.6488 mm"."""
     factor, name = prefixed(value, unit)

@@ -79,8 +79,8 @@ REACH = {
     "export": 64_500,
     "synthesise": 64_500,
     "run": 66_500,
-    "tolerance": 66_500,
-    "search": 70_300,
+    "tolerance": 66_550,
+    "search": 70_350,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 
