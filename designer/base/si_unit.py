@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from designer.base.units import spaced_quantity
+from designer.base.units import ACCELERATIONS, spaced_quantity
 
 PREFIXED = {
     "Hz": ((1e7, 1e6, "MHz"), (1e4, 1e3, "kHz"), (0.1, 1.0, "Hz"), (0.0, 1e-3, "mHz")),
@@ -100,6 +100,11 @@ def span_text(low: float, high: float, unit: str, si: Unit | None = None) -> str
         return f"from {quantity_text(low, unit)} to {quantity_text(high, unit)}"
     plain = f"from {low:.6g} to {high:.6g}" + (f" {unit}" if unit else "")
     return plain if si is None else f"{plain} ({si.text(low)} to {si.text(high)})"
+
+
+def acceleration_text(value: float, digits: int = DIGITS) -> str:
+    """An acceleration in m/s² for people: "3.2 m/s² (0.3263 g)"."""
+    return f"{value:.{digits}g} m/s² ({value / ACCELERATIONS['g']:.{digits}g} g)"
 
 
 def value_text(value: float, unit: str, digits: int = DIGITS) -> str:

@@ -124,6 +124,19 @@ class Design:
         volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
         return volts * (1.0 if b is None else self.model.b / b)
 
+    def base_per_volt(
+        self, b: float | None = None, omega: float | None = None
+    ) -> tuple[int, float] | None:
+        """The generator's channel that stands for a moving base, and the base's acceleration in
+        model units per volt of it, peak for peak; None of a model without one. Arguments : as of
+        ``amplitude``; with ideal parts it is the same at every frequency."""
+        system = self.model.second_order()
+        found = system.ground_channel(system.own_frequency if omega is None else omega)
+        if found is None:
+            return None
+        channel, acceleration = found
+        return channel, acceleration / self.amplitude(b, omega, channel)
+
     def largest_amplitudes(self, responses: Sequence[ModelResponse]) -> list[float]:
         """Of each of the generator's channels, over these responses; without any at the model's
         clearance and own frequency [V peak]."""
@@ -261,6 +274,8 @@ class GeneratorSetting:
     """As of ``Excitation``."""
     second: SecondDrive | None = None
     """As of ``Excitation``."""
+    base: tuple[int, float] | None = None
+    """As of ``Design.base_per_volt``."""
 
     @property
     def excitation(self) -> Excitation:
@@ -275,5 +290,6 @@ def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[Genera
     for r in responses:
         to = design.excitation(r.b, r.omega)
         whose = r.omega, r.expected, to.frequency, to.amplitude
-        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second))
+        base = design.base_per_volt(r.b, r.omega)
+        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second, base=base))
     return tuple(out)

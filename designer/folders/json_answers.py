@@ -42,7 +42,7 @@ def synthesis_json(
     out where there are none.
     """
     from designer.circuit.design import settings
-    from designer.model.si_units import mechanism_json
+    from designer.model.si_units import base_json, mechanism_json
 
     errors, circuit = design.errors, design.circuit
     return {
@@ -72,6 +72,7 @@ def synthesis_json(
                 "omega": s.omega,
                 "frequency_hz": s.frequency_hz,
                 **mechanism_json(s.omega, modelfile.si),
+                **base_json(s.base, modelfile.si),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
                 **({} if s.shape == SINE else {"shape": [list(wave) for wave in s.shape]}),
