@@ -132,7 +132,8 @@ class BifurcationWork:
         name = plan.parameter
         store = None if folder is None else _store(plan, self.files(folder))
         blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-        step = self.progress.stage(f"sweep over {name}", blocks)
+        over = titles.taken(plan.subject, name, plan.values)
+        step = self.progress.stage(f"sweep over {over}", blocks)
         self.made = sweep.run(plan, self.jobs, store, step)
         return self.made
 
@@ -141,7 +142,9 @@ class BifurcationWork:
         plan, kind = self.plan, self.request.kind
         assert not isinstance(plan, SweepPlan)
         store = None if folder is None else _store(plan, self.files(folder))
-        step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+        over = titles.taken(plan.subject, plan.x, plan.xs)
+        over += f" and {titles.taken(plan.subject, plan.y, plan.ys)}"
+        step = self.progress.stage(f"{kind} over {over}", len(plan.ys))
         if isinstance(plan, MapPlan):
             self.made = made = parameter_map.run(plan, self.jobs, store, step)
             return made
@@ -209,6 +212,8 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
     body: dict[str, Any] = {
         "parameter": name,
         "unit": unit,
+        "from": plan.values.min(),
+        "to": plan.values.max(),
         **({} if si is None else {"si_unit": si.name, "si_scale": si.scale}),
         "tracks": list(plan.tracks),
         "steps": len(plan.values),

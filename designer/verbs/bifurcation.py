@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from designer.base.defaults import CURVE_DEPTH, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.si_unit import quantity_text, suffix, value_text
+from designer.base.si_unit import Unit, quantity_text, span_text, suffix, value_text
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Kind, Out, Overwrite, Resume, Seed, Source, Verb, option
 from designer.verbs.tables import YES_NO, files
@@ -41,7 +41,9 @@ def bifurcation(
         option(
             "--from",
             "A",
-            'One end of the sweep; of a file with SI values also "10 Hz" or "0.5 mm".',
+            "One end of the sweep. A plain number has the unit of the model: ω in rad/s where "
+            'the values of a format 2 file have units. Of a file with SI values also "10 Hz" or '
+            '"0.5 mm".',
             reads=str | None,
         ),
     ] = None,
@@ -218,7 +220,7 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     members = Counter(w["family"] for w in windows if w.get("family")).values()
     families = any(count > 1 for count in members)
     table(
-        "Windows",
+        f"Windows{_taken(answer)}",
         (
             {
                 "track": w["track"],
@@ -255,6 +257,18 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
         if "region" in answer:
             for text in _region(answer, both):
                 say(text)
+
+
+def _taken(answer: Mapping[str, Any]) -> str:
+    """What was swept, with the unit that its numbers were taken in; "" of older answers."""
+    if "from" not in answer:
+        return ""
+    from designer.plots.titles import NAMES
+
+    name, si = answer["parameter"], answer.get("si_unit")
+    unit = None if si is None else Unit(si, answer["si_scale"])
+    span = span_text(answer["from"], answer["to"], answer["unit"], unit)
+    return f", {NAMES.get(name, name)} {span}"
 
 
 Written = Callable[[float], str]

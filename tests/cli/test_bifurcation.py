@@ -26,6 +26,7 @@ from designer.verbs.bifurcation import bifurcation
 from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.quick_folders import quick_folder
+from tests.shared.system_text import clearance, system_text, table
 
 SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
 
@@ -520,3 +521,34 @@ def test_a_kind_is_the_verb_with_the_words_that_it_stands_for(
     assert _asked(capfd, "sweep", *words, model)["kind"] == "sweep"
     assert entry.status(["bifurcation", "sweeps", str(model), *words]) == 2
     assert "found sweeps, expected one of sweep, curves" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("ends", [("60", "100"), ("9.5492965855 Hz", "100 rad/s")])
+def test_the_unit_that_a_plain_number_was_taken_in_is_said(
+    ends: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """60 rad/s are 9.549 Hz, whoever writes them."""
+    path = tmp_path / "gap.toml"
+    path.write_text(
+        system_text(
+            {"hammer": "0.5 kg"},
+            {("hammer", "ground"): "2 kN/m"},
+            {("hammer", "ground"): "6 N s/m"},
+            clearance("A", "hammer", "ground", upper="1 mm", lower="1 mm", stiffness="38 kN/m"),
+            table("force", on="hammer", amplitude="4 N"),
+        ),
+        encoding="utf-8",
+    )
+    words = ["bifurcation", "sweep", str(path), "--from", ends[0], "--to", ends[1], "--steps", "2"]
+    words += ["--periods", "20", "--no-points"]
+    assert entry.status(words) == 0
+    said = capfd.readouterr().err
+    over = "ω from 60 to 100 rad/s (9.549 Hz to 15.92 Hz)"
+    assert f"sweep over {over} …" in said
+    assert f"\nWindows, {over}\n" in said
+    lengths = ["--over", "A.upper", "--from", "0.001", "--to", "2 mm", "--omega", "80"]
+    assert entry.status([*words[:3], *lengths, *words[7:]]) == 0
+    assert "sweep over A.upper from 1 mm to 2 mm" in capfd.readouterr().err
+    answer = _asked(capfd, *words[1:])
+    assert (answer["unit"], answer["to"]) == ("rad/s", 100.0)
+    assert answer["from"] == pytest.approx(60.0, rel=1e-9)
