@@ -43,6 +43,14 @@ def nobody(_name: str, _content: bytes) -> bool:
     return False
 
 
+class OtherFormError(ValueError):
+    """An entry whose head can be read, and whose value has another form or size."""
+
+    def __init__(self, head: Mapping[str, Any], found: str) -> None:
+        super().__init__(found)
+        self.head = head
+
+
 class EntryCodec(Protocol[Entry]):
     """How an entry is written."""
 
@@ -52,7 +60,7 @@ class EntryCodec(Protocol[Entry]):
 
     def decode(self, content: bytes) -> tuple[Mapping[str, Any], Entry]:
         """Head and value of an entry; raises any of ``guarded_reading.UNREADABLE`` on other
-        bytes."""
+        bytes, ``OtherFormError`` where the head at least is one."""
 
 
 @dataclass
@@ -108,12 +116,16 @@ class KeyedStore(Generic[Entry]):
             return None
         try:
             head, value = self.form.decode(content)
-            if {k: head.get(k) for k in key} != dict(key):
+            made = make(value) if _answers(head, key) else None
+        except (*UNREADABLE, InputError) as error:
+            # The work of another request has other columns, or more of them: that is no damage.
+            if isinstance(error, OtherFormError) and not _answers(error.head, key):
                 self.foreign.add(name)
-                return None
-            made = make(value)
-        except (*UNREADABLE, InputError):
-            self._damaged(name, DAMAGED)
+            else:
+                self._damaged(name, DAMAGED)
+            return None
+        if not _answers(head, key):
+            self.foreign.add(name)
             return None
         if not state:
             self.unsealed.add(name)
@@ -149,6 +161,11 @@ class KeyedStore(Generic[Entry]):
         if name not in self.noted:
             self.noted.add(name)
             self.note(f"{self.root / name}: {why}")
+
+
+def _answers(head: Mapping[str, Any], key: Mapping[str, Any]) -> bool:
+    """Whether an entry with this head answers the request with this key."""
+    return {k: head.get(k) for k in key} == dict(key)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from designer.base.keyed_store import OtherFormError
 from designer.base.seal import BLANK
 
 HEAD, SEAL = b"designer", b"designer-seal"
@@ -58,8 +59,9 @@ class ParquetForm:
 
         Raises
         ------
-        ValueError, TypeError, LookupError, OSError : other bytes, other columns, no head, or more
-            rows, values or bytes than an entry may have.
+        OtherFormError : a head with other columns, or with more rows than an entry may have.
+        ValueError, TypeError, LookupError, OSError : other bytes, no head, or more values or bytes
+            than an entry may have.
         """
         try:
             file = pq.ParquetFile(pa.BufferReader(content))
@@ -69,8 +71,11 @@ class ParquetForm:
                 raise TypeError("a head that is no object")
             present = [f for f in self.optional if f.name in schema.names]
             if not schema.remove_metadata().equals(pa.schema([*self.schema, *present])):
-                raise ValueError("other columns")
-            texts = _check_size(content, metadata, self.most)
+                raise OtherFormError(head, "other columns")
+            if metadata.num_rows > self.most:
+                found = f"{metadata.num_rows} rows, more than {self.most}"
+                raise OtherFormError(head, found)
+            texts = _check_size(content, metadata)
             # A text that many rows share stays one text until it is known how long all are.
             file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=texts)
             table = file.read()
@@ -82,12 +87,10 @@ class ParquetForm:
         return head, rows
 
 
-def _check_size(content: bytes, metadata: pq.FileMetaData, most: int) -> list[str]:
+def _check_size(content: bytes, metadata: pq.FileMetaData) -> list[str]:
     """The paths of the columns of text; ValueError for an entry that is too large."""
     if not metadata.created_by.startswith(_WRITER):  # of others the library reads some bytes more
         raise ValueError("another writer")
-    if metadata.num_rows > most:
-        raise ValueError(f"{metadata.num_rows} rows, more than {most}")
     values = size = 0
     texts = set()
     for group in range(metadata.num_row_groups):

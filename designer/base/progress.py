@@ -127,7 +127,8 @@ class WholeWork:
     """How far a work of several phases is, each of which takes some time as a rule.
 
     usual : that time [s], in the order of the work, by how the name of the phase's first stage
-    begins. What has ended says by how much this work is slower than usual.
+    begins. What has ended, and the phase under way where it lasts longer, say by how much this work
+    is slower than usual. The share that is done never falls, whatever becomes known of the rest.
     """
 
     def __init__(self, usual: Mapping[str, float], clock: Callable[[], float]) -> None:
@@ -135,7 +136,7 @@ class WholeWork:
         self._clock = clock
         self._began = self._phase_began = clock()
         self._at = -1
-        self._seconds = self._expected = 0.0
+        self._seconds = self._expected = self._most = 0.0
 
     def enter(self, stage: str) -> None:
         """A stage begins: with it the phase that it is the first of, and the one before ends."""
@@ -157,10 +158,14 @@ class WholeWork:
             return None
         times, now = list(self.usual.values()), self._clock()
         pace = (TRUST + self._seconds) / (TRUST + self._expected)
-        spent = now - self._phase_began
-        rest = max(times[self._at] * pace - spent, LONGER * spent, steps_left)
+        spent, usual = now - self._phase_began, times[self._at]
+        rest = max(usual * pace - spent, LONGER * spent, steps_left)
+        # Else a first phase that lasts would be most of the whole until the next one begins.
+        known = self._seconds + spent + steps_left
+        pace = max(pace, (TRUST + known) / (TRUST + self._expected + usual))
         left = rest + pace * sum(times[self._at + 1 :])
-        return 1.0 - left / (self.spent + left), left
+        self._most = max(self._most, 1.0 - left / (self.spent + left))
+        return self._most, left
 
     @property
     def spent(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from designer.base.units import spaced_quantity
+from designer.base.units import ACCELERATIONS, spaced_quantity
 
 PREFIXED = {
     "Hz": ((1e7, 1e6, "MHz"), (1e4, 1e3, "kHz"), (0.1, 1.0, "Hz"), (0.0, 1e-3, "mHz")),
@@ -88,6 +88,23 @@ def quantity_text(value: float, unit: str, digits: int = DIGITS) -> str:
     if unit in PREFIXED:
         return value_text(value, unit, digits)
     return spaced_quantity(value, unit, digits).replace("\u00a0", " ")
+
+
+def span_text(low: float, high: float, unit: str, si: Unit | None = None) -> str:
+    """A range of plain numbers as they were taken: "from 20 to 40 rad/s (3.183 Hz to 6.366 Hz)",
+    "from 0.3 mm to 0.5 mm", "from 1.2 to 1.8". unit : of the numbers, "" without. si : the unit
+    that they are shown in too."""
+    if si is not None and si.own_si and unit != "rad/s":
+        unit = si.name
+    if unit in PREFIXED:
+        return f"from {quantity_text(low, unit)} to {quantity_text(high, unit)}"
+    plain = f"from {low:.6g} to {high:.6g}" + (f" {unit}" if unit else "")
+    return plain if si is None else f"{plain} ({si.text(low)} to {si.text(high)})"
+
+
+def acceleration_text(value: float, digits: int = DIGITS) -> str:
+    """An acceleration in m/s² for people: "3.2 m/s² (0.3263 g)"."""
+    return f"{value:.{digits}g} m/s² ({value / ACCELERATIONS['g']:.{digits}g} g)"
 
 
 def value_text(value: float, unit: str, digits: int = DIGITS) -> str:

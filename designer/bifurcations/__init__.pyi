@@ -78,6 +78,7 @@ from .sweep import (
     next_start as next_start,
 )
 from .window_ends import (
+    LEAST_STEPS as LEAST_STEPS,
     NOT_SOUGHT as NOT_SOUGHT,
     SweptEnd as SweptEnd,
     WindowEnds as WindowEnds,

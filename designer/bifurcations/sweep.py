@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
+from designer.bifurcations.orbit_jumps import jumps
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
 from designer.dynamics.orbit import OrbitStatus
@@ -137,9 +139,10 @@ class Sweep:
     steps: Mapping[str, tuple[SteadyMotion, ...]]
     """For each track one ``SteadyMotion`` per value, in the order of ``plan.values``."""
 
-    @property
+    @cached_property
     def windows(self) -> list[Window]:
-        """Of every followed track by itself; of fixed starts together. Ascending."""
+        """Of every followed track by itself, where it jumps to another orbit of one name too; of
+        fixed starts together. Ascending."""
         if self.plan.followed:
             return [w for t in self.plan.tracks for w in _windows(self, (t,), t)]
         track = self.plan.tracks[0] if len(self.plan.tracks) == 1 else "starts"
@@ -247,7 +250,11 @@ def _fixed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[SteadyMot
 
 def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
     """Runs of steps at which one of the tracks shows a response; ordered by where they begin."""
-    values = sweep.plan.values
+    values, plan = sweep.plan.values, sweep.plan
+    ends: set[int] = set()
+    if plan.followed:
+        family = plan.subject.family(plan.parameter)
+        ends = {k for t in tracks for k in jumps(family, values.tolist(), sweep.steps[t])}
     out: list[Window] = []
     running: dict[tuple[str, bool | None], int] = {}
     responses: set[tuple[str, bool | None]]
@@ -256,7 +263,7 @@ def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
         if i < len(values):
             steps = [sweep.steps[t][i] for t in tracks]
             responses = {(s.response, s.symmetric) for s in steps}
-        for key in [k for k in running if k not in responses]:
+        for key in [k for k in running if k not in responses or i in ends]:
             first = running.pop(key)
             low, high = float(values[first]), float(values[i - 1])
             run = [s for t in tracks for s in sweep.steps[t][first:i] if s.response == key[0]]

@@ -20,6 +20,7 @@ from designer.bifurcations.continuation import Branch, BranchPoint, End, apart, 
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.points import Bifurcation, locate as points_on
 from designer.bifurcations.sweep import Sweep, Window
+from designer.bifurcations.window_families import families
 from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, WindowEnd, all_windows
 from designer.dynamics import attractors
 from designer.dynamics.counts import read_counts
@@ -75,6 +76,8 @@ class WindowEnds:
     """Bifurcation points on them within the sweep, ascending."""
     ends: tuple[tuple[SweptEnd, SweptEnd] | None, ...]
     """The lower and the upper end of each window of the sweep; None of one that is not periodic."""
+    families: tuple[int | None, ...]
+    """The family of each window, as of ``window_families.families``."""
 
     @property
     def missing(self) -> list[SweptEnd]:
@@ -172,7 +175,8 @@ def find(sweep: Sweep, jobs: int = 1, progress: Callable[[], None] = lambda: Non
         same_kind = [p for p in out if p.kind is point.kind]
         if not any(abs(p.value - point.value) <= SAME * abs(point.value) for p in same_kind):
             out.append(point)
-    return WindowEnds(tuple(out), tuple(followed.judged_by(out) for followed in each))
+    ends = tuple(followed.judged_by(out) for followed in each)
+    return WindowEnds(tuple(out), ends, families(sweep, jobs))
 
 
 def _order(point: Bifurcation) -> tuple[float, str]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from math import log
 from typing import Any
 
 import numpy as np
@@ -30,10 +31,16 @@ MOST = 8000
 FIRST, LOST = 50, 20
 """Boards after which a study may end because the target is missed, and the lost boards by which
 it then knows their share well enough (to a quarter of it): lost boards are the dear ones."""
+MOST_PLAIN, PLAIN_BLOCK = 400_000, 10_000
+"""Boards drawn as they are by which a share is bounded of which no search met a loss, and how many
+are asked together."""
 TAG = 0xC04E
 """Sets the boards of a cure apart from those of a study with the same seed."""
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
+_LOST = {_LETTERS[Verdict.LOST], _LETTERS[Verdict.GRAZING]}
+NONE_LOST = -log(0.05)
+"""Over the boards of which none is lost: the share that may be lost all the same, by 95 %."""
 _RARE = "rare"
 """In the place of a block's number: what was estimated of a study."""
 
@@ -175,10 +182,8 @@ class MeasuredYield:
 
     @property
     def reached(self) -> bool:
-        """The whole interval is at the target or above, or no board was lost of those that were
-        drawn towards the losses."""
-        none_lost = self.rare is not None and self.rare.lost == 0.0
-        return none_lost or self.interval[0] >= self.target
+        """The whole interval is at the target or above."""
+        return self.interval[0] >= self.target
 
     @property
     def missed(self) -> bool:
@@ -277,10 +282,40 @@ def measure_together(
             plan, trim = study
             if most > BLOCK and is_rare(target) and not measured[k].missed:
                 assert trim is None, "boards that are trimmed are counted"
-                measured[k] = replace(measured[k], rare=book.rare(plan, jobs, progress))
+                measured[k] = _estimated(plan, measured[k], book, jobs, progress)
             else:
                 measured[k] = measure(
                     plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
                     progress=progress,
                 )  # fmt: skip
     return tuple(measured)
+
+
+def _estimated(
+    plan: StudyPlan,
+    counted: MeasuredYield,
+    book: VerdictCache,
+    jobs: int,
+    progress: Callable[[], None],
+) -> MeasuredYield:
+    """A yield whose losses are too rare to be counted.
+
+    Where no search met a loss, boards drawn as they are bound the share, as many as the target
+    takes; a loss among them is one that the searches did not meet, and they alone decide then.
+    """
+    rare = book.rare(plan, jobs, progress)
+    if rare.lost > 0.0 or 1.0 - rare.high >= counted.target:
+        return replace(counted, rare=rare)
+    wanted = NONE_LOST / (1.0 - counted.target) - NONE_LOST / rare.unseen
+    letters = ""
+    while len(letters) < min(wanted, MOST_PLAIN) and not set(letters) & _LOST:
+        indices = range(len(letters), len(letters) + PLAIN_BLOCK)
+        letters += book.block(replace(plan, samples=indices.stop), indices, None, jobs)[0]
+        doing(f"{len(letters)} boards as they are, {sum(map(letters.count, _LOST))} lost")
+        progress()
+    if set(letters) & _LOST:
+        return MeasuredYield(Yield(*map(letters.count, VERDICTS)), counted.target)
+    answered = len(letters) - letters.count(_LETTERS[Verdict.FAILED])
+    bound = NONE_LOST / (answered + NONE_LOST / rare.unseen)
+    boards = rare.boards + len(letters)
+    return replace(counted, rare=replace(rare, high=bound, unseen=bound, boards=boards))

@@ -105,7 +105,7 @@ def _reach(orbit: Orbit) -> tuple[float | None, float | None]:
 
 def check(starts: int) -> None:
     """Raises InputError for a number of starts that cannot be."""
-    at_least("--starts", starts, 1)
+    at_least("--starts", starts, 0)
     if starts > MOST_STARTS:
         raise InputError(None, "--starts", starts, f"at most {MOST_STARTS}")
 

@@ -119,7 +119,7 @@ class Simulated:
     """What the orbits are motions of; None in ngspice."""
     coexistence: Coexistence | None = None
     """What share of the starts in a box goes to the orbit, to each of ``others`` and to none; its
-    orbits are in the flow's own units. None where the engine was not asked (ngspice)."""
+    orbits are in the flow's own units. None where none was drawn, as in ngspice."""
 
     @property
     def twin(self) -> Orbit | None:
@@ -202,9 +202,8 @@ def simulate(
     synthesis : of this model file; where the engine needs one and None is given it is made by
     ``choose``, or as ``check.synthesis_result`` makes it. traces : keep the orbits and their mirror
     twins as traces too. rung : the op-amps' model in ngspice. starts, seed : of the initial states
-    that are drawn to see which attractors coexist
-    (``check.coexistence``); ngspice has none. start : (states,) in model units, where the drive's
-    phase is 0.
+    that are drawn to see which attractors coexist (``check.coexistence``), 0 for none; ngspice has
+    none. start : (states,) in model units, where the drive's phase is 0.
 
     Raises
     ------
@@ -323,8 +322,8 @@ def _on_model(
     flow = model_flow(model, r.omega)
     orbits = _apart(flow, [_measured(flow, o) for o in (r.orbit, *_attractors(r.others))])
     first = _attractors(orbits)
-    result = coexistence.of_flow(flow, scale_of(model, r.omega), *sampling, first)
-    orbits += [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
+    result, met = _drawn(flow, scale_of(model, r.omega), *sampling, first)
+    orbits += met
     twins = [None if flow.system.mirror is None else _twin(flow, o) for o in orbits]
     units = np.ones(flow.system.size)
     return Simulated(
@@ -346,6 +345,24 @@ def _on_model(
         flow=UnitFlow(partial(model_flow, model, r.omega), units, 1.0, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
+
+
+def _drawn(
+    flow: Flow,
+    box: Array,
+    starts: int,
+    seed: int,
+    known: Sequence[Orbit],
+    unit: Array | None = None,
+    *,
+    even: bool = True,
+) -> tuple[Coexistence | None, list[Orbit]]:
+    """Where drawn starts end, None of none, and the attractors that are not among the known; as of
+    ``coexistence.of_flow``."""
+    if not starts:
+        return None, []
+    result = coexistence.of_flow(flow, box, starts, seed, known, unit, even=even)
+    return result, [_measured(flow, b.orbit) for b in result.basins[len(known) :]]
 
 
 def _apart(flow: Flow, orbits: Sequence[Orbit]) -> list[Orbit]:
@@ -439,8 +456,7 @@ def _on_circuit(
     model = synthesis.modelfile.model.at(r.b)
     box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts[:, None]
     even = model.second_order().even
-    result = coexistence.of_flow(flow, box, *sampling, first, volts, even=even)
-    more = [_measured(flow, b.orbit) for b in result.basins[len(first) :]]
+    result, more = _drawn(flow, box, *sampling, first, volts, even=even)
     rows += range(len(measured), len(measured) + len(more))
     measured += more
     scaled += [design.in_model_units(o, volts) for o in more]
@@ -563,11 +579,13 @@ def _alike(a: Orbit, b: Orbit) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:
-    """With its exponent measured to a bound and, over 200 periods, its extremes where the orbit is
-    not periodic and has none."""
+    """With its exponent measured to a bound and, over 200 periods, its extremes and largest impacts
+    where the orbit is not periodic and has none."""
     orbit = attractors.with_exponent(flow, orbit)
     if len(orbit.extremes) or not len(orbit.start):
         return orbit
     with flow.within(Budget(step_budget.SETTLING)):
         run_ = flow.run(orbit.start, 200, measure=True)
-    return orbit if run_.status is not FlowStatus.DONE else replace(orbit, extremes=run_.extremes)
+    if run_.status is not FlowStatus.DONE:
+        return orbit
+    return replace(orbit, extremes=run_.extremes, spans=run_.spans, speeds=run_.speeds)

@@ -124,6 +124,19 @@ class Design:
         volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
         return volts * (1.0 if b is None else self.model.b / b)
 
+    def base_per_volt(
+        self, b: float | None = None, omega: float | None = None
+    ) -> tuple[int, float] | None:
+        """The generator's channel that stands for a moving base, and the base's acceleration in
+        model units per volt of it, peak for peak; None of a model without one. Arguments : as of
+        ``amplitude``; with ideal parts it is the same at every frequency."""
+        system = self.model.second_order()
+        found = system.ground_channel(system.own_frequency if omega is None else omega)
+        if found is None:
+            return None
+        channel, acceleration = found
+        return channel, acceleration / self.amplitude(b, omega, channel)
+
     def largest_amplitudes(self, responses: Sequence[ModelResponse]) -> list[float]:
         """Of each of the generator's channels, over these responses; without any at the model's
         clearance and own frequency [V peak]."""
@@ -216,13 +229,20 @@ class Design:
 
     def in_model_units(self, orbit: Orbit, volts: Array) -> Orbit:
         """An orbit of a board, in volts and seconds, in model units. volts : as of ``volts``."""
-        seconds, graze = self.errors.scales.seconds, orbit.graze
+        seconds, graze, spans = self.errors.scales.seconds, orbit.graze, orbit.spans
+        speeds = orbit.speeds
         if len(graze):
             graze = graze / self._clearance_volts(volts[0::2])[:, None]
+        if len(spans):
+            spans = spans / self._clearance_volts(volts[0::2])[:, None]
+        if len(speeds):
+            speeds = speeds / self._clearance_volts(volts[1::2])[:, None]
         return replace(
             orbit,
             start=orbit.start / volts if len(orbit.start) else orbit.start,
             extremes=orbit.extremes / volts[:, None] if len(orbit.extremes) else orbit.extremes,
+            spans=spans,
+            speeds=speeds,
             impact_times=orbit.impact_times / seconds,
             impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
             lyapunov=orbit.lyapunov * seconds,
@@ -254,6 +274,8 @@ class GeneratorSetting:
     """As of ``Excitation``."""
     second: SecondDrive | None = None
     """As of ``Excitation``."""
+    base: tuple[int, float] | None = None
+    """As of ``Design.base_per_volt``."""
 
     @property
     def excitation(self) -> Excitation:
@@ -268,5 +290,6 @@ def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[Genera
     for r in responses:
         to = design.excitation(r.b, r.omega)
         whose = r.omega, r.expected, to.frequency, to.amplitude
-        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second))
+        base = design.base_per_volt(r.b, r.omega)
+        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second, base=base))
     return tuple(out)

@@ -73,6 +73,7 @@ from .orbit import (
     Orbit as Orbit,
     OrbitStatus as OrbitStatus,
     failed as failed,
+    largest_speeds as largest_speeds,
 )
 from .piecewise_linear import (
     Drive as Drive,

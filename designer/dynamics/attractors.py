@@ -399,6 +399,8 @@ def describe(
         start=run.strobes[0],
         mode=flow.mode_at(x, 0.0, mode),
         extremes=run.extremes,
+        spans=run.spans,
+        speeds=run.speeds,
         impact_times=run.impacts.time[once],
         impact_velocities=run.impacts.velocity[once],
         impact_sides=run.impacts.side[once].astype(float),

@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from designer.base.arrays import Array, Index
+from designer.dynamics.orbit import largest_speeds
 from designer.dynamics.piecewise_linear import ModeKey
 
 
@@ -63,6 +64,12 @@ class FlowResult:
     """Undecided tangencies to a stop."""
     clipped_time: float
     """Time spent in modes where an element that ought to be linear is at its limit."""
+
+    @property
+    def speeds(self) -> Array:
+        """(clearances, 2) as of ``Orbit``, where the impacts were measured."""
+        met = self.impacts
+        return largest_speeds(met.velocity, met.side, met.clearance, len(self.spans))
 
     @property
     def penetration(self) -> float:

@@ -94,6 +94,12 @@ class Orbit(Motion):
     """Key of the mode that holds at ``start``."""
     extremes: Array = field(default_factory=lambda: np.zeros((0, 2)))
     """(states, 2) least and greatest value of each state, refined."""
+    spans: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(clearances, 2) least and greatest displacement in each clearance, refined; (0, 2) where they
+    are not known."""
+    speeds: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(clearances, 2) largest speed at an entry into contact on the lower and the upper stop of
+    each clearance, nan without one; (0, 2) where they are not known."""
     impact_times: Array = field(default_factory=lambda: np.zeros(0))
     """(k,) times of the impacts over n periods, in order."""
     impact_velocities: Array = field(default_factory=lambda: np.zeros(0))
@@ -153,6 +159,14 @@ class Orbit(Motion):
     def radius(self) -> float:
         """Largest modulus of the multipliers; nan where there are none."""
         return float(np.abs(self.multipliers).max()) if len(self.multipliers) else float("nan")
+
+
+def largest_speeds(velocities: Array, sides: Array | Index, clearances: Index, count: int) -> Array:
+    """``Orbit.speeds`` of impacts: their velocities, sides and clearances (k,). count : of all
+    clearances."""
+    speeds = np.full((count, 2), np.nan)
+    np.fmax.at(speeds, (clearances, (sides > 0).astype(int)), np.abs(velocities))
+    return speeds
 
 
 def failed(reason: str) -> Orbit:

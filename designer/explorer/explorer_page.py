@@ -16,7 +16,7 @@ from designer.explorer import plots
 from designer.explorer.controls import Control, controls, length_unit, units_note
 from designer.explorer.omega_strip import PERIODS
 from designer.explorer.place import OMEGA, first_place
-from designer.explorer.response_view import shown_motions
+from designer.explorer.response_view import IN_SIGHT, shown_motions
 from designer.explorer.wire import Message
 from designer.model.model_file import ModelFile
 
@@ -88,6 +88,7 @@ def _render(
             "plots": items,
             "recording": recording,
             "settled_within": PERIODS,
+            "in_sight": IN_SIGHT,
             "length": {"unit": unit, "scale": scale},
         }
     )

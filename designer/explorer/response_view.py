@@ -33,6 +33,11 @@ LISTED = 4
 """Impacts on a stop whose velocities are written one by one; of more the least and the greatest."""
 
 
+RADIUS, EXPONENT = "largest |μ|", "λ max"
+IN_SIGHT = (RADIUS, EXPONENT)
+"""Figures that stay in sight beside the response on a page too narrow for all of them."""
+
+
 @dataclass(frozen=True)
 class Detail:
     """How finely a motion is drawn."""
@@ -203,9 +208,9 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
         symmetric = {True: "yes", False: "no", None: "not known"}[orbit.symmetric]
         rows += [("period", f"{orbit.n} of the drive"), ("symmetric", symmetric)]
         rows.append(("multipliers", multipliers_text(orbit.multipliers)))
-        rows.append(("largest |μ|", f"{orbit.radius:.4g}"))
+        rows.append((RADIUS, f"{orbit.radius:.4g}"))
     per_second = " 1/s" if place.in_si and np.isfinite(orbit.lyapunov) else ""
-    rows.append(("λ max", f"{exponent_text(orbit)}{per_second}"))
+    rows.append((EXPONENT, f"{exponent_text(orbit)}{per_second}"))
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):

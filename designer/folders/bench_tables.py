@@ -20,6 +20,7 @@ from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import state_names
 from designer.model.model import SiScales
 from designer.model.model_file import ModelFile
+from designer.model.si_units import BASE, base_json
 from designer.yields.start_recipe import Recipe, hertz, volts
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.study import plan_study
@@ -61,7 +62,8 @@ def setup_csv(
     """``setup.csv``, in digits that a generator takes; ``design.json`` has all of them.
 
     recipes : how to start each response; None where the nominal circuit does not show it.
-    si : adds what each frequency is in the mechanism, Hz, in a last column.
+    si : adds what each frequency is in the mechanism, Hz, and where its base moves the base's
+    acceleration per volt of the channel that stands for it, in last columns.
     """
     bench_settings = settings(design, responses)
     omegas = [repr(s.omega) for s in bench_settings]
@@ -79,11 +81,14 @@ def setup_csv(
             "start": _start(recipe, si) + _coexisting(r),
             **_second(s),
             **({} if si is None else {MECHANISM: hertz(si.hertz(s.omega))}),
+            **{key: f"{value:.{DIGITS}g}" for key, value in base_json(s.base, si).items()},
         }
         for s, omega, r, recipe in zip(bench_settings, omegas, responses, recipes, strict=True)
     ]
-    more = SECOND if any(s.second is not None for s in bench_settings) else ()
-    return csv_text((*COLUMNS, *more, *(() if si is None else (MECHANISM,))), rows)
+    more: tuple[str, ...] = SECOND if any(s.second for s in bench_settings) else ()
+    more += () if si is None else (MECHANISM,)
+    more += (BASE,) if any(BASE in row for row in rows) else ()
+    return csv_text((*COLUMNS, *more), rows)
 
 
 def _second(setting: GeneratorSetting) -> dict[str, str]:
@@ -189,6 +194,7 @@ def _amplitudes(
     names = ("generator volt", "volt of the generator's second channel")
     driving = [(name, gain) for name, gain in zip(names, gains, strict=True) if gain]
     states = state_names(len(volts) // 2)
+    base = design.base_per_volt(b)
     rows = [(f"volts per unit of {s}", v, "V", b) for s, v in zip(states, volts, strict=True)]
     si = modelfile.si
     if si is None:
@@ -196,13 +202,20 @@ def _amplitudes(
             (f"model units of {s} per volt", 1.0 / v, "1/V", b)
             for s, v in zip(states, volts, strict=True)
         ]
-        return [*rows, *((f"model force per {name}", gain, "1/V", b) for name, gain in driving)]
+        rows += [(f"model force per {name}", gain, "1/V", b) for name, gain in driving]
+        if base is not None:
+            rows.append((f"model acceleration of the base per {names[base[0]]}", base[1], "1/V", b))
+        return rows
     length, speed = si.length_scale, si.speed_scale
     for i, (s, v) in enumerate(zip(states, volts, strict=True)):
         name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
         rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))
     force = si.force_scale
-    return [*rows, *((f"newtons per {name}", gain * force, "N/V", b) for name, gain in driving)]
+    rows += [(f"newtons per {name}", gain * force, "N/V", b) for name, gain in driving]
+    if base is not None:
+        name = f"acceleration of the base per {names[base[0]]}"
+        rows.append((name, base[1] * si.acceleration_scale, "m/s²/V", b))
+    return rows
 
 
 def _coexisting(response: ModelResponse) -> str:

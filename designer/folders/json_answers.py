@@ -5,6 +5,7 @@ JSON has no NaN and no infinity: both become null.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +42,7 @@ def synthesis_json(
     out where there are none.
     """
     from designer.circuit.design import settings
-    from designer.model.si_units import mechanism_json
+    from designer.model.si_units import base_json, mechanism_json
 
     errors, circuit = design.errors, design.circuit
     return {
@@ -71,6 +72,7 @@ def synthesis_json(
                 "omega": s.omega,
                 "frequency_hz": s.frequency_hz,
                 **mechanism_json(s.omega, modelfile.si),
+                **base_json(s.base, modelfile.si),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
                 **({} if s.shape == SINE else {"shape": [list(wave) for wave in s.shape]}),
@@ -162,7 +164,8 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
     orbit = (simulated.orbit, *simulated.others)[number]
     twin = _twin_json(simulated.twins[number] if simulated.twins else None)
     if not simulated.masses:
-        return {**orbit_json(orbit, si), **_frequencies_hz(orbit, si), "twin": twin}
+        own = {**orbit_json(orbit, si), **_frequencies_hz(orbit, si)}
+        return {**own, **_in_clearances(simulated, orbit, si), "twin": twin}
     answer = {**orbit_json(orbit), **_frequencies_hz(orbit, si)}
     is_known = simulated.absolute and len(simulated.absolute[number])
     x = simulated.absolute[number][0::2] if is_known else None
@@ -173,6 +176,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x_max": high,
         "x_min": low,
         **_from_base(simulated, orbit),
+        **_in_clearances(simulated, orbit),
         **_misfits(simulated, number),
         "twin": twin,
     }
@@ -188,6 +192,30 @@ def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
     z = orbit.extremes[0::2] if len(orbit.extremes) else None
     low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
     return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
+
+
+def _in_clearances(
+    simulated: Simulated, orbit: Orbit, si: SiScales | None = None
+) -> dict[str, Any]:
+    """How far an orbit goes in each clearance and into its stops, and how fast it meets them; with
+    ``si`` also that in SI units. Nothing of a model without clearances."""
+    rows: list[dict[str, Any]] = []
+    scales = {"": (1.0, "", 1.0, "")}
+    if si is not None:
+        scales["SI"] = (si.length_scale, "_m", si.speed_scale, "_m_s")
+    for k, (name, motion) in enumerate(zip(simulated.clearances, simulated.motions, strict=False)):
+        low, high = orbit.spans[k] if len(orbit.spans) else (math.nan, math.nan)
+        speeds = orbit.speeds[k] if len(orbit.speeds) else (math.nan, math.nan)
+        row: dict[str, Any] = {"clearance": name, "upper": None, "lower": None}
+        for length, unit, speed, rate in scales.values():
+            row |= {f"max{unit}": length * high, f"min{unit}": length * low}
+            for side, place in motion.stops:
+                end, met = (high, speeds[1]) if side > 0 else (low, speeds[0])
+                key = "upper" if side > 0 else "lower"
+                depth = {f"depth{unit}": length * side * (end - place)}
+                row[key] = {**(row[key] or {}), **depth, f"speed{rate}": speed * met}
+        rows.append(row)
+    return {"in_clearances": rows} if rows else {}
 
 
 def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:

@@ -40,7 +40,8 @@ class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
     is told of blocks that are damaged or of another study. kept : where the blame is; pieces :
     where what is known of one that is not whole. prefix : of the names in the folder, "" or ending
-    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``)."""
+    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``). noise : whether a
+    blame counts only if the noise of its indices is known."""
 
     def __init__(
         self,
@@ -51,8 +52,9 @@ class FolderStores(Stores):
         pieces: StudyCache | None = None,
         prefix: str = "",
         vouch: Vouch = nobody,
+        noise: bool = False,
     ) -> None:
-        self._vouch = vouch
+        self._vouch, self._noise = vouch, noise
         self._root, self._guard, self._note, self._cache = root, guard, note, cache
         self._pieces, self._prefix = pieces, prefix
         self._stores: dict[str, BlockStore[Any]] = {}
@@ -81,6 +83,8 @@ class FolderStores(Stores):
             return None
         result: Blame | None = self._cache.get("blame", blame_hash(plan))
         if result is None or (result.share < 1.0 and (result.budget or 0) < budget):
+            return None
+        if self._noise and not result.noise_known:
             return None
         return result
 

@@ -21,12 +21,13 @@ def windows_csv(windows: Sequence[Mapping[str, Any]], suffix: str = "") -> str:
     end_keys = (*_END, *_in_unit(("value",), suffix))
     window_keys = (*_WINDOW, *_in_unit(("from", "to"), suffix))
     ends = [(side, key) for side in ("from", "to") for key in end_keys]
-    columns = (*window_keys, *(f"{side}_end_{key}" for side, key in ends))
+    columns = (*window_keys, *(f"{side}_end_{key}" for side, key in ends), "family")
     rows = []
     for window in windows:
         row = {key: window[key] for key in window_keys}
         for side, key in ends:
             row[f"{side}_end_{key}"] = window.get(f"{side}_end", {}).get(key)
+        row["family"] = window.get("family")
         rows.append(row)
     return _csv(columns, rows)
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -76,6 +76,20 @@ Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
 """What is in the JSON object, what it cost, and what makes the pictures and tables."""
 
 
+@overload
+def _store(plan: SweepPlan, files: WorkFiles) -> SweepStore: ...
+@overload
+def _store(plan: MapPlan | BasinPlan, files: WorkFiles) -> GridStore: ...
+@overload
+def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore: ...
+def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore:
+    """Where the blocks of a plan's work are kept, to write them and to read them."""
+    if isinstance(plan, SweepPlan):
+        return SweepStore(files, plan.parameter)
+    kind = "map" if isinstance(plan, MapPlan) else "basins"
+    return GridStore(files, kind, plan.x, plan.xs, plan.y, plan.ys)
+
+
 class BifurcationWork:
     """What is to be computed, and what decides it."""
 
@@ -116,9 +130,10 @@ class BifurcationWork:
         plan = self.plan
         assert isinstance(plan, SweepPlan)
         name = plan.parameter
-        store = None if folder is None else SweepStore(self.files(folder), name)
+        store = None if folder is None else _store(plan, self.files(folder))
         blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-        step = self.progress.stage(f"sweep over {name}", blocks)
+        over = titles.taken(plan.subject, name, plan.values)
+        step = self.progress.stage(f"sweep over {over}", blocks)
         self.made = sweep.run(plan, self.jobs, store, step)
         return self.made
 
@@ -126,10 +141,10 @@ class BifurcationWork:
         """The map or the basins likewise."""
         plan, kind = self.plan, self.request.kind
         assert not isinstance(plan, SweepPlan)
-        store = None
-        if folder is not None:
-            store = GridStore(self.files(folder), kind, plan.x, plan.xs, plan.y, plan.ys)
-        step = self.progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+        store = None if folder is None else _store(plan, self.files(folder))
+        over = titles.taken(plan.subject, plan.x, plan.xs)
+        over += f" and {titles.taken(plan.subject, plan.y, plan.ys)}"
+        step = self.progress.stage(f"{kind} over {over}", len(plan.ys))
         if isinstance(plan, MapPlan):
             self.made = made = parameter_map.run(plan, self.jobs, store, step)
             return made
@@ -197,6 +212,8 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
     body: dict[str, Any] = {
         "parameter": name,
         "unit": unit,
+        "from": plan.values.min(),
+        "to": plan.values.max(),
         **({} if si is None else {"si_unit": si.name, "si_scale": si.scale}),
         "tracks": list(plan.tracks),
         "steps": len(plan.values),
@@ -247,11 +264,13 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
 
 
 def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[dict[str, object]]:
-    """The windows of a sweep, and the ends of the periodic ones where these were looked for."""
+    """The windows of a sweep; where they were looked for, families and ends of periodic ones."""
     out = []
     for number, window in enumerate(swept.windows):
         row = with_si(window.as_dict(), unit)
         ends = None if found is None else found.ends[number]
+        if found is not None:
+            row["family"] = found.families[number]
         if ends is not None:
             keys = zip(("from_end", "to_end"), ends, strict=True)
             row |= {key: with_si(end.as_dict(), unit) for key, end in keys}
@@ -415,13 +434,12 @@ class PictureData:
         if self.made is not None:
             return self.made
         assert kept is not None
+        finished = _Finished(_store(plan, kept))
         if isinstance(plan, SweepPlan):
-            return sweep.run(plan, 1, _Finished(SweepStore(kept, plan.parameter)))
-        kind = "map" if isinstance(plan, MapPlan) else "basins"
-        grid = _Finished(GridStore(kept, kind, plan.x, plan.xs, plan.y, plan.ys))
+            return sweep.run(plan, 1, finished)
         if isinstance(plan, MapPlan):
-            return parameter_map.run(plan, 1, grid)
-        return basins.run(plan, 1, grid)
+            return parameter_map.run(plan, 1, finished)
+        return basins.run(plan, 1, finished)
 
 
 @dataclass(frozen=True)
@@ -561,16 +579,15 @@ def requested(
         answer["cost"]["seconds"] = time.perf_counter() - began
         data = PictureData(plan, work.made, None)
         return BifurcationResult(answer, False, None, request.ends, data)
-    folder = Folder(out)
+    folder, kind = Folder(out), request.kind
     inputs = {
-        "model": modelfile.sha256,
+        "model": _model_hash(modelfile, folder, kind),
         "version": __version__,
         "subject": "circuit" if request.circuit else "model",
         "work": work.hash,
     }
     if request.circuit:
         inputs["catalogue"] = load_catalog().hash
-    kind = request.kind
     stages: Stages = {kind: (inputs, _names(kind, work))}
     asked = {"model": modelfile.text, "work": work.decides}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume, asked=asked)
@@ -588,6 +605,14 @@ def requested(
 
 
 # ---------------------------------------------------------------------------------------------
+
+
+def _model_hash(modelfile: ModelFile, folder: Folder, kind: StageName) -> str:
+    """What says of the model file which work a folder has: no motion depends on what is expected
+    of one. Folders of earlier versions say it by the file's text."""
+    stages = {} if folder.manifest is None else folder.manifest.stages
+    said = stages[kind].inputs.get("model") if kind in stages else None
+    return modelfile.sha256 if said == modelfile.sha256 else modelfile.motions_sha256
 
 
 def _subject(

@@ -50,6 +50,8 @@ class Options:
     """Whether the blame is worked out."""
     blame_budget: int | None = None
     """Steps of the blame; None for ``blame_extent.BUDGET``."""
+    blame_anew: bool = False
+    """Whether a stored blame without noise is made anew: ``--blame`` was said."""
     measured: Path | None = None
     """File of a list of boards that are studied instead of random ones."""
 

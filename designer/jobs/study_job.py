@@ -213,7 +213,7 @@ def measured_into(
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
     inputs = {**runner.design_inputs, **numbers, **folder_numbers.rung_input(options)}
-    options = merged(folder, inputs, options, BUILT.stage)
+    options = merged(folder, inputs, options, BUILT.stage, BUILT.prefix)
     stages = BUILT.stages(inputs, options, len(modelfile.responses), census=True)
     list_file = BUILT.prefix + MEASURED
     stages[BUILT.stage][1].append(list_file)

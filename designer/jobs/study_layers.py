@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from designer.base.blame_noise import lacks_noise
 from designer.base.defaults import OVERS
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.manifest import StageName
@@ -16,6 +17,8 @@ from designer.jobs.options import Options
 MAP = "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
 WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
+NOISE = "noise of the blame"
+"""Of a blame that an earlier version had stored without it."""
 
 
 def layers_of(options: Options) -> list[str]:
@@ -30,6 +33,7 @@ def layers_of(options: Options) -> list[str]:
         "reached": options.reached,
         "rare": options.rare,
         WITHOUT_BLAME: not options.blame,
+        NOISE: options.blame and options.blame_anew,
         f"{BLAME_BUDGET}{budget}": budget is not None,
         **{f"{MAP}{over}": True for over in options.map_},
     }
@@ -48,19 +52,28 @@ def blame_budget(layers: Iterable[str]) -> int | None:
 
 
 def merged(
-    folder: Folder, inputs: Mapping[str, Any], options: Options, name: StageName = "study"
+    folder: Folder,
+    inputs: Mapping[str, Any],
+    options: Options,
+    name: StageName = "study",
+    prefix: str = "",
 ) -> Options:
     """The options with every layer that the folder's study has already, if it is one of the same
-    inputs otherwise: a study gets more layers, it loses none. name : of the study's stage."""
+    inputs otherwise: a study gets more layers, it loses none. name : of the study's stage.
+    prefix : of its files."""
     stage = folder.manifest.stages.get(name) if folder.manifest else None
     stored = {} if stage is None else stage.inputs
     if {k: v for k, v in stored.items() if k != "layers"} != dict(inputs):
-        return options
+        return replace(options, blame_anew=False)
+    complete = stage is not None and stage.complete
+    if options.blame_anew:
+        lacking = complete and lacks_noise(folder.json(prefix + TOLERANCE))
+        options = replace(options, blame_anew=lacking)
     names = {*stored.get("layers", ()), *layers_of(options)}
     rung = options.rung
     if "ngspice" in names and rung != "bandwidth":
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    has_blame = stage is not None and stage.complete and blamed(stored["layers"])
+    has_blame = complete and blamed(stored["layers"])
     with_blame = options.blame or has_blame
     return replace(
         options,
@@ -70,6 +83,7 @@ def merged(
         rare="rare" in names,
         map_=tuple(over for over in OVERS if f"{MAP}{over}" in names),
         blame=with_blame,
+        blame_anew=NOISE in names,
         blame_budget=blame_budget(names) if with_blame else None,
     )
 

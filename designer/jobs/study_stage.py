@@ -172,6 +172,7 @@ class StudyStage:
             place.cache(folder, self.progress.note, PIECES),
             place.prefix,
             folder.vouches,
+            noise=options.blame_anew,
         )
 
         def result_of(study: Study) -> RunResult:

@@ -8,9 +8,9 @@ mode is autonomous: z' = M z. A step of length h has the propagator E = exp(M h)
 and every guard are Taylor polynomials in s = t/h, exact to rounding since ‖M h‖ <= 1/2.
 
 Proof that no boundary is stepped over: first the chord bound, max(g0, g1) + |g''| h²/8 < 0, with
-|g''| bounded by an entrywise majorant of C M² exp(M t); where that fails, interval subdivision of
-the guard's polynomial with a bound on its second derivative. Only an interval shorter than 1e-10
-of a step that still cannot be decided counts as grazing.
+|g''| bounded by an entrywise majorant of r M² exp(M t), r the guard's row over z; where that fails,
+interval subdivision of the guard's polynomial with a bound on its second derivative. Only an
+interval shorter than 1e-10 of a step that still cannot be decided counts as grazing.
 """
 
 from __future__ import annotations
@@ -263,10 +263,11 @@ def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, wor
 def _jump(
     tables: ModeTables, mode: int, other: int, guard: int, z: Float, n: int, phi: Float
 ) -> None:
-    """phi ← (I + (f₊ - f₋) Cᵀ/g') phi where the guard g = C x + … is crossed at z.
+    """phi ← (I + (f₊ - f₋) r/g') phi where the guard g = r x + … is crossed at z.
 
-    The saltation matrix: f₋ and f₊ are the vector fields before and after, g' = C f₋ + D u' is the
-    guard's rate (Aizerman and Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958).
+    The saltation matrix: r (n,) is the guard's row over the states, f₋ and f₊ are the vector fields
+    before and after, g' = r f₋ + D u' is the guard's rate
+    (Aizerman and Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958).
     """
     row, rate = tables.guard[mode, guard], 0.0
     for j in range(z.shape[0]):

@@ -130,7 +130,7 @@ def widths(modes: Modes) -> tuple[int, int, int]:
     """Columns of the tables and of the integers of such modes, and their far boundaries.
 
     Those are (2 n + 1, far) behind the linear functions: positive and negative part of each
-    boundary's C, and its constant; their number is rounded up so that loops over it vectorise.
+    boundary's row, and its constant; their number is rounded up so that loops over it vectorise.
     """
     n, far = modes.A.shape[-1], (modes.target == FAR) & _there(modes)
     most = int((_there(modes) & ~far).sum(axis=1).max())
@@ -451,7 +451,7 @@ def _opposite(guards: Float, clearance: Int, ints: Int, count: int, g: int) -> i
 
 @leaf
 def _distant(table: Float, o: int, far: int, row: Float) -> None:
-    """A far boundary's column at o: parts of C by sign, then the largest of what is left."""
+    """A far boundary's column at o: parts of its row by sign, then the largest of what is left."""
     n = row.shape[0] - 3
     for j in range(n):
         table[o + far * j] = max(row[j], 0.0)

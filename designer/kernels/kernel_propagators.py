@@ -503,10 +503,11 @@ def _log_impact(trail: RunTrail, time: float, clearance: int, side: int, data: F
 def _leap(
     data: Float, place: int, before: int, after: int, unit: Unit, phi: Float, work: Float
 ) -> None:
-    """phi ← (I + (f₊ - f₋) Cᵀ/g') phi where the guard at ``place``, C x + …, is crossed.
+    """phi ← (I + (f₊ - f₋) r/g') phi where the guard at ``place``, r x + …, is crossed.
 
-    The saltation matrix: f₋ and f₊ are the vector fields of the modes before and after, g' is the
-    guard's rate (Aizerman and Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958).
+    The saltation matrix: r (n,) is the guard's row over the states, f₋ and f₊ are the vector fields
+    of the modes before and after, g' is the guard's rate
+    (Aizerman and Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958).
     """
     n, rate = len(unit), 0.0
     local, _, _ = function_places(n)

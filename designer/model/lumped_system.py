@@ -189,8 +189,6 @@ def _check_restitution(gap: Gap, field: str) -> None:
     """It decides the damper of the stops, so that there is one damper and one stiffness for it."""
     if gap.damping:
         _refuse(field, gap.restitution, "none beside damping, which it decides")
-    if gap.of is not None:
-        _refuse(field, gap.restitution, "damping instead: of a combination no one contact is meant")
     if gap.law == "hertz":
         _refuse(field, gap.restitution, 'damping instead: with law = "hertz" no stiffness decides')
     upper, lower = gap.sides
@@ -533,7 +531,8 @@ class LumpedSystem(Elements):
         """Of the stops of a clearance: as stated, or what makes its restitution.
 
         A contact of the bodies with such a stop alone lasts half a period of their motion on its
-        spring, which leaves exp(-π ζ/√(1 - ζ²)) of the speed.
+        spring, which leaves exp(-π ζ/√(1 - ζ²)) of the speed. The mass that moves on that spring
+        is 1/(r M⁻¹ rᵀ), r the factors of the displacements in the clearance and M the mass matrix.
         """
         if gap.restitution is None:
             return gap.damping

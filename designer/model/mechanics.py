@@ -215,6 +215,22 @@ class SecondOrderSystem:
         """Without the ground's."""
         return (HarmonicForce(1, self.force, self.quadrature), *self.harmonics)
 
+    def ground_channel(self, omega: float) -> tuple[int, float] | None:
+        """The channel that makes the ground's motion at a drive frequency, and the peak of the
+        ground's acceleration; None where the ground rests, where both channels take part in its
+        motion, and where forces take more than two."""
+        ground = channels(_parts(self._without_forces.drive_waves(omega)))
+        every = self.channels(omega)
+        if not ground or not every:
+            return None
+        peak = float(np.abs(ground[0].force[0]) / self.mass[0])
+        wanted = np.abs(ground[0].force)
+        for number, each in enumerate(every):
+            near = np.allclose(np.abs(each.force), wanted, rtol=1e-9, atol=0.0)
+            if len(every) == 1 or (near and each.shape == ground[0].shape):
+                return number, peak
+        return None
+
     def drive_force(self, omega: float, channel: int = 0) -> Array:
         """(n,) amplitude of a channel's shape in the force on each mass at a drive frequency; 0 for
         a channel that there is not.

@@ -172,6 +172,11 @@ class SiScales:
         """Metres per second per unit of its velocities."""
         return self.length_scale / self.time_scale
 
+    @property
+    def acceleration_scale(self) -> float:
+        """Metres per second squared per unit of its accelerations."""
+        return self.speed_scale / self.time_scale
+
     def omega(self, Omega: float) -> float:
         """The model's frequency of an excitation at ``Omega`` rad/s."""
         return Omega * self.time_scale

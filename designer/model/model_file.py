@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -50,7 +51,7 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.matrices import Matrices, written_out
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem
 from designer.model.model import Dimensionless, Mechanical, SiScales
-from designer.model.response_table import Response, ResponseTable
+from designer.model.response_table import EXPECTED, Response, ResponseTable
 from designer.model.search_table import SearchSpec
 from designer.model.si_units import in_si
 from designer.model.spread_table import BENCH_1, SpreadSpec
@@ -103,6 +104,18 @@ class ModelFile:
     def sha256(self) -> str:
         """Hash of the text: two files with the same hash ask for the same thing."""
         return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+
+    @property
+    def motions_sha256(self) -> str:
+        """Hash of its tables without what is expected of responses: files with the same one have
+        the same motions, whatever is wanted of them."""
+        data = self.data
+        data["response"] = [
+            {key: value for key, value in response.items() if key not in EXPECTED}
+            for response in data.get("response", ())
+        ]
+        text = json.dumps(data, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
 
     @property
     def angular(self) -> bool:

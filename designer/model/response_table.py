@@ -183,6 +183,10 @@ class HertzResponse(Response):
     in_hertz: ClassVar[bool] = True
 
 
+EXPECTED = ("expect", "twin", "symmetric", "least_exponent")
+"""Keys by which a motion is judged; none changes it."""
+
+
 @dataclass(frozen=True)
 class ResponseTable(Response):
     """A response as a file states it."""

@@ -52,6 +52,17 @@ def mechanism_json(omega: float, si: SiScales | None) -> dict[str, float]:
     return {} if si is None else {"mechanism_hz": si.hertz(omega)}
 
 
+BASE = "base_m_s2_per_v"
+
+
+def base_json(per_volt: tuple[int, float] | None, si: SiScales | None) -> dict[str, float]:
+    """The acceleration of a moving base per generator volt, m/s²; nothing of a model without SI
+    values or without one. per_volt : channel, and the same in model units."""
+    if si is None or per_volt is None:
+        return {}
+    return {BASE: per_volt[1] * si.acceleration_scale}
+
+
 def units_of(si: SiScales | None, model: MechanicalModel) -> dict[str, Unit]:
     """The SI units that a model's quantities are shown in beside its own numbers, by name: none of
     a model without SI values, and no unit that the numbers have already, but for frequencies,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -168,6 +169,8 @@ SHARE_BAND = 1.6
 """Height of the band of counted basins [inch]."""
 STOP_PANEL = 1.8
 """Height of the panel of each stop past the first [inch]."""
+PANEL = 30
+"""Letters of a line that stands along a panel."""
 STRIPS = {DOWN: "↓", UP: "↑"}
 
 
@@ -236,18 +239,14 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     symbol = plan.subject.states[0][0]
     labels = plan.subject.labels
     name = labels.get("displacement", f"{symbol}₁")
-    least.set_ylabel(
-        _label(
-            f"least {name}\nin each period" if labels else f"least {name} in each period",
-            units.get("x", ""),
-        )
-    )
+    text = f"least {name}\nin each period" if labels else f"least {name} in each period"
+    least.set_ylabel(_label(_wrapped(text), units.get("x", "")))
     for speed, stop in zip(speeds, plan.subject.stops, strict=True):
         text = f"impact velocity {stop.velocity}\non {stop.name}"
         if len(speeds) > 1:  # their panels are too low for the stop's name beside them
             heading, text = f"on {stop.name}", f"impact velocity\n{stop.velocity}"
             speed.set_title(heading, loc="left", pad=2.0, fontsize=8, color=MUTED, weight="normal")
-        speed.set_ylabel(_label(text, units.get("v", "")))
+        speed.set_ylabel(_label(_wrapped(text), units.get("v", "")))
         si_y(speed, si.get("x1'"))
     growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
     for axes in panels:
@@ -257,9 +256,14 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
 
 def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
     """The axis of the swept parameter, below the lowest panel."""
-    span = float(plan.values[-1] - plan.values[0])
-    lowest.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
+    lowest.set_xlim(*_limits(plan.values))
     parameter_x(lowest, plan.subject, plan.parameter, below=SECOND_AXIS)
+
+
+def _limits(values: Array) -> tuple[float, float]:
+    """Of the axis of the swept parameter: its values and a little beside them."""
+    beside = 0.004 * float(values[-1] - values[0])
+    return float(values[0]) - beside, float(values[-1]) + beside
 
 
 def _met(step: SteadyMotion, stop: int) -> Array:
@@ -455,8 +459,9 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
             and bool(before.symmetric) is bool(window.symmetric)
         ):
             axes.axvline(window.low - half, color="white", lw=0.8)
+    left, right = _limits(values)
     for window in named:
-        low, high = window.low - half, window.high + half
+        low, high = max(window.low - half, left), min(window.high + half, right)  # what is seen
         centre = 0.5 * (low + high)
         text = window.response
         wide = len(text) * 0.0068 * span
@@ -526,6 +531,11 @@ def _attractor_colours(result: Basins) -> list[str]:
         else:
             out.append(OPEN if a.response == OrbitStatus.NOT_SETTLED else next(free))
     return out
+
+
+def _wrapped(text: str) -> str:
+    """A panel's label on as many lines as keep it within the panel: names may be long."""
+    return "\n".join(part for line in text.split("\n") for part in wrap(line, PANEL))
 
 
 def _label(text: str, unit: str) -> str:

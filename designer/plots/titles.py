@@ -5,7 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping
 
-from designer.base.si_unit import quantity_text
+from designer.base.arrays import Array
+from designer.base.si_unit import quantity_text, span_text
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan
@@ -85,6 +86,13 @@ def _fixed(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[st
     for name, value in {**subject.fixed(changed), **changed}.items():
         if value is not None:
             yield f"{parameter_name(subject, name)} = {parameter_text(subject, name, value)}"
+
+
+def taken(subject: Subject, name: str, values: Array) -> str:
+    """A swept parameter and its range, with the unit that its numbers were taken in."""
+    low, high = float(values.min()), float(values.max())
+    unit, si = subject.units.get(name, ""), subject.si.get(name)
+    return f"{NAMES.get(name, name)} {span_text(low, high, unit, si)}"
 
 
 def in_si_values(subject: Subject) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -405,7 +406,7 @@ def _blame(data: ReportData, pictures: Pictures) -> PageSection:
     if avoided is not None:
         blocks.append(PageSection("Losses avoided", [avoided, pictures.get("avoided")]))
     if indices is not None:
-        moved: list[Block] = [SmallPrint(INDICES_NOTE), indices, pictures.get("indices")]
+        moved: list[Block] = [*_indices_note(data, blame), indices, pictures.get("indices")]
         blocks.append(PageSection("Whose spread moves the margin", moved))
     blocks.append(_one("Worst corners", tolerance_tables.corners(data)))
     title = "Which part is to blame?" if lost else "What comes nearest to a loss?"
@@ -414,9 +415,23 @@ def _blame(data: ReportData, pictures: Pictures) -> PageSection:
 
 INDICES_NOTE = (
     "Sobol indices of the margin, the largest of each response: the share of its variance that a "
-    "coordinate explains alone (first-order) and with all others (total), with the 95 % noise of "
-    "the estimate, by the bootstrap over base samples."
+    "coordinate explains alone (first-order) and with all others (total)"
 )
+NOISE_NOTE = ", with the 95 % noise of the estimate, by the bootstrap over base samples."
+
+
+def _indices_note(data: ReportData, blame: Blame) -> list[Block]:
+    """What the indices are; where their noise was not stored, how to get it."""
+    if blame.noise_known:
+        return [SmallPrint(INDICES_NOTE + NOISE_NOTE)]
+    folder = shlex.quote(data.folder) if data.folder else "DIR"
+    measured = " --measured FILE" if data.plan.census else ""
+    return [
+        SmallPrint(
+            f"{INDICES_NOTE}. An earlier version made them and stored no noise; this works it out:"
+        ),
+        Verbatim((f"designer tolerance {folder}{measured} --blame --resume",)),
+    ]
 
 
 def _blame_note(blame: Blame, *, lost: bool) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from designer.base.page import Table, table
-from designer.base.si_unit import drive_text
+from designer.base.si_unit import acceleration_text, drive_text
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
@@ -226,6 +226,11 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
         if si is not None:
             one = "one generator volt" if name == "generator" else f"one volt of the {name}"
             rows.append((one, words.quantity(gain * si.force_scale, "N")))
+    base = design.base_per_volt()
+    if base is not None and si is not None:
+        whose = ("one generator volt", "one volt of the second channel")[base[0]]
+        text = acceleration_text(base[1] * si.acceleration_scale)
+        rows.append((f"{whose}, of the base's acceleration", text))
     return table(("scale", "value"), rows, (1,))
 
 

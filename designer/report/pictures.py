@@ -56,10 +56,8 @@ AVOIDED = (
     "Per cent of the lost boards that were asked again. Above the line groups, below it the parts "
     "that help most."
 )
-INDICES = (
-    "First-order: what a coordinate explains alone; total: with all others. Thin lines: the 95 % "
-    "noise of each."
-)
+INDICES = "First-order: what a coordinate explains alone; total: with all others."
+NOISE = " Thin lines: the 95 % noise of each."
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
 """From where each side is seen."""
@@ -251,5 +249,6 @@ def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
     if any(b is not None and b.indices for b in blames):
         shows = "Sobol indices of each response's margin, its largest coordinates."
         svg = element(blame_plots.index_chart(labels, blames), shows)
-        out["indices"] = Picture(caption=INDICES, svg=svg)
+        known = data.study.blame is not None and data.study.blame.noise_known
+        out["indices"] = Picture(caption=INDICES + NOISE * known, svg=svg)
     return out

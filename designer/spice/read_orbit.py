@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.dynamics.counts import MAX_PERIOD, read_counts
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus, largest_speeds
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice.simulator import Waveforms
 
@@ -152,6 +152,11 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
     order = np.argsort(times, kind="stable")
     which = [np.full(len(each.times), k) for k, each in enumerate(impacts)]
     pairs = [each.pair for each in impacts] or [(0, 0)]
+    met = (
+        _joined([each.velocities for each in impacts])[order],
+        _joined([each.sides for each in impacts])[order],
+        _joined(which)[order].astype(np.int64),
+    )
     orbit = Orbit(
         status=status,
         n=n,
@@ -160,10 +165,12 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         more=tuple(pairs[1:]),
         start=strobes[-1],
         extremes=np.stack([y[inside].min(axis=0), y[inside].max(axis=0)], axis=1),
+        spans=np.array([each.span for each in impacts]).reshape(-1, 2),
+        speeds=largest_speeds(*met, len(impacts)),
         impact_times=times[order],
-        impact_velocities=_joined([each.velocities for each in impacts])[order],
-        impact_sides=_joined([each.sides for each in impacts])[order],
-        impact_clearances=_joined(which)[order].astype(np.int64),
+        impact_velocities=met[0],
+        impact_sides=met[1],
+        impact_clearances=met[2],
         asymmetry=_asymmetry(t, y, marks[-1], n, reading.period, peak),
         graze=np.array([[each.depth, each.miss] for each in impacts]).reshape(-1, 2),
         reason=reason,
@@ -176,7 +183,8 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
 class _Impacts:
     """The impacts in one clearance over a lap, and what makes their count doubtful.
 
-    counts : a lap, by side. depth, miss : of the shallowest contact and the nearest miss.
+    counts : a lap, by side. depth, miss : of the shallowest contact and the nearest miss. span :
+    least and greatest displacement in the clearance.
     """
 
     counts: dict[int, float]
@@ -185,6 +193,7 @@ class _Impacts:
     velocities: Array
     depth: float
     miss: float
+    span: tuple[float, float]
     doubt: str
 
     @property
@@ -229,7 +238,8 @@ def _impacts(
             velocities.append(np.interp(once, t, moving) if len(once) else np.zeros(0))
         moved = y @ rows.displacement[:-2] + rows.displacement[-2] * u + rows.displacement[-1]
         floor = ENGINE_ERROR * max(float(np.abs(moved).max()), 1e-12)
-        joined = _joined(times), _joined(sides), _joined(velocities), depth, miss
+        span = float(moved[inside].min()), float(moved[inside].max())
+        joined = _joined(times), _joined(sides), _joined(velocities), depth, miss, span
         out.append(_Impacts(counts, *joined, _doubt(counts, min(depth, miss), floor)))
     return out
 

@@ -19,7 +19,9 @@ import numpy as np
 
 from designer.base.errors import Unreachable
 from designer.base.progress import best_so_far, doing, part
+from designer.base.units import format_quantity
 from designer.catalog.design_rule import ROUNDING
+from designer.catalog.entries import UNITS, Kind
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
@@ -49,6 +51,8 @@ from designer.synthesis.scale_box import Conflict
 from designer.synthesis.scale_choice import ScaleAttempt, ScaleChoice
 from designer.synthesis.static_shifts import least_drive
 
+EVERY: dict[Kind, tuple[float, float]] = {"resistor": (1e-2, 1e10), "capacitor": (1e-14, 1.0)}
+"""A range that holds every value which is sold [ohm, F]."""
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
 BOX_ROUNDS = 8
@@ -165,7 +169,7 @@ def synthesise(
         search = _Search(order, responses, jobs)
         best = search.best(spec.active_conditions)
     if isinstance(best, _Missed):
-        search.refuse(best)
+        search.refuse(best, catalog)
     design = best.design
     if binding:
         design = replace(design, binding=search.binding(best))
@@ -308,11 +312,11 @@ class _Search:
 
         yield best_beside(order, best.limits, linear, best_pair, make, most)
 
-    def refuse(self, missed: _Missed) -> NoReturn:
+    def refuse(self, missed: _Missed, catalog: Catalog) -> NoReturn:
         """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees
         it."""
         if missed.conflicts:
-            _refuse_conflicts(missed)
+            _refuse_conflicts(missed, self.order.spec, catalog)
         what = missed.short.what
         guilty, names = self._guilty(missed)
         if names and names != what:
@@ -552,19 +556,51 @@ def _design(order: Order, made: Attempt) -> Design:
     )
 
 
-def _refuse_conflicts(missed: _Missed) -> NoReturn:
+def _sold(kind: Kind, spec: CircuitSpec, catalog: Catalog) -> tuple[float, float]:
+    """The least and the largest value of the file's series and grade that can be bought."""
+    series, grade = (
+        (spec.capacitors, spec.capacitor_grade)
+        if kind == "capacitor"
+        else (spec.resistors, spec.resistor_grade)
+    )
+    values = catalog.values(kind, series, *EVERY[kind], grade)
+    return float(values.min()), float(values.max())
+
+
+def _unbought(conflict: Conflict, spec: CircuitSpec, catalog: Catalog) -> str:
+    """That a wider range alone would ask for a value which cannot be bought; "" of one that can,
+    and of any other limit."""
+    limit = conflict.limit
+    for kind in UNITS:
+        if limit.condition == f"{kind}_range":
+            low, high = _sold(kind, spec, catalog)
+            if limit.least and conflict.needed < low:
+                return f"no {kind} below {format_quantity(low, limit.unit, 3)}"
+            if not limit.least and conflict.needed > high:
+                return f"no {kind} above {format_quantity(high, limit.unit, 3)}"
+    return ""
+
+
+def _refuse_conflicts(missed: _Missed, spec: CircuitSpec, catalog: Catalog) -> NoReturn:
     """Raise ``Unreachable`` with limits that cannot be kept together, and how far each would have
-    to give."""
+    to give: those that can, and why the others cannot."""
     limits = ", ".join(c.limit.told(c.limit.value) for c in missed.conflicts)
     found = f"no scales within the limits of the search (linear program): together stand {limits}"
     if missed.broken:
         names = ", ".join(n for n in SIDE_CONDITIONS if n in missed.broken)
         found += f"; where finished circuits did not keep {names}, that was made narrower"
-    ways = [c.limit.told(c.needed) for c in missed.conflicts if np.isfinite(c.needed) and c.needed]
-    there = {c.limit.condition for c in missed.conflicts}
+    given = [c for c in missed.conflicts if np.isfinite(c.needed) and c.needed]
+    alone = [c for c in missed.conflicts if c not in given]
+    lacking = {c: text for c in given if (text := _unbought(c, spec, catalog))}
+    ways = [c.limit.told(c.needed) for c in given if c not in lacking]
+    there = {c.limit.condition for c in missed.conflicts if c.frees}
     free = "one of them as wide as this, the others as they are: " + " or ".join(ways)
     if not ways:
         free = "two of them wider"
+    for each, text in lacking.items():
+        free += f"; {each.limit.told(each.needed)} would do too, but the catalogue has {text}"
+    if alone and ways:
+        free += f"; no value of {' or of '.join(c.limit.what for c in alone)} alone is enough"
     if there & set(SIDE_CONDITIONS):
         free += "; or circuit.side_conditions without "
         free += " or ".join(n for n in SIDE_CONDITIONS if n in there)

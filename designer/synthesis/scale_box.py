@@ -38,6 +38,8 @@ class Conflict:
     needed: float
     """What it would have to be for a choice of scales, the others as they are; infinite, or 0,
     where no number helps."""
+    frees: bool
+    """Whether there are scales without any limit of its condition."""
 
 
 @dataclass
@@ -113,7 +115,14 @@ class ScaleBox:
             if self.point(any_point, without={*gone, limit}) is None:
                 gone.append(limit)
         held = [limit for limit in limits if limit not in gone]
-        return [Conflict(limit, self._needed(limit)) for limit in held]
+        whose = {
+            limit.condition: [one for one in limits if one.condition == limit.condition]
+            for limit in held
+        }
+        frees = {
+            name: self.point(any_point, without=own) is not None for name, own in whose.items()
+        }
+        return [Conflict(limit, self._needed(limit), frees[limit.condition]) for limit in held]
 
     def _needed(self, limit: StatedLimit) -> float:
         """What a limit would have to be, with all others kept."""

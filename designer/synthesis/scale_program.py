@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.eseries import series_values
 from designer.base.units import format_quantity
 from designer.catalog.diode_curve import diode_model
 from designer.circuit.build import constant_resistor
@@ -26,6 +27,7 @@ from designer.circuit.dead_zone_parts import HalfNames, half_parts
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.netlist import Circuit, Section
 from designer.linear_network.linear_terms import Targets
+from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.clearance import Clearance
 from designer.model.find_responses import Reach
 from designer.model.mechanics import SecondOrderSystem
@@ -45,16 +47,28 @@ from designer.synthesis.stop_halves import INPUTS
 HIGHEST = 0.95
 """Of the output limit: the highest threshold. A stop that no wanted response meets has to be within
 reach of the displacement too."""
+EQUAL = 1e-9
+"""Relative: values that differ by less are one."""
 STILL = 1e-6
 """Peaks below this share of the largest count as so much: those of a state that hardly moves."""
 
 
+CATALOGUE, TRIED, STAGE = "catalogue", "tried", "stage"
+"""Limits that neither a side condition nor a key sets: by what can be bought, by the values that a
+search tries, by a stage's own way to work."""
+_TOLD = {
+    CATALOGUE: "no other can be bought",
+    TRIED: "no other is tried there",
+    STAGE: "of the stage itself",
+}
+
+
 @dataclass(frozen=True)
 class StatedLimit:
-    """A number that a side condition or the model file sets."""
+    """A number that a side condition, the model file or the catalogue sets."""
 
     condition: str
-    """The side condition, or the key of the table [circuit]."""
+    """The side condition, the key of the table [circuit], ``CATALOGUE``, ``TRIED`` or ``STAGE``."""
     what: str
     """What is limited, in words."""
     value: float
@@ -67,7 +81,15 @@ class StatedLimit:
     def told(self, value: float) -> str:
         """The limit in words, at this value."""
         number = format_quantity(value, self.unit, 3)
-        return f"{self.what} {'>=' if self.least else '<='} {number} ({self.condition})"
+        keys = {each.name for each in fields(CircuitSpec)}
+        whose = f"rule {self.condition}"
+        if self.condition in _TOLD:
+            whose = _TOLD[self.condition]
+        elif self.condition in SIDE_CONDITIONS:
+            whose = f"side condition {self.condition}"
+        elif self.condition in keys:
+            whose = f"circuit.{self.condition}"
+        return f"{self.what} {'>=' if self.least else '<='} {number} ({whose})"
 
 
 @dataclass(frozen=True)
@@ -318,10 +340,10 @@ class _Maker:
         frequency = -self.time + float(np.log(self.system.own_frequency / (2.0 * np.pi)))
         self._keep(frequency, StatedLimit("frequency", "the band's low end", low, "Hz", least=True))
         self._keep(frequency, StatedLimit("frequency", "the band's high end", high, "Hz"))
-        self._keep(
-            self.time,
-            StatedLimit("bandwidth", "least time scale", self.within.seconds[0], "s", least=True),
-        )
+        least = self.within.seconds[0]
+        if least > self.system.own_frequency / (2.0 * np.pi * high) * (1.0 + EQUAL):
+            what = "circuit time per unit of model time"
+            self._keep(self.time, StatedLimit("bandwidth", what, least, "s", least=True))
         levels = [self.volts(i) + self.peaks[i] for i in range(self.states)]
         swing = StatedLimit("swing", "peak of a state", self.within.swing, "V")
         ratio = StatedLimit("level", "ratio of two peaks", self.within.level)
@@ -344,10 +366,28 @@ class _Maker:
         """Of the parts that are chosen at will."""
         for name, place in self.shared.items():
             own = np.exp(self.lists[place][[0, -1]])
-            key, unit = ("capacitor_range", "F") if name[0] == "C" else ("resistor_range", "Ω")
-            low, high = (float(end) for end in own)
-            self._keep(self._unit(place), StatedLimit(key, "the least", low, unit, least=True))
-            self._keep(self._unit(place), StatedLimit(key, "the largest", high, unit))
+            for end, most in zip(own.tolist(), (False, True), strict=True):
+                self._keep(self._unit(place), self._end(name, end, most=most))
+
+    def _end(self, name: str, value: float, *, most: bool) -> StatedLimit:
+        """The limit that the least or the largest value of a part is, by what sets it."""
+        spec, order = self.order.spec, self.order
+        kind = "capacitor" if name[0] == "C" else "resistor"
+        series, span, bought, unit = (
+            (spec.capacitors, spec.capacitor_range, order.capacitors, "F")
+            if kind == "capacitor"
+            else (spec.resistors, spec.resistor_range, order.resistors, "Ω")
+        )
+        allowed = series_values(series, *span)[-1 if most else 0]
+        sold = bought.max() if most else bought.min()
+        whose = TRIED
+        if np.isclose(value, allowed, rtol=EQUAL, atol=0.0):
+            whose = f"{kind}_range"
+        elif np.isclose(value, sold, rtol=EQUAL, atol=0.0):
+            whose = CATALOGUE
+        # One key is one limit for every part that it bounds.
+        what = f"the {'largest' if most else 'smallest'} {kind}"
+        return StatedLimit(whose, what, value, unit, least=not most)
 
     def _row(
         self,
@@ -514,11 +554,9 @@ class _Maker:
         known[first.resistor] = self.part(first.resistor)
         for force in (first, *others):
             capacitor, log = force.capacitor, seconds - known[force.resistor]
-            for word, most in (("the least", False), ("the largest", True)):
+            for most in (False, True):
                 value = float(np.exp(values[-1 if most else 0]))
-                what = f"{capacitor}, {word}"
-                limit = StatedLimit("capacitor_range", what, value, "F", least=not most)
-                self._keep(log, limit)
+                self._keep(log, self._end(capacitor, value, most=most))
             self.rows.append(Row((capacitor,), log, values))
 
     def _lift(
@@ -543,7 +581,7 @@ class _Maker:
             share = float(np.log(abs(each.factor)))
             self._row([each.resistor], source + self.volts(each.state) - self.volts(x) - share)
         what = f"gain of the difference in clearance {clearance.name}"
-        self._keep(gain, StatedLimit("stage", what, MOST_DIFFERENCE))
+        self._keep(gain, StatedLimit(STAGE, what, MOST_DIFFERENCE))
         if reach.peak > 0.0:
             peak = gain + self.volts(x) + float(np.log(reach.peak))
             what = f"difference in clearance {clearance.name}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from designer.base.defaults import CURVE_DEPTH, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.si_unit import quantity_text, suffix, value_text
+from designer.base.si_unit import Unit, quantity_text, span_text, suffix, value_text
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Kind, Out, Overwrite, Resume, Seed, Source, Verb, option
 from designer.verbs.tables import YES_NO, files
@@ -41,7 +41,9 @@ def bifurcation(
         option(
             "--from",
             "A",
-            'One end of the sweep; of a file with SI values also "10 Hz" or "0.5 mm".',
+            "One end of the sweep. A plain number has the unit of the model: ω in rad/s where "
+            'the values of a format 2 file have units. Of a file with SI values also "10 Hz" or '
+            '"0.5 mm".',
             reads=str | None,
         ),
     ] = None,
@@ -215,8 +217,10 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     si = answer.get("si_unit")
     chaos = any("lyapunov" in w for w in widest)
     followed = any("from_end" in w for w in widest)
+    members = Counter(w["family"] for w in windows if w.get("family")).values()
+    families = any(count > 1 for count in members)
     table(
-        "Windows",
+        f"Windows{_taken(answer)}",
         (
             {
                 "track": w["track"],
@@ -224,15 +228,20 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
+                **({"family": _family(w)} if families else {}),
                 **(_located(w, answer["unit"], si, in_si=in_si) if followed else {}),
                 **({f"λ{' [1/s]' if unit else ''}": _exponents(w)} if chaos else {}),
             }
             for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
         ),
     )
+    if families:
+        say("windows of one family show one motion that goes on from each to the next")
     left_out = {end["reason"] for w in widest for end in _not_sought(w)}
     if left_out:
         say(f"-: the ends of a window are not looked for where {' or '.join(sorted(left_out))}")
+    if _narrow(windows):
+        say("more --steps, or --from and --to close about a narrow window, find its ends")
     if len(windows) > len(widest):
         say(f"and {len(windows) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
@@ -248,6 +257,18 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
         if "region" in answer:
             for text in _region(answer, both):
                 say(text)
+
+
+def _taken(answer: Mapping[str, Any]) -> str:
+    """What was swept, with the unit that its numbers were taken in; "" of older answers."""
+    if "from" not in answer:
+        return ""
+    from designer.plots.titles import NAMES
+
+    name, si = answer["parameter"], answer.get("si_unit")
+    unit = None if si is None else Unit(si, answer["si_scale"])
+    span = span_text(answer["from"], answer["to"], answer["unit"], unit)
+    return f", {NAMES.get(name, name)} {span}"
 
 
 Written = Callable[[float], str]
@@ -394,6 +415,18 @@ def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) 
     own = {f"{end}{unit}": f"{window[end]:.6g}" for end in names}
     other = {f"{end} [{si}]": _si(window, end, si) for end in names} if si else {}
     return {**other, **own} if in_si else {**own, **other}
+
+
+def _family(window: Mapping[str, Any]) -> str:
+    """The number of a periodic window's family."""
+    return "-" if window["family"] is None else str(window["family"])
+
+
+def _narrow(windows: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether ends were not looked for because too few steps show a window."""
+    from designer.bifurcations.window_ends import LEAST_STEPS
+
+    return any(_not_sought(w) and w["steps"] < LEAST_STEPS for w in windows)
 
 
 def _not_sought(window: Mapping[str, Any]) -> list[Mapping[str, Any]]:

@@ -57,7 +57,13 @@ def run(
 
     words = {"samples": samples, "seed": seed, "until": None, "blame": blame}
     words |= {"blame_budget": blame_budget}
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **stated_options(words))
+    options = Options(
+        jobs=jobs,
+        overwrite=overwrite,
+        resume=resume,
+        blame_anew=bool(blame),
+        **stated_options(words),
+    )
     return design_and_study(
         model, out, options, words, VERB.command, progress, shown, catalog, whole_job=True
     )

@@ -99,7 +99,8 @@ def simulate(
         option("--rung", None, "The op-amps' model, with --engine ngspice."),
     ] = "ideal",
     starts: Annotated[
-        int, option("--starts", "N", "Initial states that are drawn: the attractors' shares.")
+        int,
+        option("--starts", "N", "Initial states that are drawn: the attractors' shares; 0: none."),
     ] = DRAWN_STARTS,
     seed: Seed = SEED,
     start: Annotated[
@@ -292,6 +293,11 @@ def tables(answer: Mapping[str, Any]) -> None:
     if any("base_amplitude" in r for r in rows):
         from_base = [_from_base(r, masses, in_si=in_si) for r in rows]
         table("Displacements from the base", from_base, gap=1)
+    met = [(r, each) for r in rows for each in r.get("in_clearances", ())]
+    if met:
+        sides = [side for side in ("upper", "lower") if any(one[side] for _, one in met)]
+        in_them = (_in_clearance(r, one, sides, in_si=in_si) for r, one in met)
+        table("In the clearances: furthest into each stop, and fastest impact", in_them, gap=1)
     for r in rows:
         place = _place(r, in_si=in_si)
         if r["starts"] is not None:
@@ -327,6 +333,33 @@ def _from_base(row: Mapping[str, Any], masses: Sequence[str], *, in_si: bool) ->
         cells[f"x{i + 1} − y ({name})"] = _between(ends, in_si=in_si)
     y = row["base_amplitude"]
     return {**cells, "y (base)": f"± {value_text(y, 'm') if in_si else format(y, '.6g')}"}
+
+
+def _in_clearance(
+    row: Mapping[str, Any], met: Mapping[str, Any], sides: Iterable[str], *, in_si: bool
+) -> dict[str, str]:
+    """How far a response goes in a clearance and into its stops, and the fastest impact on each."""
+    stated = "max_m" in met  # beside the values of a dimensionless model
+    length, rate = ("_m", "_m_s") if stated else ("", "")
+
+    def text(value: float | None, unit: str) -> str:
+        if value is None:
+            return "-"
+        return value_text(value, unit) if stated or in_si else f"{value:.6g}"
+
+    low, high = met[f"min{length}"], met[f"max{length}"]
+    cells = {
+        "at": _place(row, in_si=in_si),
+        "response": row["response"],
+        "clearance": met["clearance"],
+        "displacement": "-" if low is None else f"{text(low, 'm')} to {text(high, 'm')}",
+    }
+    for side in sides:
+        stop = met[side] or {}
+        depth = stop.get(f"depth{length}")
+        cells[f"{side} depth"] = text(depth if (depth or 0.0) > 0.0 else None, "m")
+        cells[f"{side} speed"] = text(stop.get(f"speed{rate}"), "m/s")
+    return cells
 
 
 def _between(ends: Sequence[float], *, in_si: bool) -> str:

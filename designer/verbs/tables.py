@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.si_unit import drive_text, is_angular, value_text
+from designer.base.blame_noise import lacks_noise
+from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
 
@@ -103,10 +104,18 @@ def synthesised(answer: Mapping[str, Any]) -> None:
                     "frequency": f"{r['frequency_hz']:.4g} Hz",
                     "amplitude (peak, high-Z)": f"{r['amplitude_v_peak']:.4g} V",
                     **_second_channel(r),
+                    **_base(r),
                 }
                 for r in rows
             ),
         )
+
+
+def _base(knob: Mapping[str, Any]) -> dict[str, str]:
+    """The base's acceleration per volt of the channel that stands for it, where it moves."""
+    if "base_m_s2_per_v" not in knob:
+        return {}
+    return {"base per volt": acceleration_text(knob["base_m_s2_per_v"])}
 
 
 def _second_channel(knob: Mapping[str, Any]) -> dict[str, str]:
@@ -176,10 +185,16 @@ def _boards(answer: Mapping[str, Any]) -> None:
 
 
 def blame_status(answer: Mapping[str, Any]) -> None:
-    """One line about a blame that is not whole; none where it is."""
+    """One line about a blame that is not whole, or whose indices an earlier version stored
+    without their noise; none else."""
     status = answer.get("blame") or {}
     if status.get("reason"):
         say(f"Blame {status['status']}: {status['reason']}")
+    if lacks_noise(answer):
+        say(
+            "Blame: the noise of the Sobol indices was not stored; designer tolerance DIR --blame "
+            "--resume works it out"
+        )
 
 
 def _further(answer: Mapping[str, Any]) -> None:

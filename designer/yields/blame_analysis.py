@@ -7,6 +7,7 @@ how well the margin predicts verdicts; and the worst corner (``worst_corner``).
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -85,6 +86,12 @@ class Blame:
     """Steps that were allowed, None where all were."""
     share: float = 1.0
     """Share of the whole work that was done within the budget."""
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether the indices have their noise; not where an earlier version made them."""
+        made = (index for response in self.responses for index in response.indices)
+        return all(math.isfinite(i.total_error) for i in made if math.isfinite(i.total))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; an undefined number is None."""

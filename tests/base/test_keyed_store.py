@@ -61,6 +61,22 @@ def test_an_entry_comes_back_for_its_own_key(tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / NAME).to_pylist() == ROWS
 
 
+@pytest.mark.parametrize("form", [ParquetForm(SCHEMA.remove(1)), ParquetForm(SCHEMA, most=1)])
+def test_an_entry_of_another_form_is_foreign_only_for_another_request(
+    tmp_path: Path, form: ParquetForm
+) -> None:
+    """The rows of another map have other columns, or are more: nothing is damaged. Under the key
+    that was asked for such an entry is no entry."""
+    parquet(tmp_path, []).write(NAME, KEY, ROWS)
+    notes: list[str] = []
+    other = KeyedStore(tmp_path, form, notes.append)
+    assert other.read(NAME, {**KEY, "study": "b"}) is None
+    assert (notes, other.foreign) == ([], {NAME})
+    own = KeyedStore(tmp_path, form, notes.append)
+    assert own.read(NAME, KEY) is None
+    assert (notes, own.foreign) == ([f"{tmp_path / NAME}: {DAMAGED}"], set())
+
+
 def test_a_flipped_bit_of_a_block_is_noticed(tmp_path: Path) -> None:
     parquet(tmp_path, []).write(NAME, KEY, ROWS)
     path = tmp_path / NAME

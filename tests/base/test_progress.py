@@ -153,7 +153,7 @@ def test_a_whole_says_how_far_it_is_beside_each_stage(capsys: pytest.CaptureFixt
             assert later(20.0) == "  0:00:20 so far; whole: 7 %, about 0:06:20 left"
             with lines.whole({"within": 1.0}):  # is a part of it
                 lines.stage("a stage within")
-            assert later(190.0) == "  0:03:10 so far; whole: 38 %, about 0:05:52 left"
+            assert later(190.0) == "  0:03:10 so far; whole: 25 %, about 0:11:07 left"
             step = lines.stage("boards, 200 of them", 200)
             for _ in range(50):
                 step()
@@ -181,6 +181,35 @@ def test_phases_whose_names_begin_alike_are_entered_in_their_order() -> None:
         now[0] = at
         whole.enter(stage)
         assert whole.far(0.0) == pytest.approx((at / (at + left), left))
+
+
+def test_the_share_of_a_whole_never_falls() -> None:
+    """Neither where the first phase lasts 25 times as long as usual and the others do not, nor
+    where a stage turns out to have many more steps; and what was said in the first phase holds."""
+    now = [0.0]
+    whole = WholeWork({"parts": 12.0, "files": 60.0, "study": 40.0}, lambda: now[0])
+    said: list[float] = []
+
+    def watched(seconds: int, steps_left: float = 0.0) -> None:
+        for _ in range(seconds):
+            now[0] += 1.0
+            far = whole.far(steps_left)
+            assert far is not None
+            said.append(far[0])
+            assert far[1] > 0.0
+
+    whole.enter("parts")
+    watched(300)
+    before = said[-1]
+    whole.enter("files")
+    watched(1)
+    assert said[-1] == pytest.approx(before, abs=0.05)
+    watched(59)
+    watched(20, steps_left=2000.0)
+    whole.enter("study")
+    watched(40)
+    assert said == sorted(said)
+    assert 0.0 < said[0] < said[-1] < 1.0
 
 
 def test_the_best_so_far_is_told_after_a_minute_and_each_minute(

@@ -396,6 +396,31 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
     assert waits.rare is None
 
 
+def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As many as the target takes; one that is lost all the same is counted with them."""
+    asked: list[tuple[int, range]] = []
+
+    def none(*_: object, **__: object) -> Any:
+        return SimpleNamespace(lost=0.0, low=0.0, high=1e-3, unseen=1e-3, boards=2000, pilots=0)
+
+    monkeypatch.setattr(cure_measure, "rare_losses", none)
+    coins(monkeypatch, asked, 1.0)
+    plan = replace(bench_plans.plan(1, samples=8000), seed=2)
+    (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
+    assert found.reached
+    assert found.rare is not None
+    boards = asked[-1][1].stop + 3000  # what the searches had drawn as they are
+    assert found.rare.high == pytest.approx(3.0 / boards, rel=2e-3)
+    assert 3.0 / (boards - cure_measure.PLAIN_BLOCK) > 1e-4  # no more than the target takes
+    coins(monkeypatch, asked, 1.0 - 1.5e-4)
+    (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
+    assert not found.reached
+    assert found.rare is None
+    assert found.counts.lost > 0
+
+
 def coins(
     monkeypatch: pytest.MonkeyPatch, asked: list[tuple[int, range]], usual: float = 0.999
 ) -> None:
@@ -404,7 +429,7 @@ def coins(
     def block(plan: StudyPlan, indices: range, jobs: int) -> list[Any]:
         asked.append((plan.seed, indices))
         share = {1: 0.3, 4: 0.96}.get(plan.seed, usual)
-        fine = np.random.default_rng(plan.seed).random(8000) < share
+        fine = np.random.default_rng(plan.seed).random(max(8000, indices.stop)) < share
         return [_Row("ok" if fine[i] else "lost") for i in indices]
 
     monkeypatch.setattr(exact_rung, "block", block)

@@ -129,5 +129,20 @@ def test_table_and_json_say_how_many_starts_went_where(
     assert "of 30 starts at drive phase 0 in the box x1 ± 2.11" in table
     assert f"1-1-1 {100 * starts['attractors'][0]['share']:.3g} %" in table
     assert "1-2-2 (with its twin)" in table
-    assert entry.status([*words[:-4], "--starts", "0"]) == 2
-    assert "--starts: found 0" in capfd.readouterr().err
+    assert entry.status([*words[:-4], "--starts", "-1"]) == 2
+    assert "--starts: found -1" in capfd.readouterr().err
+
+
+def test_no_drawn_starts_leave_what_is_reached_from_rest_without_shares(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(SI, encoding="utf-8")
+    words = ["simulate", str(path), "--omega", "0.7", "--starts", "0"]
+    assert entry.status([*words, "--json", "-q"]) == 0
+    (row,) = json.loads(capfd.readouterr().out)["responses"]
+    response, strobes = brute(MODEL, 0.7, np.zeros(4))
+    assert (row["response"], row["starts"], row["others"]) == (response, None, [])
+    assert np.abs(strobes - row["start"]).max(axis=1).min() < 1e-6 * np.abs(strobes).max()
+    assert entry.status(words) == 0
+    assert " starts at drive phase" not in capfd.readouterr().err

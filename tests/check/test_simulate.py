@@ -88,6 +88,13 @@ def test_an_asymmetric_orbit(tmp_path: Path, capfd: Captured, engine: str) -> No
     assert [i["side"] for i in r["impacts"]] == ["upper", "lower"]
     assert [i["velocity"] for i in r["impacts"]] == r["impact_velocities"]
     assert [i["time"] for i in r["impacts"]] == pytest.approx(list(run.impacts.time), abs=near)
+    (inside,) = r["in_clearances"]
+    assert (inside["min"], inside["max"]) == pytest.approx((r["x1_min"], r["x1_max"]), abs=near)
+    for side, end, velocity in zip(
+        ("upper", "lower"), (r["x1_max"], -r["x1_min"]), r["impact_velocities"], strict=True
+    ):
+        assert inside[side]["depth"] == pytest.approx(end - 0.25, abs=near)
+        assert inside[side]["speed"] == pytest.approx(abs(velocity), abs=near)
     if engine == "model":
         assert r["penetration"] == pytest.approx(run.penetration, abs=near)
     # The twin: the mirror image, half a period on.

@@ -26,6 +26,7 @@ from designer.verbs.bifurcation import bifurcation
 from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.quick_folders import quick_folder
+from tests.shared.system_text import clearance, system_text, table
 
 SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
 
@@ -89,6 +90,21 @@ def test_writes_pictures_and_data_with_their_origin(
     assert entry.status(["bifurcation", *map(str, words), "--periods", "100"]) == 2
     assert "--overwrite" in capfd.readouterr().err
     assert _tree(out) == written
+
+
+def test_a_smaller_map_takes_the_place_of_a_larger_one(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The rows of the larger one are of another map. They go, and none is called damaged."""
+    ends, quick = ("--from", "1.4", "--to", "1.5"), ("--periods", "20", "--keep", "4")
+    words = (model, *ends, *quick, "--out", tmp_path / "out")
+    _asked(capfd, *words, "--steps", "4", "--map", "b", "0.2", "0.3", "3")
+    again = ("--steps", "3", "--map", "b", "0.2", "0.3", "2", "--overwrite")
+    assert entry.status(["bifurcation", *map(str, (*words, *again)), "--json"]) == 0
+    said = capfd.readouterr()
+    assert "damaged" not in said.err
+    assert sum(_strict(said.out)["counts"].values()) == 6
+    assert len(list((tmp_path / "out" / "map.parquet").iterdir())) == 2
 
 
 def test_files_of_others_are_left_alone(
@@ -246,6 +262,43 @@ def test_map_and_basins(model: Path, tmp_path: Path, capfd: pytest.CaptureFixtur
     table = pq.read_table(out / "basins.parquet" / "row-000002.parquet", partitioning=None)
     assert {"x1", "x1'", "status"} <= set(table.column_names)
     assert {"map.png", "map.svg", "map.json", "basins.png", "basins.svg"} <= set(_tree(out))
+
+
+def test_what_is_expected_of_a_response_makes_no_other_work(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A file with another ``expect`` has the same basins. One with another damping has not, nor
+    has one whose first response, at whose frequency they are, is another."""
+    file = read_model_file(model)
+    out, changed = tmp_path / "out", tmp_path / "changed.toml"
+
+    def asked(text: str) -> int:
+        changed.write_text(text, encoding="utf-8")
+        axes = ("--steps", "2", "--map", "x2", "-1", "1", "2", "--periods", "20", "--keep", "4")
+        words = ["bifurcation", "basins", str(changed), *axes, "--out", str(out)]
+        return entry.status(words)
+
+    assert asked(file.text) == 0
+    before = _tree(out)
+    (first,) = file.data["response"]
+    other = {**first, "expect": "2-1-1", "twin": "exact", "symmetric": False}
+    assert asked("# a comment\n" + file.with_({"response": [other]}).text) == 0
+    assert _tree(out) == before
+    capfd.readouterr()
+    for change in ({"response": [{**first, "omega": 0.9}]}, {"zeta": 0.11}, {"title": "another"}):
+        assert asked(file.with_(change).text) == 2
+        assert "--overwrite" in capfd.readouterr().err
+    assert _tree(out) == before
+    # A folder of an earlier version says it by the text.
+    manifest = out / "manifest.json"
+    said = json.loads(manifest.read_text())["stages"]["basins"]["inputs"]["model"]
+    assert said == file.motions_sha256 != file.sha256
+    folder = Folder(out)
+    assert folder.manifest is not None
+    folder.manifest.stages["basins"].inputs["model"] = file.sha256
+    folder._save()
+    assert asked(file.text) == 0
+    assert asked("# a comment\n" + file.text) == 2
 
 
 def test_a_model_and_its_circuit_need_a_folder_each(
@@ -468,3 +521,34 @@ def test_a_kind_is_the_verb_with_the_words_that_it_stands_for(
     assert _asked(capfd, "sweep", *words, model)["kind"] == "sweep"
     assert entry.status(["bifurcation", "sweeps", str(model), *words]) == 2
     assert "found sweeps, expected one of sweep, curves" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("ends", [("60", "100"), ("9.5492965855 Hz", "100 rad/s")])
+def test_the_unit_that_a_plain_number_was_taken_in_is_said(
+    ends: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """60 rad/s are 9.549 Hz, whoever writes them."""
+    path = tmp_path / "gap.toml"
+    path.write_text(
+        system_text(
+            {"hammer": "0.5 kg"},
+            {("hammer", "ground"): "2 kN/m"},
+            {("hammer", "ground"): "6 N s/m"},
+            clearance("A", "hammer", "ground", upper="1 mm", lower="1 mm", stiffness="38 kN/m"),
+            table("force", on="hammer", amplitude="4 N"),
+        ),
+        encoding="utf-8",
+    )
+    words = ["bifurcation", "sweep", str(path), "--from", ends[0], "--to", ends[1], "--steps", "2"]
+    words += ["--periods", "20", "--no-points"]
+    assert entry.status(words) == 0
+    said = capfd.readouterr().err
+    over = "ω from 60 to 100 rad/s (9.549 Hz to 15.92 Hz)"
+    assert f"sweep over {over} …" in said
+    assert f"\nWindows, {over}\n" in said
+    lengths = ["--over", "A.upper", "--from", "0.001", "--to", "2 mm", "--omega", "80"]
+    assert entry.status([*words[:3], *lengths, *words[7:]]) == 0
+    assert "sweep over A.upper from 1 mm to 2 mm" in capfd.readouterr().err
+    answer = _asked(capfd, *words[1:])
+    assert (answer["unit"], answer["to"]) == ("rad/s", 100.0)
+    assert answer["from"] == pytest.approx(60.0, rel=1e-9)

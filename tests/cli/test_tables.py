@@ -21,6 +21,16 @@ def test_a_spread_of_the_model_file_is_said(capsys: pytest.CaptureFixture[str]) 
     assert "7 samples, spread of the model file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("noise", "said"), [({"total_error": 0.01}, 0), ({}, 1)])
+def test_noise_that_an_earlier_version_did_not_store_is_said_once(
+    noise: dict[str, float], said: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    indices = [{"first": 0.1, "total": 0.2, **noise}, {"first": None, "total": None}]
+    response = {"blame": {"indices": indices}}
+    tables.blame_status({"blame": {"reason": ""}, "responses": [response, response]})
+    assert capsys.readouterr().err.count("--blame --resume") == said
+
+
 @pytest.mark.parametrize(("narrow", "said"), [(True, "boards: reached"), (False, "NOT reached")])
 def test_whether_the_width_was_reached(
     narrow: bool, said: str, capsys: pytest.CaptureFixture[str]
@@ -112,6 +122,37 @@ def test_the_unit_that_was_asked_for_comes_first(
     assert f"track {heads} response" in text
     assert "λ [1/s]" in text
     assert place in text
+
+
+def test_families_and_narrow_windows_of_a_sweep_are_said_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    known = {"kind": "limit of the parameter", "value": 0.0, "error": 0.0}
+    few = {"kind": "not looked for", "value": 0.0, "error": None, "reason": "fewer than 4 steps"}
+    long = {**few, "reason": "its period is longer than 4"}
+
+    def window(response: str, steps: int, family: int | None, end: Any) -> dict[str, Any]:
+        place = {"track": "up", "from": 0.1, "to": 0.2, "symmetric": False, "steps": steps}
+        ends = {} if family is None else {"from_end": end, "to_end": end}
+        return {**place, "response": response, "family": family, **ends}
+
+    def said(*windows: Any) -> list[str]:
+        sweep = {"kind": "sweep", "unit": "", "windows": windows, "points": []}
+        result = BifurcationResult(sweep, False, None, ("", ""), cast(Any, None))
+        bifurcation.show(result)
+        return capsys.readouterr().err.splitlines()
+
+    joined = window("1-1-1", 9, 1, known), window("1-1-2", 8, 1, known)
+    text = said(*joined, window("aperiodic", 3, None, None), window("2-1-1", 2, 2, few))
+    (head,) = (line for line in text if line.startswith("track"))
+    place = head.index("family")
+    assert [line[place] for line in text if line.startswith("up")] == ["1", "1", "-", "2"]
+    assert sum("windows of one family" in line for line in text) == 1
+    assert sum("--steps" in line for line in text) == 1
+    # One window a family, and an end that no finer sweep finds: neither is said.
+    plain = said(window("1-1-1", 9, 1, known), window("5-1-1", 6, 2, long))
+    assert not any("family" in line or "--steps" in line for line in plain)
+    assert any("longer than 4" in line for line in plain)
 
 
 def test_the_figure_of_a_design_rule_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -109,9 +109,30 @@ def test_on_a_phone_no_slider_jumps_away_while_the_figures_change(
         )
         page.wait_for_timeout(200)
         assert box(page, "[data-name=omega]")["top"] == pytest.approx(top, abs=1.0), response
+        check_figures_in_sight(page, response)
         heights.append(box(page, "#facts dl")["height"])
     assert heights[0] < heights[1]
     page.close()
+
+
+def check_figures_in_sight(page: Page, response: str) -> None:
+    """Response, largest multiplier and exponent are whole above the portrait, as the list says."""
+    figures = dict(
+        page.evaluate(
+            """() => [...document.querySelectorAll("#facts dt")].map((each) =>
+              [each.innerText, each.nextElementSibling.innerText])"""
+        )
+    )
+    shown = [n for n in ("largest |μ|", "λ max") if n in figures]
+    assert len(shown) == (1 if response == "aperiodic" else 2)
+    assert page.inner_text("#in-sight") == ", ".join(f"{n} = {figures[n]}" for n in shown)
+    head, line, plot = (box(page, each) for each in ("#summary", "#in-sight", "#portrait"))
+    assert 0.0 <= head["top"] < head["bottom"] <= line["top"]
+    assert line["bottom"] <= plot["top"]
+    (cut,) = page.evaluate(
+        "() => [document.querySelector('#in-sight')].map((e) => e.scrollWidth > e.clientWidth)"
+    )
+    assert not cut
 
 
 def test_a_finger_on_a_plot_moves_the_page(browser: Browser, addresses: dict[str, str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from designer.check.synthesis_result import synthesise
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design, settings
 from designer.circuit.netlist import Resistor
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.folders.bench_tables import (
     COLUMNS,
     NO_RECIPE,
@@ -22,10 +24,12 @@ from designer.folders.bench_tables import (
     setup_csv,
     start_recipes,
 )
+from designer.model.find_responses import ModelResponse
 from designer.model.model_file import parse_model_file
+from designer.report.design_tables import scale_table
 from tests.shared.chains import chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit
-from tests.shared.system_text import clearance
+from tests.shared.system_text import clearance, system_text, table
 
 TEXT = (Path(__file__).resolve().parents[2] / "examples" / "rectifier.toml").read_text("utf-8")
 
@@ -92,3 +96,39 @@ def test_each_stop_of_several_clearances_has_its_threshold() -> None:
         "threshold of contact, A, lower stop, of v1": "1.5",
         "threshold of contact, B, upper stop, of v3": "0.952381",
     }
+
+
+@pytest.mark.parametrize("amplitude", ["0.8 g", "0.6 mm"])
+def test_a_volt_stands_for_an_acceleration_of_the_base(amplitude: str) -> None:
+    """The generator's amplitude times that is the stated motion: Y ω² of a displacement Y."""
+    text = system_text(
+        {"hammer": "0.5 kg", "table": "1.5 kg"},
+        {("hammer", "table"): "2 kN/m", ("table", "ground"): "9 kN/m"},
+        {("hammer", "table"): "6 N s/m", ("table", "ground"): "9 N s/m"},
+        clearance("A", "hammer", "table", upper="1 mm", stiffness="38 kN/m"),
+        f'[base]\namplitude = "{amplitude}"\n',
+        *(table("response", frequency=f"{hertz} Hz") for hertz in (15, 8)),
+    )
+    file = parse_model_file(text)
+    system = file.model.second_order()
+    circuit = exact_circuit(system, Scale(1e-2, np.full(4, 3000.0), 1.0))
+    errors = coefficient_errors(circuit, system)
+    design = Design(file.model, circuit, errors, Certificate("bound", 0.0, ""), {}, {}, 0.0)
+    responses = tuple(
+        ModelResponse(spec, 1.0, Orbit(OrbitStatus.PERIODIC), (), True) for spec in file.responses
+    )
+    rows = list(csv.DictReader(io.StringIO(setup_csv(design, responses, [None, None], file.si))))
+    scale = float(rows[0]["base_m_s2_per_v"])
+    assert float(rows[1]["base_m_s2_per_v"]) == pytest.approx(scale, rel=1e-5)
+    for row, hertz in zip(rows, (15.0, 8.0), strict=True):
+        moved = 0.6e-3 * (2.0 * math.pi * hertz) ** 2 if "mm" in amplitude else 0.8 * 9.80665
+        assert float(row["amplitude_v_peak"]) * scale == pytest.approx(moved, rel=1e-4)
+    card = {r["quantity"]: r for r in csv.DictReader(io.StringIO(scales_csv(file, design, ())))}
+    own = card["acceleration of the base per generator volt"]
+    assert own["unit"] == "m/s²/V"
+    assert float(own["value"]) == pytest.approx(scale, rel=1e-5)
+    shown = scale_table(design, file.si)
+    assert shown is not None
+    texts = {row[0]: row[1] for row in shown.rows}
+    text = texts["one generator volt, of the base's acceleration"]
+    assert text == f"{scale:.4g} m/s² ({scale / 9.80665:.4g} g)"

@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from zipfile import ZipFile
 
 import numpy as np
@@ -14,12 +15,13 @@ import pytest
 
 from designer.base.seal import BLANK, sealed
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.folders import study_stores
 from designer.folders.study_cache import StudyCache
 from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
-from designer.verdicts.verdict import Verdict
+from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Crossing, Limit, Prediction
@@ -105,6 +107,25 @@ def test_only_its_own_key_opens_an_item(tmp_path: Path) -> None:
     assert kept(path).get("gates", "old") is None
     assert len(kept(path).get("gates", "new") or ()) == 2
     assert same(kept(path).get("blame", "mine"), BLAME)
+
+
+def test_a_blame_without_noise_counts_unless_noise_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study_stores, "blame_hash", lambda plan: "key")
+    cache, plan = kept(tmp_path / "kept.npz"), cast(StudyPlan, None)
+    plain, noisy = (
+        study_stores.FolderStores(tmp_path, lambda: None, cache=cache, noise=noise)
+        for noise in (False, True)
+    )
+    for index, there in (
+        (Index("R1", "R1", 0.1, 0.2), False),
+        (Index("R1", "R1", 0.1, 0.2, 0.01, 0.02), True),
+        (Index("R1", "R1", float("nan"), float("nan")), True),  # a margin that nothing moves
+    ):
+        plain.put_blame(plan, replace(BLAME, responses=(replace(BLAMED, indices=(index,)),)))
+        assert plain.blame(plan, 1) is not None
+        assert (noisy.blame(plan, 1) is not None) == there
 
 
 def test_what_nobody_used_is_forgotten(tmp_path: Path) -> None:

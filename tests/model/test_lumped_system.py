@@ -125,23 +125,53 @@ def test_every_parameter_has_a_name_and_can_be_changed() -> None:
     assert caught.value.expected == "a number > 0"
 
 
-@pytest.mark.parametrize("between", ['["hammer", "ground"]', '["hammer", "casing"]'])
-def test_restitution_is_the_speed_that_one_contact_leaves(between: str) -> None:
-    """Of the bodies with the stop alone, from Newton's law by another integrator."""
-    text = HAMMER.replace('expect = "1-1-1"\n', "").replace('["hammer", "ground"]', between, 1)
+COUPLED = """\
+format = 2
+[matrices]
+names = ["hammer", "casing"]
+mass = [[2.0, 0.6], [0.6, 3.0]]
+stiffness = [[60e3, -60e3], [-60e3, 100e3]]
+damping = [[56.0, -56.0], [-56.0, 80.0]]
+"""
+
+
+@pytest.mark.parametrize("masses", [[[2.0, 0.0], [0.0, 3.0]], [[2.0, 0.6], [0.6, 3.0]]])
+@pytest.mark.parametrize(
+    ("joint", "row"),
+    [
+        ('between = ["hammer", "ground"]', [1.0, 0.0]),
+        ('between = ["hammer", "casing"]', [1.0, -1.0]),
+        ("of = { hammer = 1.0, casing = -0.5 }", [1.0, -0.5]),
+        ("of = { hammer = 0.3, casing = 2.0 }", [0.3, 2.0]),
+    ],
+)
+def test_restitution_is_the_speed_that_one_contact_leaves(
+    joint: str, row: list[float], masses: list[list[float]]
+) -> None:
+    """Of the bodies with the stop alone, from Newton's law by another integrator, in whatever way
+    the bodies move beside the motion in the clearance."""
+    text = HAMMER.replace('expect = "1-1-1"\n', "")
+    if masses[0][1]:
+        text = COUPLED + text[text.index("[[clearance]]") :]
+    text = text.replace('between = ["hammer", "ground"]\nupper', f"{joint}\nupper")
     text = text.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\nrestitution = 0.7')
-    system = read(text).model.second_order()
-    (clearance,) = system.clearances
-    bodies = system.mass[:1] if clearance.other is None else system.mass
-    k, c, m = clearance.first.stiffness, clearance.damping, 1.0 / sum(1.0 / bodies)
-    rate = np.array([[0.0, 1.0], [-k / m, -c / m]])
+    (clearance,) = read(text).model.second_order().clearances
+    r, inverse = np.array(row), np.linalg.inv(np.array(masses))
+    k, c = clearance.first.stiffness, clearance.damping
+    rate = np.block(
+        [
+            [np.zeros((2, 2)), np.eye(2)],
+            [-k * inverse @ np.outer(r, r), -c * inverse @ np.outer(r, r)],
+        ]
+    )
+    before = np.array([0.0, 0.0, 1.0 / r[0], 0.0])  # the hammer alone closes the gap
 
     def depth(t: float) -> float:
-        return float((expm(rate * t) @ [0.0, 1.0])[0])
+        return float(r @ (expm(rate * t) @ before)[:2])
 
-    half = np.pi * np.sqrt(m / k)  # of the undamped motion; the damped one is a little longer
+    half = np.pi / np.sqrt(k * r @ inverse @ r)  # undamped; the damped one is a little longer
     end = brentq(depth, 0.5 * half, 1.9 * half, xtol=1e-16)
-    assert (expm(rate * end) @ [0.0, 1.0])[1] == pytest.approx(-0.7, rel=1e-6)
+    assert r @ (expm(rate * end) @ before)[2:] == pytest.approx(-0.7, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from designer.bifurcations import sweep
-from designer.bifurcations.sweep import SweepPlan
-from designer.model.model_file import parse_model_file
+from designer.bifurcations.sweep import SweepPlan, follow
+from designer.dynamics.steady_state import TransientSettings
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.bifurcation_plots import diagram
 from tests.shared.figure_text import clipped, overlapping
+from tests.shared.house import ROOT
 from tests.shared.mechanism_file import HAMMER
 
 LAST_OF_THE_FIRST = 41.0
@@ -56,7 +58,29 @@ def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
     places = {line.get_color(): set(np.asarray(line.get_xdata())) for line in strip.lines}
     (border,) = places.pop("white")
     assert border == pytest.approx(LAST_OF_THE_FIRST + 0.5)
-    assert list(places.values()) == [{LAST_OF_THE_FIRST}]  # to the tilted name
+    left, _ = strip.get_xlim()
+    ((name,),) = places.values()  # to the tilted one, from the middle of what is seen
+    assert name == pytest.approx(0.5 * (left + border))
     # Nothing is symmetric, so the key does not say what symmetric looks like.
     (legend,) = figure.legends
     assert [t.get_text() for t in legend.get_texts()] == ["followed down", "not symmetric"]
+
+
+def test_the_name_of_a_window_at_the_edge_keeps_clear_of_the_arrow_of_its_track() -> None:
+    """Half a step of it lies beside the axes: there is room for what is seen of it alone."""
+    file = parse_model_file(HAMMER)
+    values = np.linspace(LAST_OF_THE_FIRST, 61.0, 11)
+    subject = ModelSubject(file.model, scales=file.si)
+    figure = diagram(sweep.run(SweepPlan(subject, "omega", values, **follow("down", "up"))))
+    assert [axes.get_ylabel() for axes in figure.axes[:2]] == ["↓", "↑"]
+    assert (clipped(figure), overlapping(figure)) == ([], [])
+
+
+def test_a_long_label_of_a_panel_takes_several_lines() -> None:
+    """The clearance of the gears is between four coordinates, whose names are all on the axis."""
+    subject = ModelSubject(read_model_file(ROOT / "examples/gears.toml").model)
+    quick = TransientSettings(4, 2, 8)
+    figure = diagram(sweep.run(SweepPlan(subject, "omega", np.linspace(1.1, 1.2, 3), course=quick)))
+    assert (clipped(figure), overlapping(figure)) == ([], [])
+    label = figure.axes[1].get_ylabel()
+    assert " ".join(label.split()) == f"least {subject.labels['displacement']} in each period"

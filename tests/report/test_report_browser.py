@@ -143,6 +143,34 @@ def test_the_first_screen_has_the_answers(nine: Loaded) -> None:
         assert "DIR" not in command
 
 
+def test_portraits_of_few_responses_are_larger_and_leave_the_answers_in_sight(
+    report: Loaded, nine: Loaded
+) -> None:
+    for width, height, larger in ((1280, 900, 1.5), (400, 850, 1.4)):
+        for each in (report, nine):
+            each.page.set_viewport_size({"width": width, "height": height})
+        few, many = (each.page.locator(".bars svg").first.bounding_box() for each in (report, nine))
+        assert few is not None
+        assert many is not None
+        assert few["width"] > larger * many["width"]
+        assert report.page.evaluate("document.documentElement.scrollWidth") == width
+    report.page.set_viewport_size({"width": 1280, "height": 900})
+    report.page.evaluate("scrollTo(0, 0)")
+    box = report.page.locator("#answers").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] <= 900
+    for item in report.page.locator(".bars li:has(svg)").all():
+        portrait, name, share = (
+            item.locator(one).bounding_box() for one in ("svg", ".of", "strong")
+        )
+        assert portrait is not None
+        for words in (name, share):  # beside the portrait, and not below its end
+            assert words is not None
+            assert words["x"] >= portrait["x"] + portrait["width"]
+            assert words["y"] + words["height"] <= portrait["y"] + portrait["height"]
+    report.page.set_viewport_size({"width": 1200, "height": 900})
+
+
 def test_a_link_opens_what_it_leads_to(nine: Loaded) -> None:
     page = nine.page
     page.set_viewport_size({"width": 1280, "height": 900})

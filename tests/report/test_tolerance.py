@@ -87,6 +87,9 @@ def plain() -> ReportData:
     return plain_report()
 
 
+BOTH = Index("U3C.offset", "U3C", 0.2, 0.6, 0.02, 0.05), Index("R204", "R204", -0.01, 0.3)
+
+
 def blamed(question: int, lost: int) -> ResponseBlame:
     subjects = (
         BlamedPart("all offsets", "group", 9, 10, 1, 4),
@@ -97,7 +100,7 @@ def blamed(question: int, lost: int) -> ResponseBlame:
         question,
         lost,
         subjects if lost else (),
-        (Index("U3C.offset", "U3C", 0.2, 0.6, 0.02, 0.05), Index("R204", "R204", -0.01, 0.3)),
+        BOTH,
         (NearLimit("stability: a fold", 1.5),),
         Prediction(80, 20, 2, 3),
         8,
@@ -256,6 +259,20 @@ def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
         ("R204", "−1 %", "30 %"),  # of an earlier version, that knew no noise
     ]
     assert "500 attractors" in render_markdown(full)
+
+
+def test_a_blame_without_noise_says_once_how_to_get_it(full: ReportData) -> None:
+    anew = "designer tolerance 'my boards' --blame --resume"
+    text = render_markdown(replace(full, folder="my boards"))
+    assert text.count(anew) == text.count("stored no noise") == 1
+    assert "95 % noise" not in text
+    blame = full.study.blame
+    assert blame is not None
+    known = tuple(replace(index, first_error=0.02, total_error=0.05) for index in BOTH)
+    whole = replace(blame, responses=tuple(replace(r, indices=known) for r in blame.responses))
+    text = render_markdown(changed(full, blame=whole))
+    assert "95 % noise" in text
+    assert "stored no noise" not in text
 
 
 def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:

@@ -290,6 +290,23 @@ def test_the_bench_is_told_what_each_channel_gives(name: str) -> None:
         assert np.abs(levels).max() == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_volt_of_the_base_s_channel_is_an_acceleration_of_the_base() -> None:
+    """Beside a force of its own the base has a channel to itself: Y ω² over its volts."""
+    result = made("force beside base")
+    design, base = result.design, result.modelfile.model.second_order().base
+    (response,) = result.model_responses
+    setting = design.excitation(response.b, response.omega)
+    assert setting.second is not None
+    found = design.base_per_volt(response.b, response.omega)
+    assert found is not None
+    channel, scale = found
+    volts = (setting.amplitude, setting.second.amplitude)[channel]
+    assert volts * scale == pytest.approx(base * response.omega**2, rel=1e-9)
+    other = (design.errors.drive_gain, design.errors.second_gain)[channel]
+    assert (other != 0.0).all()  # the base drives every mass
+    assert made("two phases").design.base_per_volt() is None
+
+
 def test_a_turned_knob_turns_both_channels() -> None:
     result = made("two phases")
     design, (response,) = result.design, result.model_responses

@@ -201,6 +201,9 @@ def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -
         return
     assert room(made, frozenset(every - set(own)), {}) > 0.0
     for conflict in found:
+        same = {limit for limit in every if limit.condition == conflict.limit.condition}
+        left = room(made, frozenset(same), {})
+        assert conflict.frees is (left <= 0.0) or abs(left) < near
         assert room(made, frozenset(every - set(own) | {conflict.limit}), {}) < near
         if np.isfinite(conflict.needed):
             given = np.log(conflict.needed)
@@ -268,10 +271,29 @@ def test_a_refusal_says_what_conflicts_and_how_far_it_has_to_give() -> None:
     with pytest.raises(Unreachable) as refused:
         design(ONE, frequency=(6e4, 7e4))
     text = str(refused.value)
-    assert "60kHz (frequency)" in text
-    assert "(bandwidth)" in text
+    assert "60kHz (circuit.frequency)" in text
+    assert "(side condition bandwidth)" in text
     needed = design(ONE, frequency=(3.4e3, 7e4))  # what it says would do
     assert all(check.holds for check in needed.checks)
+
+
+def test_a_refusal_says_what_the_catalogue_lacks() -> None:
+    """Far slower than any capacitor that is sold allows: its largest, not the range, is in the way,
+    and the band alone says how slow the circuit has to be."""
+    spec = CircuitSpec()
+    sold = CATALOG.values("capacitor", spec.capacitors, 1e-14, 1.0, spec.capacitor_grade)
+    top = f"{sold.max() * 1e6:.3g}µF"
+    with pytest.raises(Unreachable) as refused:
+        design(ONE, frequency=(1e-3, 2e-3), capacitor_range=(1e-9, 1e-1))
+    text = str(refused.value)
+    assert f"the largest capacitor <= {top} (no other can be bought)" in text
+    assert "side condition bandwidth" not in text
+    assert "circuit.capacitor_range" not in text
+    with pytest.raises(Unreachable) as refused:
+        design(ONE, frequency=(1e-3, 2e-3))
+    text = str(refused.value)
+    assert "the largest capacitor <= 1µF (circuit.capacitor_range)" in text
+    assert f"but the catalogue has no capacitor above {top}" in text
 
 
 @pytest.mark.parametrize("seed", range(4))

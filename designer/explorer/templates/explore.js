@@ -157,6 +157,8 @@
       }
       for (const c of controls) c.field.removeAttribute("aria-invalid");
       by("summary").textContent = message.summary;
+      by("in-sight").textContent = message.facts.filter(([name]) => page.in_sight.includes(name))
+        .map(([name, text]) => `${name} = ${text}`).join(", ");
       const list = document.querySelector("#facts dl");
       by("tried").textContent = "";
       document.querySelector("#others ul").replaceChildren();
