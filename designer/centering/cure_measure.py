@@ -132,11 +132,15 @@ class VerdictCache:
         self._save({"format": 1, "studies": self._known})
         return letters, True
 
-    def rare(self, plan: StudyPlan, jobs: int, progress: Callable[[], None]) -> RareShare:
-        """How many boards of a plan of one question lose the response, estimated once."""
+    def rare(
+        self, plan: StudyPlan, bound: float | None, jobs: int, progress: Callable[[], None]
+    ) -> RareShare:
+        """How many boards of a plan of one question lose the response, estimated once.
+
+        bound : as ``rare_losses`` has it."""
         study = self._known.setdefault(study_hash(plan, "samples"), {})
         if _RARE not in study:
-            found = rare_losses(plan, 0, jobs=jobs, progress=progress)
+            found = rare_losses(plan, 0, bound=bound, jobs=jobs, progress=progress)
             boards = found.boards + found.pilots
             share = RareShare(found.lost, found.low, found.high, found.unseen, boards)
             study[_RARE] = asdict(share)
@@ -259,6 +263,7 @@ def measure_together(
     target: float,
     book: VerdictCache,
     *,
+    whole: bool = False,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[MeasuredYield, ...]:
@@ -269,7 +274,8 @@ def measure_together(
     the target is rare (``is_rare``), the share of what none of the block has lost is estimated.
 
     plans : each with what its boards are trimmed by (``VerdictCache.block``), None: as built; None
-    where there is no response to ask for, which misses.
+    where there is no response to ask for, which misses. whole : an estimate does not end as soon as
+    it lies on one side of the target.
     """
     measured = [MeasuredYield(Yield(0, 0, 0, 0), target) for _ in plans]
     for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):
@@ -282,7 +288,7 @@ def measure_together(
             plan, trim = study
             if most > BLOCK and is_rare(target) and not measured[k].missed:
                 assert trim is None, "boards that are trimmed are counted"
-                measured[k] = _estimated(plan, measured[k], book, jobs, progress)
+                measured[k] = _estimated(plan, measured[k], book, whole, jobs, progress)
             else:
                 measured[k] = measure(
                     plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
@@ -295,6 +301,7 @@ def _estimated(
     plan: StudyPlan,
     counted: MeasuredYield,
     book: VerdictCache,
+    whole: bool,
     jobs: int,
     progress: Callable[[], None],
 ) -> MeasuredYield:
@@ -303,7 +310,7 @@ def _estimated(
     Where no search met a loss, boards drawn as they are bound the share, as many as the target
     takes; a loss among them is one that the searches did not meet, and they alone decide then.
     """
-    rare = book.rare(plan, jobs, progress)
+    rare = book.rare(plan, None if whole else 1.0 - counted.target, jobs, progress)
     if rare.lost > 0.0 or 1.0 - rare.high >= counted.target:
         return replace(counted, rare=rare)
     wanted = NONE_LOST / (1.0 - counted.target) - NONE_LOST / rare.unseen

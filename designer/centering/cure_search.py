@@ -165,7 +165,7 @@ class _Search:
         if not is_rare(self.target) or any(m.missed for m in trial.measured):
             return trial
         again += ROUNDS
-        return self._trial(which, pick, predicted, again, f"{name}, with another seed")
+        return self._trial(which, pick, predicted, again, f"{name}, with another seed", whole=True)
 
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
@@ -320,11 +320,13 @@ class _Search:
         number: int,
         name: str,
         boards: int | None = None,
+        *,
+        whole: bool = False,
     ) -> Trial:
         """A choice, measured on fresh boards.
 
         boards : their number, for each response; None: more until it is decided whether all
-        responses reach the target."""
+        responses reach the target. whole : as ``measure_together`` has it."""
         model = self.pictures[which]
         cost = self._price(which, pick)
         step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
@@ -340,7 +342,7 @@ class _Search:
         measured: tuple[MeasuredYield, ...]
         if boards is None:
             measured = measure_together(
-                plans, self.target, self.book, jobs=self.jobs, progress=step
+                plans, self.target, self.book, whole=whole, jobs=self.jobs, progress=step
             )
         else:
             measured = tuple(

@@ -49,6 +49,8 @@ PILOTS, PILOT = 3, 600
 """Rounds in which the tilts are moved, and boards of each."""
 ENOUGH = 50.0
 """Effective number of lost boards, at least, of an estimate that ends before its most boards."""
+SOME = 20.0
+"""The same, of an estimate that ends on one side of a bound."""
 FEWEST = 6
 """Lost boards of one kind that move a tilt."""
 CLEAR = 1.5
@@ -243,13 +245,15 @@ def rare_losses(
     *,
     most: int = MOST_BOARDS,
     target: float = TARGET,
+    bound: float | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> RareLosses:
     """How many boards lose question ``number`` of a plan, on the exact circuit.
 
     most : boards that the estimate may take. target : half-width of the 95 % interval over the
-    estimate at which it ends. progress : called once a board that was asked.
+    estimate at which it ends. bound : a share; it ends as well where the interval lies on one side
+    of it, which favours that side a little. progress : called once a board that was asked.
 
     Raises
     ------
@@ -272,7 +276,8 @@ def rare_losses(
         doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
         narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
         narrow = narrow and result.effective >= ENOUGH
-        if count >= most or (narrow and count >= LEAST_BOARDS):
+        told = bound is not None and _beside(result, bound)
+        if count >= most or ((narrow or told) and count >= LEAST_BOARDS):
             break
         sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
     spent = pilots + count
@@ -344,6 +349,14 @@ def _interval(mean: float, error: float, outside: float) -> tuple[float, float]:
         return 0.0, outside
     spread = math.exp(QUANTILE * error / mean)
     return mean / spread, min(mean * spread, 1.0)
+
+
+def _beside(estimate: _Estimate, bound: float) -> bool:
+    """Whether an estimate's interval lies on one side of a share, by enough lost boards."""
+    if estimate.effective < SOME:
+        return False
+    low, high = _interval(estimate.mean, estimate.error, math.inf)
+    return high <= bound or low > bound
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,11 @@ class _Boards:
 
 
 def estimated(
-    monkeypatch: pytest.MonkeyPatch, size: int, lost: Callable[[Array], list[str]], seed: int
+    monkeypatch: pytest.MonkeyPatch,
+    size: int,
+    lost: Callable[[Array], list[str]],
+    seed: int,
+    **how: float | None,
 ) -> rare_losses.RareLosses:
     """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
     is fine. No linear limit is known."""
@@ -101,7 +105,7 @@ def estimated(
     )  # fmt: skip
     monkeypatch.setattr(rare_losses._Drawing, "asked", asked)
     monkeypatch.setattr(rare_losses, "between", wider)
-    return rare_losses.rare_losses(plan, 0)
+    return rare_losses.rare_losses(plan, 0, **how)
 
 
 REPETITIONS = 60
@@ -127,6 +131,29 @@ def test_the_interval_covers_a_probability_that_is_known(
     assert np.median([r.gain for r in found]) > 5.0
     assert all(r.largest_weight <= 1.0 / rare_losses.PLAIN for r in found)
     assert all(len(r.regions) >= 1 and r.regions[0].becomes == "1-0-0" for r in found)
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_an_estimate_ends_on_the_right_side_of_a_bound(
+    monkeypatch: pytest.MonkeyPatch, factor: float
+) -> None:
+    """Of a share that is known, and with fewer boards than the share itself takes."""
+    truth = irwin_hall(12, 10.3)
+
+    def lost(points: Array) -> list[str]:
+        return ["1-0-0" if s > 10.3 else "" for s in points.sum(axis=1)]
+
+    pairs = [
+        [
+            estimated(monkeypatch, 12, lost, seed, target=0.08, bound=bound)
+            for bound in (factor * truth, None)
+        ]
+        for seed in range(20)
+    ]
+    sides = [r.high <= factor * truth if factor > 1.0 else r.low > factor * truth for r, _ in pairs]
+    assert sum(sides) >= 19
+    assert all(r.boards <= whole.boards for r, whole in pairs)
+    assert sum(r.boards for r, _ in pairs) < 0.9 * sum(whole.boards for _, whole in pairs)
 
 
 def test_two_regions_that_lie_apart_are_both_counted(monkeypatch: pytest.MonkeyPatch) -> None:
