@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from math import log
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from designer.model.tuning_bands import Bands
 from designer.spread.part_rules import spread_of
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
-from designer.yields.rare_losses import rare_losses
+from designer.yields.rare_losses import rare_losses, unseen_share
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
 from designer.yields.tuned_yield import benched_block
@@ -39,8 +39,6 @@ TAG = 0xC04E
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
 _LOST = {_LETTERS[Verdict.LOST], _LETTERS[Verdict.GRAZING]}
-NONE_LOST = -log(0.05)
-"""Over the boards of which none is lost: the share that may be lost all the same, by 95 %."""
 _RARE = "rare"
 """In the place of a block's number: what was estimated of a study."""
 
@@ -199,6 +197,14 @@ class MeasuredYield:
         """Whether more boards would not change the answer."""
         return self.reached or self.missed
 
+    def bounded(self, plain: Yield) -> MeasuredYield:
+        """The same with what other boards, drawn as they are, leave for losses that no search
+        met."""
+        if self.rare is None:
+            return self
+        left = unseen_share(plain.lost + plain.grazing, plain.samples - plain.failed)
+        return replace(self, rare=replace(self.rare, unseen=min(left, self.rare.unseen)))
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         low, high = self.interval
@@ -297,6 +303,12 @@ def measure_together(
     return tuple(measured)
 
 
+def telling(target: float) -> int:
+    """Boards drawn as they are that tell whether a target is reached, where none of them is lost;
+    ``MOST_PLAIN`` at most."""
+    return min(ceil(unseen_share(0, 1) / (1.0 - target)), MOST_PLAIN)
+
+
 def _estimated(
     plan: StudyPlan,
     counted: MeasuredYield,
@@ -313,9 +325,9 @@ def _estimated(
     rare = book.rare(plan, None if whole else 1.0 - counted.target, jobs, progress)
     if rare.lost > 0.0 or 1.0 - rare.high >= counted.target:
         return replace(counted, rare=rare)
-    wanted = NONE_LOST / (1.0 - counted.target) - NONE_LOST / rare.unseen
+    drawn = unseen_share(0, 1) / rare.unseen
     letters = ""
-    while len(letters) < min(wanted, MOST_PLAIN) and not set(letters) & _LOST:
+    while len(letters) < telling(counted.target) - drawn and not set(letters) & _LOST:
         indices = range(len(letters), len(letters) + PLAIN_BLOCK)
         letters += book.block(replace(plan, samples=indices.stop), indices, None, jobs)[0]
         doing(f"{len(letters)} boards as they are, {sum(map(letters.count, _LOST))} lost")
@@ -323,6 +335,6 @@ def _estimated(
     if set(letters) & _LOST:
         return MeasuredYield(Yield(*map(letters.count, VERDICTS)), counted.target)
     answered = len(letters) - letters.count(_LETTERS[Verdict.FAILED])
-    bound = NONE_LOST / (answered + NONE_LOST / rare.unseen)
+    bound = unseen_share(0, answered + drawn)
     boards = rare.boards + len(letters)
     return replace(counted, rare=replace(rare, high=bound, unseen=bound, boards=boards))

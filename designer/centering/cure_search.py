@@ -11,6 +11,7 @@ Branches are made only as far as they may be cheaper than what is known.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from designer.centering.cure_measure import (
     plan_of,
     questions_of,
     study_seed,
+    telling,
 )
 from designer.centering.cure_milp import CureProgram, cheapest
 from designer.centering.cure_trial import Cure, Trial
@@ -158,14 +160,24 @@ class _Search:
         """The verdict on a choice that was measured to be enough.
 
         Boards were drawn until the target was reached, which favours it. The verdict is that of
-        other boards, of a number fixed beforehand; where the target is rare, these only refute, and
-        an estimate with another seed decides."""
-        again = 2 + ROUNDS + number
-        trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
-        if not is_rare(self.target) or any(m.missed for m in trial.measured):
+        other boards, of a number fixed beforehand. Where the target is rare these refute, and bound
+        what no search met; two whole estimates decide, the worse one: a region of losses may be met
+        by one alone."""
+        again, rare = 2 + ROUNDS + number, is_rare(self.target)
+        boards = telling(self.target) if rare else CONFIRMING
+        trial = self._trial(which, pick, predicted, again, f"{name}, once more", boards)
+        if not rare or any(m.missed for m in trial.measured):
             return trial
-        again += ROUNDS
-        return self._trial(which, pick, predicted, again, f"{name}, with another seed", whole=True)
+        one, other = (
+            self._trial(
+                which, pick, predicted, again + k * ROUNDS, f"{name}, estimate {k}", whole=True
+            )
+            for k in (1, 2)
+        )
+        pairs = zip(one.measured, other.measured, strict=True)
+        worse = (min(pair, key=lambda m: m.interval) for pair in pairs)
+        bounded = (m.bounded(plain.counts) for m, plain in zip(worse, trial.measured, strict=True))
+        return replace(other, measured=tuple(bounded))
 
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""

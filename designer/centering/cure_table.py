@@ -65,6 +65,7 @@ def _yield(m: Mapping[str, Any]) -> str:
         return "not shown"
     if rare := m.get("rare"):
         low, high = 1e6 * rare["low"], 1e6 * rare["high"]
-        return f"{1e6 * rare['lost']:.3g} of a million lost ({low:.3g} to {high:.3g})"
+        unseen = f"at most {1e6 * rare['unseen']:.3g} that no search met"
+        return f"{1e6 * rare['lost']:.3g} of a million lost ({low:.3g} to {high:.3g}; {unseen})"
     text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
     return text + (f", {m['failed']} failed" if m["failed"] else "")

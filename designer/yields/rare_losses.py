@@ -284,7 +284,7 @@ def rare_losses(
     elsewhere = (
         sample.lost & (sample.component == 0) & (cube.densities(sample.points).argmax(1) == 0)
     )
-    outside = _outside(int(elsewhere.sum()), clear + int((sample.component == 0).sum()))
+    outside = unseen_share(int(elsewhere.sum()), clear + int((sample.component == 0).sum()))
     low, high = _interval(result.mean, result.error, outside)
     gain = math.nan
     if result.mean > 0.0 and result.error > 0.0:
@@ -335,7 +335,7 @@ def counted_losses(number: int, counted: Yield) -> RareLosses | None:
     )
 
 
-def _outside(lost: int, plain_boards: int) -> float:
+def unseen_share(lost: int, plain_boards: float) -> float:
     """What may lie outside the regions, by 95 %: of so many plain boards so many were lost there
     (the exact upper end of a Poisson count: 3 over the boards where none was)."""
     from scipy.stats import chi2  # takes a second

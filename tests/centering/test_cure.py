@@ -29,14 +29,20 @@ from designer.centering import cure_measure, cure_search
 from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest
 from designer.centering.cure_linear_model import LinearModel, share_above, tail_quantile
-from designer.centering.cure_measure import MeasuredYield, VerdictCache, measure, measure_together
+from designer.centering.cure_measure import (
+    MeasuredYield,
+    RareShare,
+    VerdictCache,
+    measure,
+    measure_together,
+)
 from designer.centering.cure_milp import cheapest
 from designer.centering.cure_plots import front_chart
 from designer.centering.cure_result_json import cure_json
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_slots import PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_table import text
-from designer.centering.cure_trial import Cure
+from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.cure_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
@@ -51,6 +57,7 @@ from designer.spread.spread import Spread, draw_many
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.margins import Limit, Margin
+from designer.yields.rare_losses import unseen_share
 from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.yield_count import Yield
 from designer.yields.yield_maps import Axis, YieldMap
@@ -214,7 +221,7 @@ def test_a_rare_loss_is_cured_for_the_least_price(monkeypatch: pytest.MonkeyPatc
     (measured,) = found.best.measured
     assert measured.rare is not None
     assert measured.rare.high <= 1.0 - RARE_TARGET
-    assert len(set(asked)) == len(asked) >= 2
+    assert len(set(asked)) == len(asked) >= 3
     seen = known_picture(nominal)
     enough = [
         pick
@@ -384,7 +391,11 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
     stored = json.loads(json.dumps(kept))["studies"]
     assert measure_together([fine, other], 1.0 - 1e-5, VerdictCache(stored)) == (good, open_)
     assert estimated == [5, 6]
-    for damage in ({"lost": "x"}, {**asdict(good.rare), "high": float("nan")}, [], None):
+    assert good.rare is not None
+    strange_ones: tuple[object, ...] = (
+        {"lost": "x"}, {**asdict(good.rare), "high": float("nan")}, [], None
+    )  # fmt: skip
+    for damage in strange_ones:
         strange = {s: {**known, "rare": damage} for s, known in stored.items()}
         assert measure_together([fine], 1.0 - 1e-5, VerdictCache(strange)) == (good,)
     assert estimated == [5, 6, 5, 5, 5, 5]
@@ -416,6 +427,29 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
     assert not found.reached
     assert found.rare is None
     assert found.counts.lost > 0
+
+
+def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A region of losses may be met by one of them alone."""
+    search = object.__new__(cure_search._Search)
+    search.target = 1.0 - 1e-5
+    counted = MeasuredYield(Yield(4000, 0, 0, 0), search.target)
+    few, many = (RareShare(s, 0.5 * s, 2.0 * s, 1e-3, 9000) for s in (1e-6, 2e-5))
+    seeds: list[int] = []
+
+    def trial(*arguments: Any, whole: bool = False) -> Trial:
+        seeds.append(arguments[3])
+        shares = {1: (None, None), 2: (few, few), 3: (many, few)}[len(seeds)]
+        assert whole is (len(seeds) > 1)
+        measured = tuple(replace(counted, rare=share) for share in shares)
+        return Trial("as it is", Upgrades(), 0.0, (1.0, 1.0), measured, search.target)
+
+    monkeypatch.setattr(search, "_trial", trial)
+    decided = search._confirmed(0, (0,), (1.0, 1.0), 0, "round 1")
+    left = unseen_share(0, 4000)
+    assert [m.rare for m in decided.measured] == [replace(r, unseen=left) for r in (many, few)]
+    assert not decided.reached
+    assert len(set(seeds)) == 3
 
 
 def coins(

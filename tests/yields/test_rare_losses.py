@@ -85,7 +85,7 @@ def estimated(
     size: int,
     lost: Callable[[Array], list[str]],
     seed: int,
-    **how: float | None,
+    **how: Any,
 ) -> rare_losses.RareLosses:
     """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
     is fine. No linear limit is known."""
@@ -201,7 +201,7 @@ def test_boards_that_are_never_lost_leave_what_plain_boards_leave(
 @pytest.mark.parametrize(("lost", "end"), [(0, 2.996), (1, 4.744), (2, 6.296)])
 def test_what_lies_outside_is_bounded_by_a_poisson_count(lost: int, end: float) -> None:
     """95 %, one-sided: as tables of the Poisson distribution have it."""
-    assert rare_losses._outside(lost, 1000) == pytest.approx(end / 1000, rel=1e-3)
+    assert rare_losses.unseen_share(lost, 1000) == pytest.approx(end / 1000, rel=1e-3)
 
 
 def test_margins_are_the_widths_at_which_a_corner_and_a_part_are_lost(
