@@ -182,7 +182,8 @@ def _text(made: Sweep) -> str:
 @pytest.mark.parametrize("tracks", [("down", "up"), ("start 0",)])
 def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]) -> None:
     """Chaotic steps: what comes after a block depends on its last digit."""
-    plan = _plan(0.9, 1.1, 150, *tracks, course=QUICK)
+    plan = _plan(0.9, 1.1, 130, *tracks, course=QUICK)
+    assert len(plan.blocks(tracks[0])) == 3
 
     def store(name: str, work: str = "w") -> SweepStore:
         (tmp_path / name).mkdir(exist_ok=True)
@@ -190,7 +191,7 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
 
     whole = sweep.run(plan, store=store("whole"))
     for track in tracks:
-        for kept in range(3):
+        for kept in (1, 2):
             place = store(f"{track}{kept}")
             for number in range(kept):
                 name = SweepStore.name(track, number)
@@ -203,7 +204,7 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
                     assert other.read_bytes() == path.read_bytes()
     foreign = store("whole", "another")
     assert foreign.read(tracks[0], 0) is None  # of another sweep
-    assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 151, *tracks).as_dict())
+    assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 131, *tracks).as_dict())
 
 
 def _flipped(path: Path) -> bytes:
