@@ -219,6 +219,8 @@ class SecondOrderSystem:
         """The channel that makes the ground's motion at a drive frequency, and the peak of the
         ground's acceleration; None where the ground rests, where both channels take part in its
         motion, and where forces take more than two."""
+        if not self.ground_moves:
+            return None
         ground = channels(_parts(self._without_forces.drive_waves(omega)))
         every = self.channels(omega)
         if not ground or not every:

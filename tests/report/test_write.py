@@ -244,7 +244,7 @@ def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
         for a in whole.study.answers
     ]
     html = render_html(changed(whole, answers=tuple(answers)))
-    bars = html[html.index('<ul class="bars">') : html.index('<div class="columns">')]
+    bars = html[html.index('<ul class="bars') : html.index('<div class="columns">')]
     assert bars.count("<li") == len(whole.checked) + 1  # and all of them on one board
     assert re.findall(r'<i style="width: ([\d.]+)%">', bars) == ["100.0", "100.0", "75.0", "75.0"]
     ends = [(float(a), float(b)) for a, b in re.findall(r"left: ([\d.]+)%; width: ([\d.]+)%", bars)]
