@@ -10,8 +10,10 @@ from math import ceil
 from typing import Any
 
 import numpy as np
+from scipy.special import bdtrc
 
 from designer.base.progress import doing
+from designer.base.proportion import TAIL, mid_p
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
@@ -38,7 +40,6 @@ TAG = 0xC04E
 """Sets the boards of a cure apart from those of a study with the same seed."""
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
-_LOST = {_LETTERS[Verdict.LOST], _LETTERS[Verdict.GRAZING]}
 _RARE = "rare"
 """In the place of a block's number: what was estimated of a study."""
 
@@ -136,7 +137,7 @@ class VerdictCache:
         """How many boards of a plan of one question lose the response, estimated once.
 
         bound : as ``rare_losses`` has it."""
-        study = self._known.setdefault(study_hash(plan, "samples"), {})
+        study = self._known.setdefault(study_hash(plan, "rare", {"bound": bound}), {})
         if _RARE not in study:
             found = rare_losses(plan, 0, bound=bound, jobs=jobs, progress=progress)
             boards = found.boards + found.pilots
@@ -180,6 +181,8 @@ class MeasuredYield:
         """Ends of the yield's 95 % interval."""
         if self.rare is not None:
             return 1.0 - self.rare.high, 1.0 - self.rare.low
+        if is_rare(self.target):  # hardly a board is lost
+            return mid_p(self.counts.ok, self.counts.samples - self.counts.failed)
         return self.counts.interval
 
     @property
@@ -199,10 +202,13 @@ class MeasuredYield:
 
     def bounded(self, plain: Yield) -> MeasuredYield:
         """The same with what other boards, drawn as they are, leave for losses that no search
-        met."""
+        met. Where more of them are lost than the estimate has room for, they are the measure."""
         if self.rare is None:
             return self
-        left = unseen_share(plain.lost + plain.grazing, plain.samples - plain.failed)
+        lost, asked = plain.lost + plain.grazing, plain.samples - plain.failed
+        if bdtrc(lost - 1, asked, self.rare.high) < TAIL:
+            return replace(self, counts=plain, rare=None)
+        left = unseen_share(lost, asked)
         return replace(self, rare=replace(self.rare, unseen=min(left, self.rare.unseen)))
 
     def as_dict(self) -> dict[str, Any]:
@@ -216,7 +222,7 @@ class MeasuredYield:
             "grazing": y.grazing,
             "failed": y.failed,
             "samples": y.samples,
-            "rate": y.rate,
+            "rate": y.rate if rare is None else self.rate,
             "low": low,
             "high": high,
             **more,
@@ -226,7 +232,7 @@ class MeasuredYield:
 def is_rare(target: float) -> bool:
     """Whether so few boards may be lost that no count of ``MOST`` shows that the target is reached,
     though none of them is lost."""
-    return not MeasuredYield(Yield(MOST, 0, 0, 0), target).reached
+    return Yield(MOST, 0, 0, 0).interval[0] < target
 
 
 def measure(
@@ -238,6 +244,7 @@ def measure(
     least: int = 2 * BLOCK,
     most: int = MOST,
     first: int | None = None,
+    block: int = BLOCK,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> MeasuredYield:
@@ -245,14 +252,14 @@ def measure(
 
     most : boards at which it gives up. first : boards after which, and after each block from there,
     it ends where the target is missed and ``LOST`` boards are lost; None: never before ``least``.
-    progress : called once a block.
+    block : boards that are asked together. progress : called once a block.
     """
     letters, result, most = "", MeasuredYield(Yield(0, 0, 0, 0), target), max(least, most)
     while len(letters) < least or (len(letters) < most and not result.decided):
         lost = result.counts.lost + result.counts.grazing
         if first is not None and result.missed and lost >= LOST:
             break
-        stop = (len(letters) // BLOCK + 1) * BLOCK
+        stop = (len(letters) // block + 1) * block
         if not letters and first is not None:
             stop = first
         indices = range(len(letters), min(stop, most))
@@ -320,21 +327,18 @@ def _estimated(
     """A yield whose losses are too rare to be counted.
 
     Where no search met a loss, boards drawn as they are bound the share, as many as the target
-    takes; a loss among them is one that the searches did not meet, and they alone decide then.
+    takes; a loss among them is one that the searches did not meet: then these boards decide.
     """
     rare = book.rare(plan, None if whole else 1.0 - counted.target, jobs, progress)
     if rare.lost > 0.0 or 1.0 - rare.high >= counted.target:
         return replace(counted, rare=rare)
     drawn = unseen_share(0, 1) / rare.unseen
-    letters = ""
-    while len(letters) < telling(counted.target) - drawn and not set(letters) & _LOST:
-        indices = range(len(letters), len(letters) + PLAIN_BLOCK)
-        letters += book.block(replace(plan, samples=indices.stop), indices, None, jobs)[0]
-        doing(f"{len(letters)} boards as they are, {sum(map(letters.count, _LOST))} lost")
-        progress()
-    if set(letters) & _LOST:
-        return MeasuredYield(Yield(*map(letters.count, VERDICTS)), counted.target)
-    answered = len(letters) - letters.count(_LETTERS[Verdict.FAILED])
-    bound = unseen_share(0, answered + drawn)
-    boards = rare.boards + len(letters)
+    plain = measure(
+        plan, counted.target, book, block=PLAIN_BLOCK, jobs=jobs, progress=progress,
+        least=ceil(telling(counted.target) - drawn), most=MOST_PLAIN,
+    ).counts  # fmt: skip
+    if plain.lost + plain.grazing:
+        return replace(counted, counts=plain)
+    bound = unseen_share(0, plain.ok + drawn)
+    boards = rare.boards + plain.samples
     return replace(counted, rare=replace(rare, high=bound, unseen=bound, boards=boards))

@@ -82,7 +82,8 @@ def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[floa
             str(number), (x, y), xytext=(7, -11), textcoords="offset points", color=MUTED, size=8
         )
     lowest = [100.0 * low for low, _ in ends] + [y for _, y in promised]
-    return min(*lowest, 100.0 * cure.target - 1.0)
+    below = min(1.0, 5.0 * (100.0 - 100.0 * cure.target))
+    return min(*lowest, 100.0 * cure.target - below)
 
 
 def _listed(axes: Axes, front: Sequence[Trial], file: ModelFile) -> None:

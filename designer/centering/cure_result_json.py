@@ -7,6 +7,7 @@ from typing import Any
 
 from designer.base.csv_tables import csv_text
 from designer.base.plain_json import FORMAT
+from designer.centering.cure_measure import is_rare
 from designer.centering.cure_trial import Cure, Trial
 from designer.model.model_file import ModelFile
 from designer.model.si_units import hertz_json
@@ -56,14 +57,16 @@ def front_csv(cure: Cure) -> str:
     rows = []
     for t in cure.front:
         low, high = t.worst.interval
+        asked, rare = t.worst.counts, t.worst.rare
+        digits = 9 if is_rare(cure.target) else 5
         rows.append(
             {
                 "price_euro": f"{t.price:.4g}",
-                "predicted": f"{min(t.predicted):.5g}",
-                "yield": f"{t.worst.rate:.5g}",
-                "low": f"{low:.5g}",
-                "high": f"{high:.5g}",
-                "samples": str(t.worst.counts.samples),
+                "predicted": f"{min(t.predicted):.{digits}g}",
+                "yield": f"{t.worst.rate:.{digits}g}",
+                "low": f"{low:.{digits}g}",
+                "high": f"{high:.{digits}g}",
+                "samples": str(asked.samples if rare is None else rare.boards),
                 "upgrades": "; ".join(t.upgrades.in_words(cure.base.modelfile)),
                 "failed": str(t.worst.counts.failed),
             }

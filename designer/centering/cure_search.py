@@ -10,8 +10,9 @@ Branches are made only as far as they may be cheaper than what is known.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from designer.centering.cure_linear_model import LinearModel, picture, pictured,
 from designer.centering.cure_measure import (
     FIRST,
     MOST,
+    PLAIN_BLOCK,
     MeasuredYield,
     VerdictCache,
     is_rare,
@@ -42,11 +44,12 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.model.model_file import need_responses
 from designer.spread.part_rules import spread_of
-from designer.verdicts.verdict import StudyPlan
+from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields.trimmed_yield import DcTrim
 
-FRONT = 100
-"""Number of the boards of the front; no round comes so far."""
+FRONT, AS_IT_IS = 100, 101
+"""Numbers of the studies of the front and of the first that confirms the design as it is; no round
+comes so far."""
 CONFIRMING = 4000
 """Boards of each response by which a choice is confirmed."""
 ROUNDS = 10
@@ -126,7 +129,10 @@ class _Search:
         self.best: Trial | None = None
 
     def run(self) -> Cure:
-        before = self.before = self._before()
+        before = self._before(1, "as it is")
+        if before.reached and is_rare(self.target):
+            before = self._confirmed(self._before, AS_IT_IS, "as it is")
+        self.before = before
         if before.reached:
             return self._answer(before, [], True, "every response is there already")
         rounds: list[Trial] = []
@@ -140,61 +146,79 @@ class _Search:
                 why = f"the cheapest choice that may be enough costs {cost:.2f} euro"
                 return self._answer(before, rounds, False, why)
             name = f"round {number + 1}"
-            trial = self._trial(which, pick, predicted, 2 + number, name)
+            measured = partial(self._trial, which, pick, predicted)
+            trial = measured(2 + number, name)
             if trial.reached:
-                trial = self._confirmed(which, pick, predicted, number, name)
+                trial = self._confirmed(measured, 2 + ROUNDS + number, name)
             rounds.append(trial)
             if trial.reached:
                 return self._answer(before, rounds, True, "measured on fresh boards")
             self._learn(which, pick, trial)
         return self._answer(before, rounds, False, f"not within {ROUNDS} rounds")
 
-    def _confirmed(
-        self,
-        which: int,
-        pick: Sequence[int],
-        predicted: tuple[float, ...],
-        number: int,
-        name: str,
-    ) -> Trial:
+    def _confirmed(self, measured: Callable[..., Trial], number: int, name: str) -> Trial:
         """The verdict on a choice that was measured to be enough.
+
+        measured : measures it anew, by the number of a study, a name, how many boards, and whether
+        estimates are whole. number : of the first of its studies; the others are ``ROUNDS`` apart.
 
         Boards were drawn until the target was reached, which favours it. The verdict is that of
         other boards, of a number fixed beforehand. Where the target is rare these refute, and bound
         what no search met; two whole estimates decide, the worse one: a region of losses may be met
         by one alone."""
-        again, rare = 2 + ROUNDS + number, is_rare(self.target)
+        rare = is_rare(self.target)
         boards = telling(self.target) if rare else CONFIRMING
-        trial = self._trial(which, pick, predicted, again, f"{name}, once more", boards)
+        trial = measured(number, f"{name}, once more", boards)
         if not rare or any(m.missed for m in trial.measured):
             return trial
         one, other = (
-            self._trial(
-                which, pick, predicted, again + k * ROUNDS, f"{name}, estimate {k}", whole=True
-            )
-            for k in (1, 2)
+            measured(number + k * ROUNDS, f"{name}, estimate {k}", whole=True) for k in (1, 2)
         )
         pairs = zip(one.measured, other.measured, strict=True)
         worse = (min(pair, key=lambda m: m.interval) for pair in pairs)
         bounded = (m.bounded(plain.counts) for m, plain in zip(worse, trial.measured, strict=True))
         return replace(other, measured=tuple(bounded))
 
-    def _before(self) -> Trial:
-        """The design as it is, on fresh boards."""
-        step = self.progress.stage("the design as it is")
+    def _before(
+        self, study: int, name: str, boards: int | None = None, *, whole: bool = False
+    ) -> Trial:
+        """The design as it is, on fresh boards. Arguments : as of ``_trial``."""
+        step = self.progress.stage(name.replace("as it is", "the design as it is", 1))
         synthesis, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
+        self.unseen.clear()
         for number, question in enumerate(questions_of(synthesis, synthesis.model_responses)):
             if question is None:
                 self.unseen.append(number)
             plan = (
-                None if question is None else plan_of(synthesis, question, study_seed(self.seed, 1))
+                None
+                if question is None
+                else plan_of(synthesis, question, study_seed(self.seed, study))
             )
             plans.append(None if plan is None else (plan, None))
-        trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+        trials = self._measured(plans, boards, whole, step)
         rates = tuple(m.rate for m in trials)
-        return self._told(
-            "as it is", Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
-        )
+        return self._told(name, Trial("as it is", Upgrades(), 0.0, rates, trials, self.target))
+
+    def _measured(
+        self,
+        plans: Sequence[tuple[StudyPlan, float | DcTrim | None] | None],
+        boards: int | None,
+        whole: bool,
+        step: Callable[[], None],
+    ) -> tuple[MeasuredYield, ...]:
+        """The yields of these studies; boards, whole : as of ``_trial``."""
+        if boards is None:
+            return measure_together(
+                plans, self.target, self.book, whole=whole, jobs=self.jobs, progress=step
+            )
+        block = PLAIN_BLOCK if is_rare(self.target) else BLOCK
+        return tuple(
+            measure(
+                plan, self.target, self.book, trim=trim, least=boards, most=boards, first=FIRST,
+                block=block, jobs=self.jobs, progress=step,
+            )
+            for plan, trim in filter(None, plans)
+        )  # fmt: skip
 
     def _told(self, name: str, trial: Trial) -> Trial:
         """The trial, once its yields are said and the best of all so far is known."""
@@ -351,19 +375,7 @@ class _Search:
             if way.kind == TRIMMER and model.trimmer is not None:
                 setting = model.trimmer.on(circuit)
             plans.append((StudyPlan(circuit, spread, seed, MOST, (way.question,)), setting))
-        measured: tuple[MeasuredYield, ...]
-        if boards is None:
-            measured = measure_together(
-                plans, self.target, self.book, whole=whole, jobs=self.jobs, progress=step
-            )
-        else:
-            measured = tuple(
-                measure(
-                    plan, self.target, self.book, trim=trim, least=boards, most=boards,
-                    first=FIRST, jobs=self.jobs, progress=step,
-                )
-                for plan, trim in plans
-            )  # fmt: skip
+        measured = self._measured(plans, boards, whole, step)
         trial = Trial(model.branch.name, upgrades, cost, predicted, measured, self.target)
         return self._told(name, trial)
 
@@ -424,7 +436,7 @@ class _Search:
                             pick = [*most, *(w if k == r else 0 for k in range(len(model.ways)))]
                             best[r] = max(best[r], model.predicted(pick, boards, shrink)[r])
         short = [
-            f"response {r + 1} ({share:.3f} at most)"
+            f"response {r + 1} ({share:.6g} at most)"
             for r, share in enumerate(best)
             if share < self.target
         ]
@@ -450,7 +462,8 @@ class _Search:
         trials = [before, *rounds]
         keys = {(t.branch, repr(t.upgrades)) for t in trials}
         choices: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
-        for target in FRONT_TARGETS if self.pictures else ():
+        # The few boards of a front's trial say nothing of a rare loss.
+        for target in FRONT_TARGETS if self.pictures and not is_rare(self.target) else ():
             options = [(k, choice) for k in range(len(self.pictures))
                        if (choice := self._of_picture(k, target)) is not None]  # fmt: skip
             if not options:
@@ -465,10 +478,15 @@ class _Search:
                 continue
             keys.add(key)
             trials.append(self._trial(which, pick, promised, FRONT, "front", FRONT_BOARDS))
-        trials.sort(key=lambda t: (t.price, -t.worst.rate))
+
+        def shown(trial: Trial) -> float:
+            worst = trial.worst
+            return worst.interval[0] if is_rare(self.target) else worst.rate
+
+        trials.sort(key=lambda t: (t.price, -shown(t)))
         front: list[Trial] = []
         for t in trials:
-            if not front or t.worst.rate > front[-1].worst.rate:
+            if not front or shown(t) > shown(front[-1]):
                 front.append(t)
         return tuple(front) if before in front else (before, *front)
 

@@ -48,6 +48,9 @@ CURE, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
 """How the studies are written: each by its hash, which says all that decides it."""
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
+FEWEST_LOST = 8
+"""Boards of a million, the fewest that may be asked for: ``cure_measure.MOST_PLAIN`` boards show as
+much where none of them is lost."""
 RULES = 6
 """Raised whenever the same inputs are to give another answer."""
 
@@ -284,8 +287,8 @@ def _yield_of(ppm: float, yield_: float | None) -> float:
     """The yield where so many boards of a million may be lost."""
     if yield_ is not None:
         raise InputError(None, "--ppm", ppm, "no --yield beside it: both say what may be lost")
-    if not 0.01 <= ppm < 1e6:
-        expected = "boards of a million that may be lost, from 0.01, such as 10"
+    if not FEWEST_LOST <= ppm < 1e6:
+        expected = f"boards of a million that may be lost, from {FEWEST_LOST}, such as 10"
         raise InputError(None, "--ppm", ppm, expected)
     return 1.0 - 1e-6 * ppm
 
@@ -294,6 +297,9 @@ def _checked(target: float, budget: float | None, without: Collection[str]) -> f
     """The kinds that are not wanted, by their own names."""
     if not 0.0 < target < 1.0:
         raise InputError(None, "--yield", target, "a share above 0 and below 1, such as 0.99")
+    if target > 1.0 - 1e-6 * FEWEST_LOST * (1.0 - 1e-9):
+        expected = f"at most {1.0 - 1e-6 * FEWEST_LOST:.8g}: more takes boards than are drawn"
+        raise InputError(None, "--yield", target, expected)
     if budget is not None and not 0.0 <= budget < float("inf"):
         raise InputError(None, "--budget", budget, "a price >= 0, in euro")
     kinds = set()

@@ -435,21 +435,35 @@ def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch)
     search.target = 1.0 - 1e-5
     counted = MeasuredYield(Yield(4000, 0, 0, 0), search.target)
     few, many = (RareShare(s, 0.5 * s, 2.0 * s, 1e-3, 9000) for s in (1e-6, 2e-5))
-    seeds: list[int] = []
+    lost = iter([0, 9])  # of the boards that are counted, in each of the cases below
 
-    def trial(*arguments: Any, whole: bool = False) -> Trial:
-        seeds.append(arguments[3])
-        shares = {1: (None, None), 2: (few, few), 3: (many, few)}[len(seeds)]
-        assert whole is (len(seeds) > 1)
-        measured = tuple(replace(counted, rare=share) for share in shares)
-        return Trial("as it is", Upgrades(), 0.0, (1.0, 1.0), measured, search.target)
+    def decided(*pairs: tuple[RareShare, RareShare]) -> tuple[MeasuredYield, ...]:
+        studies: list[int] = []
+        plain = Yield(4000 - (k := next(lost)), k, 0, 0)
 
-    monkeypatch.setattr(search, "_trial", trial)
-    decided = search._confirmed(0, (0,), (1.0, 1.0), 0, "round 1")
+        def measured(study: int, _: str, boards: int | None = None, whole: bool = False) -> Trial:
+            studies.append(study)
+            assert (boards is None) is whole is (len(studies) > 1)
+            estimates = (
+                replace(counted, counts=plain, rare=None if boards else pair[len(studies) - 2])
+                for pair in pairs
+            )
+            return Trial("as it is", Upgrades(), 0.0, (1.0,), tuple(estimates), search.target)
+
+        trial = search._confirmed(measured, 2, "round 1")
+        assert len(set(studies)) == 3
+        return trial.measured
+
     left = unseen_share(0, 4000)
-    assert [m.rare for m in decided.measured] == [replace(r, unseen=left) for r in (many, few)]
-    assert not decided.reached
-    assert len(set(seeds)) == 3
+    bad, good = decided((many, few), (few, few))
+    assert [bad.rare, good.rare] == [replace(r, unseen=left) for r in (many, few)]
+    assert not bad.reached
+    assert good.reached
+    # Boards that the estimate has no room for are the measure themselves.
+    monkeypatch.setattr(MeasuredYield, "missed", False)
+    (refuted,) = decided((few, few))
+    assert refuted.rare is None
+    assert not refuted.reached
 
 
 def coins(
@@ -571,6 +585,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
     asked: tuple[tuple[str, Mapping[str, Any]], ...] = (
         ("--yield", {"target": 1.0}),
         ("--yield", {"target": float("nan")}),
+        ("--yield", {"target": 1.0 - 1e-6}),
         ("--budget", {"target": 0.9, "budget": -1.0}),
         ("--without", {"target": 0.9, "without": ("grades",)}),
         ("--jobs", {"target": 0.9, "options": Options(jobs=0)}),
@@ -580,7 +595,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
         with pytest.raises(InputError) as refused:
             cure_into(design, **cast(Any, arguments))
         assert refused.value.field == field
-    for words in ({"ppm": 0.0}, {"ppm": 1e6}, {"ppm": float("nan")}, {"ppm": 10, "yield_": 0.9}):
+    for words in ({"ppm": 7.0}, {"ppm": 1e6}, {"ppm": float("nan")}, {"ppm": 10, "yield_": 0.9}):
         with pytest.raises(InputError) as refused:
             cure(design, **cast(Any, words))
         assert refused.value.field == "--ppm"
