@@ -34,7 +34,8 @@ def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]
     symmetry are the same.
 
     values, steps : of one followed track, ascending. A step is looked at where the displacements
-    change much more than beside it; whether it is a jump is decided by following the orbit.
+    change much more than beside it; whether it is a jump is decided by following the orbit. Where
+    that cannot be told the steps are of one window.
     """
     out: list[int] = []
     first = 0
@@ -47,21 +48,27 @@ def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]
                 beside = max(changes[max(place - 1, 0) : place] + changes[place + 1 : place + 2])
                 k = first + 1 + place
                 a, b = (values[k - 1], steps[k - 1]), (values[k], steps[k])
-                if change > max(SEEN, SUDDEN * beside) and not goes_on(family, a, b):
+                if change > max(SEEN, SUDDEN * beside) and goes_on(family, a, b) is False:
                     out.append(k)
         first = end
     return out
 
 
-def goes_on(family: Family, a: tuple[float, SteadyMotion], b: tuple[float, SteadyMotion]) -> bool:
+def goes_on(
+    family: Family, a: tuple[float, SteadyMotion], b: tuple[float, SteadyMotion]
+) -> bool | None:
     """Whether the periodic orbits of two steps, each with its value of the parameter, are one that
-    goes on from the one value to the other."""
+    goes on from the one value to the other; None where neither can be followed so far."""
     if a[1].n != b[1].n or not a[1].n:
         return False
     one, other = _solved(family, *a), _solved(family, *b)
     if one is None or other is None:
-        return False
-    return _leads(family, (a[0], one), (b[0], other)) or _leads(family, (b[0], other), (a[0], one))
+        return None
+    ways = [
+        _leads(family, (a[0], one), (b[0], other)),
+        _leads(family, (b[0], other), (a[0], one)),
+    ]
+    return True if True in ways else False if False in ways else None
 
 
 def one_orbit(a: SteadyMotion, b: SteadyMotion) -> bool:
@@ -93,19 +100,21 @@ def _solved(family: Family, value: float, step: SteadyMotion) -> Orbit | None:
     return orbit if orbit.counts.family == step.counts.family else None
 
 
-def _leads(family: Family, a: tuple[float, Orbit], b: tuple[float, Orbit]) -> bool:
-    """Whether the orbit at the value of ``a``, followed towards that of ``b``, is ``b``'s there."""
+def _leads(family: Family, a: tuple[float, Orbit], b: tuple[float, Orbit]) -> bool | None:
+    """Whether the orbit at the value of ``a``, followed towards that of ``b``, is ``b``'s there;
+    None where it was lost on the way."""
     try:
         origin = start(family, a[1], a[0])
     except ArithmeticError:
-        return False
+        return None
     sign = 1.0 if b[0] > a[0] else -1.0
     low, high = min(a[0], b[0]), max(a[0], b[0])
     branch = follow(origin, low, high, sign, until=_turned(a[0], sign))
-    last = branch.points[-1]
-    values = branch.values
-    if last.value != b[0] or not bool(np.all(sign * np.diff(values) >= 0.0)):
+    if not bool(np.all(sign * np.diff(branch.values) >= 0.0)):
         return False
+    last = branch.points[-1]
+    if last.value != b[0]:
+        return None
     flow = family.flow(b[0])
     laps: Array = flow.run(b[1].start, b[1].n).strobes[:-1]
     away = np.abs(laps - last.solved.x) / branch.curve.scale[:-1]

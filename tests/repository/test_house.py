@@ -73,7 +73,7 @@ REACH = {
     "bifurcation": 33_650,
     "reproduce": 55_950,
     "rules": 58_750,
-    "explore": 56_900,
+    "explore": 56_950,
     "bench": 61_000,
     "trade": 63_350,
     "export": 64_650,
