@@ -88,11 +88,12 @@ def _write_numbers(site: Sphinx) -> None:
             page.write_text(filled, "utf-8")
 
 
-def _number(source: str, form: str | None, **_: str) -> str:
-    """The value of a source as a page writes it.
+def _number(source: str, form: str | None, stands: str, **_: str) -> str:
+    """The value of a source as a page writes it, in the place of what stands there.
 
     Raises:
-        ValueError, KeyError: the source is not there, or is no number.
+        ValueError, KeyError: the source is not there, or is no number, or what stands there may be
+            two numbers.
     """
     if source.startswith("reports/"):
         file, _, keys = source.partition("#")
@@ -104,6 +105,8 @@ def _number(source: str, form: str | None, **_: str) -> str:
     if form is None:
         form = "_" if value >= 10_000 else "g"
     written = format(value, form).replace("_", " ").removesuffix("%")
+    if " " in stands and " " not in written:
+        raise ValueError(f"{source}: {stands} is one number of a page, or two?")
     return re.sub(r"e[+]?(-?)0*", r"e\1", written)
 
 
