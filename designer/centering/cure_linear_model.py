@@ -42,13 +42,11 @@ from designer.spread.spread import Spread, draw_many
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
 from designer.yields import margins
 from designer.yields.margins import Margin
+from designer.yields.rare_losses import OFTEN, WIDE
 from designer.yields.trimmed_yield import HIGH, LOW, DcTrim, trimmed_boards
 
 SHOWN = 4
 """Of the boards drawn, the fewest by which a share is read off."""
-WIDER, ENOUGH_LOST = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0), 0.05
-"""How much farther off boards are that show where a response is lost that hardly one of them loses
-as they are, and the share of them that has to lose it."""
 FITTED = 1000
 """Boards from which is learnt what moves the wiper."""
 
@@ -480,8 +478,8 @@ def _with_losses(
     """These boards and what becomes of them; where losses are rare, the same boards farther off
     from the nominal one, as far as some of them lose the response."""
     asked, answers = boards, foretold(boards, question, jobs)
-    for wider in WIDER[1:] if rare else ():
-        if sum(a.verdict is Verdict.LOST for a in answers) >= ENOUGH_LOST * len(answers):
+    for wider in WIDE if rare else ():
+        if sum(a.verdict is Verdict.LOST for a in answers) >= OFTEN * len(answers):
             break
         asked = between(boards, np.full(len(boards), wider))
         answers = foretold(asked, question, jobs)
