@@ -104,7 +104,7 @@ def test_what_decides_a_result_can_be_recorded(name: str) -> None:
     """Every such option is a field of ``Options``, but for those of a cure, which has no report."""
     decides = {parameter.name for parameter, word, _ in DECLARED[name].words() if word.decides}
     assert decides - {"model", "out"} - set(vars(Options())) == (
-        {"yield_", "budget", "without"} if name == "search" else set()
+        {"yield_", "ppm", "budget", "without"} if name == "search" else set()
     )
 
 
