@@ -100,6 +100,10 @@ def test_the_docs_can_be_read_in_a_day() -> None:
     assert sum(any(map(str.isalnum, word)) for word in words) <= 35_000
 
 
+def test_the_readme_is_one_screen() -> None:
+    assert len((DOCS.parent / "README.md").read_text("utf-8").split()) <= 900
+
+
 def files_of_the_contract() -> list[str]:
     table = section("Design folder").split("\n\n")
     (rows,) = [t for t in table if t.startswith("| File |")]
