@@ -174,7 +174,13 @@ class _Search:
         one, other = (
             measured(number + k * ROUNDS, f"{name}, estimate {k}", whole=True) for k in (1, 2)
         )
-        pairs = zip(one.measured, other.measured, strict=True)
+        pairs = list(zip(one.measured, other.measured, strict=True))
+        for r, (a, b) in enumerate(pairs, start=1):
+            if max(a.interval[0], b.interval[0]) > min(a.interval[1], b.interval[1]):
+                self.progress.note(
+                    f"  response {r}: the two estimates differ by more than their intervals, as "
+                    "where one of them alone met a region of losses; the worse one counts"
+                )
         worse = (min(pair, key=lambda m: m.interval) for pair in pairs)
         bounded = (m.bounded(plain.counts) for m, plain in zip(worse, trial.measured, strict=True))
         return replace(other, measured=tuple(bounded))

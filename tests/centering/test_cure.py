@@ -30,11 +30,13 @@ from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest
 from designer.centering.cure_linear_model import LinearModel, share_above, tail_quantile
 from designer.centering.cure_measure import (
+    MOST_PLAIN,
     MeasuredYield,
     RareShare,
     VerdictCache,
     measure,
     measure_together,
+    telling,
 )
 from designer.centering.cure_milp import cheapest
 from designer.centering.cure_plots import front_chart
@@ -47,7 +49,7 @@ from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with
 from designer.centering.cure_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
 from designer.jobs import rung_choice
-from designer.jobs.cure_job import CURE, STUDIES, cure, cure_into
+from designer.jobs.cure_job import CURE, FEWEST_LOST, STUDIES, cure, cure_into
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
@@ -432,7 +434,9 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
 def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     """A region of losses may be met by one of them alone."""
     search = object.__new__(cure_search._Search)
-    search.target = 1.0 - 1e-5
+    search.target, notes = 1.0 - 1e-5, list[str]()
+    search.progress = Progress()
+    monkeypatch.setattr(search.progress, "note", notes.append)
     counted = MeasuredYield(Yield(4000, 0, 0, 0), search.target)
     few, many = (RareShare(s, 0.5 * s, 2.0 * s, 1e-3, 9000) for s in (1e-6, 2e-5))
     lost = iter([0, 9])  # of the boards that are counted, in each of the cases below
@@ -459,6 +463,8 @@ def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch)
     assert [bad.rare, good.rare] == [replace(r, unseen=left) for r in (many, few)]
     assert not bad.reached
     assert good.reached
+    (note,) = notes
+    assert "response 1: the two estimates differ" in note
     # Boards that the estimate has no room for are the measure themselves.
     monkeypatch.setattr(MeasuredYield, "missed", False)
     (refuted,) = decided((few, few))
@@ -595,6 +601,9 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
         with pytest.raises(InputError) as refused:
             cure_into(design, **cast(Any, arguments))
         assert refused.value.field == field
+    fewest = 1e-6 * FEWEST_LOST
+    assert telling(1.0 - fewest) < MOST_PLAIN
+    assert telling(1.0 - fewest + 1e-6) == MOST_PLAIN  # one less, and no boards would tell
     for words in ({"ppm": 7.0}, {"ppm": 1e6}, {"ppm": float("nan")}, {"ppm": 10, "yield_": 0.9}):
         with pytest.raises(InputError) as refused:
             cure(design, **cast(Any, words))
