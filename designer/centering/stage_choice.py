@@ -21,7 +21,7 @@ from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check import checked_design, synthesis_result
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.coefficients import LARGE_ERROR
-from designer.circuit.ensemble import Ensemble
+from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.design_rules import run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.orbit import OrbitStatus
@@ -200,7 +200,7 @@ def boards_that_keep(synthesis: Synthesis, jobs: int = 1) -> int | None:
         for question in plan.questions:
             asked = question, question.excitation, question.start.start
             cases: list[Case] = [(i, *asked) for i in range(BOARDS)]
-            answers = settled(sample, cases, jobs, brief=True)
+            answers = settled(sample, cases, jobs, within=BRIEF)
             counts.append(sum(verdict is Verdict.OK for _, verdict, _ in answers))
         kept = min(counts)
     return kept

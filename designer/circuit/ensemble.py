@@ -37,7 +37,7 @@ TOGETHER = 125
 QUICK = 3
 """Stages of settling, 140 drive periods, after which a prediction gives up."""
 BRIEF = 200_000
-"""Steps that a brief settling may take."""
+"""Steps that a trial may take."""
 FAINT = 5.0 * CHAOS
 """Growth of a tangent vector per drive period below which chaos is not plain."""
 
@@ -72,6 +72,11 @@ class Ensemble:
     def __len__(self) -> int:
         return len(self.boards)
 
+    @property
+    def compiled(self) -> bool:
+        """Whether there is a compiled way to answers."""
+        return self._modes is not None
+
     def reduction(self, index: int) -> Reduction:
         """The exact reduction of one board."""
         known = self._reductions.get(index)
@@ -88,7 +93,7 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
-        brief: bool = False,
+        within: int | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> list[Orbit]:
         """The attractor of board ``which[k]`` under ``drives[k]`` from ``starts[k]``, for each k.
@@ -97,10 +102,10 @@ class Ensemble:
         each other share its tables. starts : (len(which), states), or capacitor voltages, at drive
         phase 0. Equal to ``dynamics.attractors.settle`` of each, to rounding, but for the periods
         spent where Newton's method strayed into a mode in which an op-amp clips; a board without an
-        answer gives a failed orbit with the reason. brief : as of ``respond``. progress : called
+        answer gives a failed orbit with the reason. within : as of ``respond``. progress : called
         once an answer.
         """
-        every = self.respond(which, drives, starts, jobs=jobs, brief=brief, progress=progress)
+        every = self.respond(which, drives, starts, jobs=jobs, within=within, progress=progress)
         return [r.orbit for r in every]
 
     def respond(
@@ -110,13 +115,13 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
-        brief: bool = False,
+        within: int | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> list[SettledBoard]:
         """``settle``, with the displacement that each orbit draws.
 
-        brief : for trials. What takes longer than `BRIEF` steps is not settled, and chaos is not
-        watched until it may end.
+        within : steps of a trial, such as `BRIEF`. What takes longer is not settled, and chaos is
+        not watched until it may end. None: no trial.
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
@@ -129,7 +134,7 @@ class Ensemble:
             for k, response in enumerate(settled):
                 if response is None:
                     settled[k] = self._alone(
-                        int(index[first + k]), drives[first + k], states[first + k], brief=brief
+                        int(index[first + k]), drives[first + k], states[first + k], within
                     )
                 progress()
             return [r for r in settled if r is not None]
@@ -162,7 +167,7 @@ class Ensemble:
             for k, drive in enumerate(drives[part]):
                 if settled[k] is None and not drive.is_sine:
                     board, start = int(index[first + k]), states[first + k]
-                    settled[k] = self._alone(board, drive, start, brief=True)
+                    settled[k] = self._alone(board, drive, start, BRIEF)
             progress()
             return [None if r is None else r.orbit for r in settled]
 
@@ -277,7 +282,7 @@ class Ensemble:
                 self._entered[each] = joined.take(np.array([row]))
             return self._modes_of(board)
 
-    def _alone(self, board: int, drive: Drive, start: Array, *, brief: bool) -> SettledBoard:
+    def _alone(self, board: int, drive: Drive, start: Array, within: int | None) -> SettledBoard:
         """One question, in Python."""
         try:
             reduction = self.reduction(board)
@@ -285,11 +290,11 @@ class Ensemble:
             if self._modes is not None and not (system.built or drive.is_sine):
                 system.know(self._modes.alone(board, self._beside))
             flow = Flow(system, drive, fast=self._fast)
-            if brief:
-                orbit = attractors.settle(flow, start, budget=Budget(BRIEF), watch=0)
-            else:
+            if within is None:
                 orbit = attractors.settle(flow, start)
-            if self._fast and not brief and _faint(orbit, drive):
+            else:
+                orbit = attractors.settle(flow, start, budget=Budget(within), watch=0)
+            if self._fast and within is None and _faint(orbit, drive):
                 flow = Flow(system, drive, fast=False)
                 orbit = attractors.settle(flow, start)
             trace = np.zeros(0)

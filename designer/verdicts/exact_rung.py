@@ -27,18 +27,20 @@ def settled(
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
     *,
-    brief: bool = False,
+    within: int | None = None,
 ) -> list[tuple[Orbit, Verdict, str]]:
-    """The orbit of each case, its verdict and the reason; ``progress`` is called once each. brief :
-    as of ``Ensemble.respond``."""
+    """The orbit of each case, its verdict and the reason; ``progress`` is called once each.
+
+    within : as of ``Ensemble.respond``.
+    """
     if not cases:
         return []
     boards, questions, excitations, starts = zip(*cases, strict=True)
     drives = [excitation.drive for excitation in excitations]
     orbits = ensemble.settle(
-        boards, drives, np.array(starts), jobs=jobs, brief=brief, progress=progress
+        boards, drives, np.array(starts), jobs=jobs, within=within, progress=progress
     )
-    if not brief:
+    if within is None:
         orbits = [
             _decidable(orbit, question, excitation, ensemble, board)
             for (board, question, excitation, _), orbit in zip(cases, orbits, strict=True)

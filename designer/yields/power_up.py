@@ -202,13 +202,13 @@ def switched_on(
     jobs: int = 1,
     known: Sequence[Orbit | None] = (),
     *,
-    brief: bool = False,
+    within: int | None = None,
 ) -> list[PowerUpEnd]:
     """What each start leads to: a board of the ensemble, a response with its recipe, and the drive
     phase at power-up [rad].
 
     known : of each start the board's own orbit of the response, where it has one that attracts; a
-    start that has come to it is not settled again. brief : as of ``Ensemble.respond``.
+    start that has come to it is not settled again. within : as of ``Ensemble.respond``.
     """
     arrivals = _arrivals(ensemble, starts, known, jobs)
     orbits = _arrived(ensemble, starts, arrivals, known, jobs)
@@ -219,7 +219,7 @@ def switched_on(
         )
         if isinstance(arrival, Arrival) and orbit is None
     ]
-    ends = iter(settled(ensemble, cases, jobs, brief=brief))
+    ends = iter(settled(ensemble, cases, jobs, within=within))
     out = []
     for (_, question, _, _), arrival, orbit in zip(starts, arrivals, orbits, strict=True):
         if not isinstance(arrival, Arrival):

@@ -3,9 +3,9 @@
 Where losses are rare, plain boards hardly show any. Here boards are drawn where they are lost
 (``tilted_cube``), and each counts by how likely it is. Where that is, is found in three ways: the
 linear limits of the nominal board (``margins``), boards whose parts are off by more than they may
-be, and the lost boards of pilot rounds, to whose means the tilts are moved (the cross-entropy
-method: R. Y. Rubinstein, D. P. Kroese, 2004). What no round meets is not counted: the answer says
-how much that can be, which plain boards bound.
+be (``loss_walks``), and the lost boards of pilot rounds, to whose means the tilts are moved (the
+cross-entropy method: R. Y. Rubinstein, D. P. Kroese, 2004). What no round meets is not counted: the
+answer says how much that can be, which plain boards bound.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from designer.base.progress import doing
 from designer.base.proportion import wilson
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
+from designer.dynamics.orbit import OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
+from designer.yields.loss_walks import INDEPENDENT, LossWalk, walk
 from designer.yields.margins import nominal_limits
 from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
@@ -52,17 +54,26 @@ ENOUGH = 50.0
 SOME = 20.0
 """The same, of an estimate that ends on one side of a bound."""
 FEWEST = 6
-"""Lost boards of one kind that move a tilt."""
+"""Lost boards of one kind that begin a region."""
+TELLING = 12.0
+"""Effective number of lost boards that move a tilt."""
+EVEN = 0.4
+"""Of the boards of all regions, what is shared evenly; the rest by how much each adds."""
 CLEAR = 1.5
 """Standard errors by which a coordinate's mean has to be off to move its tilt at all."""
 WIDE = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
 """By how much more than they may be the parts of boards are off that look for further regions."""
 OFTEN = 0.05
 """Share of lost boards at which they are wide enough."""
-NARROWED = 0.8
-"""Width of the next boards over that before, on the way back to what parts may be."""
-EXPLORED, STEP_BACK = 512, 400
-"""Boards of a width, and of a step on the way back."""
+MET, MANY = 3, 16
+"""Boards that show one kind of loss at a width, at least, for it to be followed back; and from the
+least width at which so many do, where one has them."""
+EXPLORED = 512
+"""Boards of a width."""
+SCOUTED = 40_000
+"""Steps that a board may take which only says where to draw."""
+OPEN = "open"
+"""Stands for what clips or has no period: to say which takes long."""
 MOST_REGIONS = 8
 """Components of the mixture beside the plain one."""
 SHOWN_PARTS = 5
@@ -168,6 +179,8 @@ class _Region:
 
     tilt: Array
     found_by: str
+    adds: float = 0.0
+    """Weight of its lost boards in the last round; 0 where none was drawn yet."""
 
 
 @dataclass(frozen=True)
@@ -207,25 +220,40 @@ class _Drawing:
     def boards(self, points: Array) -> Boards:
         return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
 
-    def asked(self, boards: Boards, *, brief: bool = False) -> list[tuple[Verdict, str]]:
-        """The verdict of each board and what it shows. brief : as of ``Ensemble.respond``."""
+    def asked(self, boards: Boards, *, within: int | None = None) -> list[tuple[Verdict, str]]:
+        """The verdict of each board and what it shows. within : as of ``Ensemble.respond``."""
         q = self.question
         out: list[tuple[Verdict, str]] = []
         for first in range(0, len(boards), BLOCK):
             some = range(first, min(first + BLOCK, len(boards)))
             ensemble = Ensemble(boards.take(np.array(some)), jobs=self.jobs)
             cases: list[Case] = [(i, q, q.excitation, q.start.start) for i in range(len(some))]
-            rows = settled(ensemble, cases, self.jobs, self.progress, brief=brief)
+            rows = settled(ensemble, cases, self.jobs, self.progress, within=within)
             out += [(verdict, orbit.response) for orbit, verdict, _ in rows]
         return out
 
-    def scouted(self, points: Array, component: Index, wide: float = 1.0) -> _Sample:
+    def foretold(self, boards: Boards) -> list[str]:
+        """What each board shows where it is lost, ``OPEN`` where that takes long to say, "" where
+        it is fine."""
+        q = self.question
+        ensemble = Ensemble(boards, jobs=self.jobs)
+        if not ensemble.compiled:
+            verdicts = self.asked(boards, within=SCOUTED)
+            return [r if v is not Verdict.OK else "" for v, r in verdicts]
+        every = range(len(boards))
+        starts = np.tile(q.start.start, (len(boards), 1))
+        drives = [q.excitation.drive] * len(boards)
+        orbits = ensemble.quick(every, drives, starts, jobs=self.jobs)
+        judged = (None if o is None else (q.judge(o)[0], o.response) for o in orbits)
+        return [OPEN if j is None else "" if j[0] is Verdict.OK else j[1] for j in judged]
+
+    def scouted(self, points: Array, component: Index, wide: Array | None = None) -> _Sample:
         """These boards asked briefly, which is enough to find where to draw: one that takes long to
-        settle is lost here. wide : by how much more off than they may be."""
+        settle is lost here. wide : (N,) by how much more off than they may be."""
         boards = self.boards(points)
-        if wide != 1.0:
-            boards = between(boards, np.full(len(points), wide))
-        verdicts = self.asked(boards, brief=True)
+        if wide is not None:
+            boards = between(boards, wide)
+        verdicts = self.asked(boards, within=SCOUTED)
         lost = np.array([v is not Verdict.OK for v, _ in verdicts], dtype=bool)
         responses = tuple(response for _, response in verdicts)
         return _Sample(points, component, lost, np.zeros_like(lost), responses)
@@ -268,7 +296,7 @@ def rare_losses(
     rng = np.random.default_rng([plan.seed, stream, TAG])
     doing("regions of loss")
     regions, pilots, clear = _regions(drawing, rng)
-    cube = TiltedCube.of([r.tilt for r in regions], PLAIN, len(drawing.names))
+    cube = _mixture(regions, PLAIN, len(drawing.names))
     sample = drawing.sample(*cube.drawn(BLOCK, rng))
     while True:
         result = _estimate(cube, sample)
@@ -403,12 +431,25 @@ def _regions(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region]
     clear = 0
     for _ in range(PILOTS):
         some = regions[:MOST_REGIONS]
-        cube = TiltedCube.of([r.tilt for r in some], 0.3, len(drawing.names))
+        cube = _mixture(some, 0.3, len(drawing.names))
         sample = drawing.scouted(*cube.drawn(PILOT, rng))
         asked += len(sample.points)
         clear += int((sample.component == 0).sum())
         regions = _moved(some, cube, sample, drawing.names) or some
     return regions[:MOST_REGIONS], asked, clear
+
+
+def _mixture(regions: Sequence[_Region], plain: float, size: int) -> TiltedCube:
+    """Plain boards and those of the regions: some of each, and more of what adds more."""
+    adds = np.array([region.adds for region in regions])
+    even = np.ones(len(regions)) / max(len(regions), 1)
+    parts = EVEN * even + (1.0 - EVEN) * adds / adds.sum() if adds.any() else even
+    return TiltedCube.of([region.tilt for region in regions], plain, size, parts)
+
+
+def _effective(weights: Array) -> float:
+    """Effective number of boards with these weights (L. Kish, Survey Sampling, 1965)."""
+    return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def _tiltable(names: Sequence[str]) -> Array:
@@ -458,34 +499,64 @@ def _strength(way: Array, distance: float) -> float:
 
 
 def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region], int]:
-    """Of boards that are further off than they may be, at the least width at which enough are lost:
-    a tilt for each kind of loss, moved along as the width goes back to what parts may be."""
-    size, asked = len(drawing.names), 0
-    cube = TiltedCube.of([], PLAIN, size)
-    found, kinds = list[_Region](), set[str]()
-    for wide in WIDE:
-        points, component = cube.drawn(EXPLORED, rng)
-        sample = drawing.scouted(points, component, wide)
+    """A tilt for each kind of loss that boards show which are further off than they may be: of
+    those boards, led back to what parts may be (``loss_walks``)."""
+    walks, asked = _met(drawing, rng)
+
+    def shown(points: Array, widths: Array) -> list[str]:
+        nonlocal asked
         asked += len(points)
-        if sample.lost.mean() < OFTEN:
-            continue
-        met = {r for r, lost in zip(sample.responses, sample.lost, strict=True) if lost}
-        last = bool(found)
-        found += [
-            _Region(tilt, f"boards {wide:g} times as far off")
-            for response, tilt in _tilts(sample, np.ones(len(points)), drawing.names)
-            if response not in kinds
-        ]
-        kinds |= met
-        if last:  # a width more, for kinds of loss that the first had too few of
-            break
-    while found and wide > 1.0:
-        wide = max(NARROWED * wide, 1.0)
-        cube = TiltedCube.of([r.tilt for r in found[:MOST_REGIONS]], PLAIN, size)
-        sample = drawing.scouted(*cube.drawn(STEP_BACK, rng), wide)
-        asked += len(sample.points)
-        found = _moved(found[:MOST_REGIONS], cube, sample, drawing.names)
+        return drawing.foretold(between(drawing.boards(points), widths))
+
+    found, may = list[_Region](), _tiltable(drawing.names)
+    for each, points in zip(walks, walk(walks, shown, rng), strict=True):
+        lost = drawing.scouted(points, np.zeros(len(points), dtype=int)).lost
+        asked += len(points)
+        even = np.ones(len(points))
+        for mine in _sides(points, even, lost) if lost.any() else ():
+            independent = INDEPENDENT * float(mine.sum())
+            tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), independent)
+            if tilt.any():
+                found.append(_Region(tilt, f"boards {each.met:g} times as far off"))
     return found, asked
+
+
+def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], int]:
+    """Walks from each kind of loss at the least width at which enough boards show it, the nearest
+    first, and the boards that were asked; wider boards are asked until enough are lost."""
+    size, asked, last = len(drawing.names), 0, False
+    plain = _mixture([], PLAIN, size)
+    met = dict[str, tuple[float, Array]]()
+    for wide in WIDE:
+        points, component = plain.drawn(EXPLORED, rng)
+        sample = drawing.scouted(points, component, np.full(len(points), wide))
+        asked += len(points)
+        shows = [r if lost else "" for r, lost in zip(sample.responses, sample.lost, strict=True)]
+        kinds = [_kind_of(shown) for shown in shows]
+        for kind in {*kinds} - {""}:
+            here = points[[each == kind for each in kinds]]
+            before = len(met[kind][1]) if kind in met else MET - 1
+            if before < min(len(here), MANY):
+                met[kind] = (wide, here)
+        if sample.lost.mean() >= OFTEN:
+            if last:  # a width more, for kinds of loss that the first had too few of
+                break
+            last = True
+    walks = list[LossWalk]()
+    for _, (wide, boards) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
+        even = np.ones(len(boards))
+        wider = between(drawing.boards(boards), np.full(len(boards), wide))
+        foretold, asked = np.array(drawing.foretold(wider)), asked + len(boards)
+        (kind, _), *_ = Counter(foretold.tolist()).most_common()
+        for side in _sides(boards, even, foretold == kind) if kind else ():
+            walks.append(LossWalk.of(kind, wide, boards[side]))
+    return walks[:MOST_REGIONS], asked
+
+
+def _kind_of(shown: str) -> str:
+    """The kind of loss of a board that shows this: one of all that have no period."""
+    named = not shown or shown == OrbitStatus.CLIPPED or shown[0].isdigit()
+    return shown if named else OPEN
 
 
 def _tilts(sample: _Sample, weights: Array, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
@@ -520,16 +591,19 @@ def _sides(points: Array, weights: Array, here: Mask) -> Iterator[Mask]:
     yield from sides if apart else [here]
 
 
-def _tilt(points: Array, weights: Array, may: Array, before: Array) -> Array:
+def _tilt(
+    points: Array, weights: Array, may: Array, before: Array, effective: float | None = None
+) -> Array:
     """The tilt whose means are those of these lost boards.
 
     Of what chance may have made of a mean, beside that with the tilt ``before``, less is taken over
     the more it may (the positive part of W. James, C. Stein, 4th Berkeley Symp. 1961). may : 1
-    where a coordinate may be tilted.
+    where a coordinate may be tilted. effective : their effective number; None: that of the weights.
     """
     known, width = mean_of(before), width_of(before)
     mean = (weights @ points) / weights.sum()
-    effective = weights.sum() ** 2 / (weights**2).sum()
+    if effective is None:
+        effective = _effective(weights)
     error = width / math.sqrt(max(effective, 1.0))
     off = np.maximum(np.abs(mean - known) / error, 1e-9)
     taken = may * np.maximum(1.0 - (CLEAR / off) ** 2, 0.0)
@@ -548,10 +622,11 @@ def _moved(
     for k, region in enumerate(regions, start=1):
         mine = sample.lost & (likeliest == k)
         tilt = region.tilt
-        if mine.sum() >= FEWEST:
+        if mine.any() and _effective(weights[mine]) >= TELLING:
             tilt = _tilt(sample.points[mine], weights[mine], may, region.tilt)
         if mine.any():
-            out.append(_Region(tilt if tilt.any() else region.tilt, region.found_by))
+            adds = float(weights[mine].sum())
+            out.append(_Region(tilt if tilt.any() else region.tilt, region.found_by, adds))
     outside = replace(sample, lost=sample.lost & (likeliest == 0))
     out += [
         _Region(tilt, f"plain boards that show {response}")

@@ -15,7 +15,7 @@ import numpy as np
 
 from designer.base.progress import doing, part
 from designer.base.second_process import Ask
-from designer.circuit.ensemble import Ensemble
+from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
@@ -267,7 +267,7 @@ class _Bench:
             [(t.board, self.question, t.recipe, t.phase) for t in trials],
             self.jobs,
             [t.known for t in trials],
-            brief=True,
+            within=BRIEF,
         )
         return [end.verdict is Verdict.OK for end in ends]
 
@@ -304,7 +304,7 @@ def _able(bench: _Bench) -> tuple[int, Mapping[int, Orbit]]:
         cases: list[Case] = [
             (i, question, question.excitation, question.start.start) for i in asked
         ]
-        ends = settled(bench.sample, cases, bench.jobs, brief=True)
+        ends = settled(bench.sample, cases, bench.jobs, within=BRIEF)
         able |= {
             i: orbit
             for i, (orbit, verdict, _) in zip(asked, ends, strict=True)

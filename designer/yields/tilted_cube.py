@@ -60,13 +60,12 @@ class TiltedCube:
     """(components,) of the mixture, with the sum 1."""
 
     @classmethod
-    def of(cls, tilts: Sequence[Array], plain: float, size: int) -> TiltedCube:
-        """A mixture of a plain part and of equal parts of these tilts (size,); of none it is
-        plain."""
+    def of(cls, tilts: Sequence[Array], plain: float, size: int, parts: Array) -> TiltedCube:
+        """A mixture of a plain part and of these tilts (size,), which share the rest as ``parts``
+        (tilts,) of the sum 1 say; of none it is plain."""
         if not tilts:
             return cls(np.zeros((1, size)), np.ones(1))
-        shares = np.full(len(tilts) + 1, (1.0 - plain) / len(tilts))
-        shares[0] = plain
+        shares = np.concatenate([[plain], (1.0 - plain) * parts])
         return cls(np.vstack([np.zeros((1, size)), *tilts]), shares)
 
     def drawn(self, count: int, rng: np.random.Generator) -> tuple[Array, Index]:

@@ -13,7 +13,7 @@ from designer.circuit import ensemble
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.ensemble import Ensemble, SettledBoard
+from designer.circuit.ensemble import BRIEF, Ensemble, SettledBoard
 from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
@@ -53,13 +53,19 @@ def nominal(kind: str, p: int) -> tuple[Drive, Orbit]:
 
 
 def respond(
-    kind: str, p: int, indices: range, *, fast: bool = True, jobs: int = 1, brief: bool = False
+    kind: str,
+    p: int,
+    indices: range,
+    *,
+    fast: bool = True,
+    jobs: int = 1,
+    within: int | None = None,
 ) -> list[SettledBoard]:
     drive, orbit = nominal(kind, p)
     boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, indices), fast=fast)
     count = len(indices)
     starts = np.tile(orbit.start, (count, 1))
-    return boards.respond(range(count), [drive] * count, starts, jobs=jobs, brief=brief)
+    return boards.respond(range(count), [drive] * count, starts, jobs=jobs, within=within)
 
 
 def test_it_is_each_board_alone() -> None:
@@ -156,7 +162,7 @@ def test_where_chaos_is_not_plain_the_general_kernel_has_the_word(
 def test_a_brief_answer_is_the_same_but_for_chaos_that_is_not_watched() -> None:
     indices = range(12)
     pairs = zip(
-        respond("saturation", 8, indices, brief=True),
+        respond("saturation", 8, indices, within=BRIEF),
         respond("saturation", 8, indices),
         strict=True,
     )

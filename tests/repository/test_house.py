@@ -72,15 +72,15 @@ REACH = {
     "simulate": 27_200,
     "bifurcation": 33_650,
     "reproduce": 55_950,
-    "rules": 58_750,
-    "explore": 56_950,
-    "bench": 61_000,
-    "trade": 63_350,
-    "export": 64_650,
+    "rules": 59_000,
+    "explore": 57_200,
+    "bench": 61_200,
+    "trade": 63_600,
+    "export": 64_900,
     "synthesise": 64_500,
-    "run": 66_650,
-    "tolerance": 66_750,
-    "search": 71_500,
+    "run": 66_850,
+    "tolerance": 66_950,
+    "search": 71_550,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 

@@ -17,11 +17,12 @@ from scipy.integrate import quad
 from designer.base.arrays import Array
 from designer.cli import entry
 from designer.verdicts.verdict import Verdict
-from designer.yields import rare_losses
+from designer.yields import loss_walks, rare_losses
 from designer.yields.margins import Margin
 from designer.yields.rare_losses import counted_losses
 from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.yield_count import Yield
+from tests.shared.closed_forms import irwin_hall
 from tests.shared.model_text import SMALL
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -46,7 +47,7 @@ def test_moments_of_a_tilt_are_their_integrals(tilt: float) -> None:
 def test_weights_are_the_mixtures() -> None:
     """Their mean is 1, none is above 1 over the plain share, and they weigh moments back."""
     tilts = [np.array([3.0, -2.0, 0.0]), np.array([0.0, 5.0, 5.0])]
-    cube = TiltedCube.of(tilts, 0.1, 3)
+    cube = TiltedCube.of(tilts, 0.1, 3, np.array([0.7, 0.3]))
     points, component = cube.drawn(200_000, np.random.default_rng(1))
     weights = cube.weights(points)
     assert np.bincount(component) == pytest.approx(len(points) * cube.shares, rel=0.01)
@@ -57,14 +58,6 @@ def test_weights_are_the_mixtures() -> None:
 
 # ---------------------------------------------------------------------------------------------
 # The estimate, on boards whose losses are known in closed form
-
-
-def irwin_hall(count: int, threshold: float) -> float:
-    """Probability that the sum of so many uniform numbers is above a threshold, by its formula
-    (J. O. Irwin, P. Hall, Biometrika 19, 1927)."""
-    rest = count - threshold
-    terms = ((-1.0) ** k * math.comb(count, k) * (rest - k) ** count for k in range(int(rest) + 1))
-    return math.fsum(terms) / math.factorial(count)
 
 
 class _Boards:
@@ -90,8 +83,13 @@ def estimated(
     """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
     is fine. No linear limit is known."""
 
-    def asked(_: object, boards: _Boards, *, brief: bool = False) -> list[tuple[Verdict, str]]:
+    def asked(
+        _: object, boards: _Boards, *, within: int | None = None
+    ) -> list[tuple[Verdict, str]]:
         return [(Verdict.LOST if r else Verdict.OK, r) for r in lost(boards.points)]
+
+    def foretold(_: object, boards: _Boards) -> list[str]:
+        return lost(boards.points)
 
     def wider(boards: _Boards, share: Array) -> _Boards:
         return _Boards(0.5 + share[:, None] * (boards.points - 0.5))
@@ -104,6 +102,7 @@ def estimated(
         modelled=lambda boards: boards,
     )  # fmt: skip
     monkeypatch.setattr(rare_losses._Drawing, "asked", asked)
+    monkeypatch.setattr(rare_losses._Drawing, "foretold", foretold)
     monkeypatch.setattr(rare_losses, "between", wider)
     return rare_losses.rare_losses(plan, 0, **how)
 
@@ -172,6 +171,26 @@ def test_two_regions_that_lie_apart_are_both_counted(monkeypatch: pytest.MonkeyP
     assert sum(r.low <= truth <= r.high for r in found) >= 16
     kinds = [{region.becomes for region in r.regions} for r in found]
     assert sum(kind == {"1-0-0", "clipped"} for kind in kinds) >= 18
+
+
+def test_the_commonest_loss_of_bad_parts_does_not_hide_that_of_good_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Among 60 coordinates twelve decide on the one, and two others, which are to be far off
+    together, on the other: that is the commoner from 1.6 times the width on, and impossible at
+    1."""
+    truth = irwin_hall(12, 10.0)
+
+    def lost(points: Array) -> list[str]:
+        first, far = points[:, :12].sum(axis=1), points[:, 20:22].sum(axis=1)
+        return [
+            "1-0-0" if a > 10.0 else "clipped" if b > 2.2 else ""
+            for a, b in zip(first, far, strict=True)
+        ]
+
+    found = [estimated(monkeypatch, 60, lost, seed) for seed in range(20)]
+    assert sum(r.low <= truth <= r.high for r in found) >= 16
+    assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
 
 
 def test_losses_on_both_sides_of_the_middle_are_two_regions(
@@ -243,7 +262,8 @@ def test_the_verb_writes_it_and_takes_it_over(
     monkeypatch.setattr(rare_losses, "MOST_BOARDS", 600)
     monkeypatch.setattr(rare_losses, "PILOT", 100)
     monkeypatch.setattr(rare_losses, "EXPLORED", 128)
-    monkeypatch.setattr(rare_losses, "STEP_BACK", 100)
+    monkeypatch.setattr(loss_walks, "BOARDS", 12)
+    monkeypatch.setattr(loss_walks, "LAST_MOVES", 20)
     model, folder = tmp_path / "model.toml", tmp_path / "d"
     model.write_text(SMALL, "utf-8")
     command = ["tolerance", str(model), "--out", str(folder), "--rung", "exact", "--samples", "20"]

@@ -13,7 +13,7 @@ from designer.base.proportion import wilson
 from designer.base.second_process import other_process
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
-from designer.circuit.ensemble import Ensemble
+from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.circuit.netlist import Excitation, Resistor
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
@@ -180,9 +180,9 @@ def test_only_a_recipe_that_worked_on_the_nominal_board_is_taken(
         _jobs: int,
         _known: object,
         *,
-        brief: bool,
+        within: int | None,
     ) -> list[Ended]:
-        assert brief
+        assert within == BRIEF
         alone = len(ensemble_.boards.values["R1"]) == 1
         return [
             Ended(

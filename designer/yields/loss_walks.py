@@ -1,0 +1,142 @@
+"""Lost boards of parts as good as they are, led there from lost boards of worse parts.
+
+Subset simulation (S.-K. Au, J. L. Beck, Probab. Eng. Mech. 16, 2001) over the width of the parts'
+laws: the width goes back in steps of which some boards stay lost, these are copied, and the copies
+walk at random among lost boards (conditional sampling: I. Papaioannou et al., Probab. Eng. Mech.
+41, 2015). Each kind of loss walks alone: the commonest of bad parts need not be that of good ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from designer.base.arrays import Array, Mask
+
+BOARDS = 48
+"""Boards of a walk."""
+MOVES = 2
+"""Moves of each board at a width."""
+LAST_MOVES, KEPT = 240, 20
+"""Moves at the last width, and between two of which the boards are kept."""
+INDEPENDENT = 0.25
+"""Independent boards for each that is kept: the rest is what copies of one board have in common."""
+NARROWED = 0.8
+"""The next width over that before, at first."""
+STAY, FEW_STAY = 0.5, 0.08
+"""Shares of boards that stay lost: above the first the next step is longer, below the second a
+shorter one is tried."""
+SHORTER = 0.5
+"""Power of the step that is tried instead."""
+TRIES = 4
+"""Steps of which too few boards stay lost, one after the other, at which a walk ends."""
+SHORTEST, LONGEST = 0.97, 0.6
+"""Steps of the width."""
+REACH = 0.4
+"""Of a move at first: its new part, over the whole."""
+ACCEPTED = 0.35
+"""Share of moves that stay lost, which the reach is led to."""
+EDGE = 1e-12
+"""Least distance of a coordinate from the ends of its range: a normal number there is finite."""
+
+Shown = Callable[[Array, Array], Sequence[str]]
+"""What boards (N, coordinates), off by (N,) times as much as they may, show where they are lost;
+"" where they are not."""
+
+
+@dataclass
+class LossWalk:
+    """Boards that lose a response in one way."""
+
+    kind: str
+    """What they show."""
+    met: float
+    """Width at which the first of them were met."""
+    width: float
+    """Width at which these boards are lost."""
+    normal: Array
+    """(N, coordinates) the boards, as normal numbers."""
+    step: float = NARROWED
+    reach: float = REACH
+    tries: int = 0
+    """Steps, one after the other, of which too few stayed."""
+
+    @classmethod
+    def of(cls, kind: str, width: float, points: Array) -> LossWalk:
+        """From lost boards (N, coordinates) of one width, each as often as another."""
+        each = np.arange(BOARDS) % len(points)
+        return cls(kind, width, width, ndtri(np.clip(points, EDGE, 1.0 - EDGE))[each])
+
+    @property
+    def going(self) -> bool:
+        """Whether it is not there yet and has not ended on its way."""
+        return self.width > 1.0 and self.tries < TRIES
+
+    @property
+    def points(self) -> Array:
+        """(N, coordinates) in the cube."""
+        return np.clip(ndtr(self.normal), 0.0, np.nextafter(1.0, 0.0))
+
+    @property
+    def next_width(self) -> float:
+        return max(1.0, self.width * self.step)
+
+    def narrow(self, stay: Mask) -> None:
+        """Go to the next width with the boards that stay lost there; (N,) which do."""
+        if stay.mean() < FEW_STAY:
+            self.tries += 1
+            self.step = min(self.step**SHORTER, SHORTEST)
+            return
+        self.width, self.tries = self.next_width, 0
+        if stay.mean() > STAY:
+            self.step = max(self.step**1.5, LONGEST)
+        kept = self.normal[stay]
+        self.normal = kept[np.arange(BOARDS) % len(kept)]
+
+
+def walk(walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator) -> tuple[Array, ...]:
+    """Lead all walks to the width 1, as far as they come.
+
+    Returns for each walk (N, coordinates) lost boards of width 1, spread as lost boards of its kind
+    are; none where it ended on its way. Boards that are near each other in it are not independent.
+    """
+    while going := [w for w in walks if w.going]:
+        shows = _asked(going, [w.points for w in going], shown, [w.next_width for w in going])
+        for each, mine in zip(going, shows, strict=True):
+            each.narrow(mine)
+        for _ in range(MOVES):
+            _moved(going, shown, rng)
+    there = [w for w in walks if w.width == 1.0]
+    states: dict[int, list[Array]] = {id(w): [] for w in walks}
+    for k in range(LAST_MOVES if there else 0):
+        _moved(there, shown, rng)
+        for each in there if (k + 1) % KEPT == 0 else ():
+            states[id(each)].append(each.points)
+    return tuple(np.concatenate(states[id(w)]) if states[id(w)] else w.normal[:0] for w in walks)
+
+
+def _asked(
+    walks: Sequence[LossWalk], points: Sequence[Array], shown: Shown, widths: Sequence[float]
+) -> list[Mask]:
+    """Which of each walk's boards (N, coordinates) show its kind of loss, all asked at once."""
+    shows = iter(shown(np.concatenate(points), np.repeat(widths, [len(p) for p in points])))
+    return [
+        np.array([next(shows) == each.kind for _ in mine], dtype=bool)
+        for each, mine in zip(walks, points, strict=True)
+    ]
+
+
+def _moved(walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator) -> None:
+    """Each board of each walk moved once, where that leaves it lost: a move keeps the law of the
+    parts, so that what is accepted has the law of lost boards."""
+    old = [w.normal for w in walks]
+    for each in walks:
+        rest, new = np.sqrt(1.0 - each.reach**2), rng.standard_normal(each.normal.shape)
+        each.normal = rest * each.normal + each.reach * new
+    stay = _asked(walks, [w.points for w in walks], shown, [w.width for w in walks])
+    for each, before, lost in zip(walks, old, stay, strict=True):
+        each.normal = np.where(lost[:, None], each.normal, before)
+        each.reach = float(np.clip(each.reach * np.exp(lost.mean() - ACCEPTED), 0.05, 0.95))

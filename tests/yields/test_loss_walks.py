@@ -1,0 +1,55 @@
+"""Lost boards led to what parts may be: their law against that of a sum of uniform numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from designer.base.arrays import Array
+from designer.yields.loss_walks import LossWalk, walk
+from tests.shared.closed_forms import irwin_hall
+
+SIZE, SUMMED = 60, 12
+
+
+def wider(points: Array, widths: Array) -> Array:
+    return 0.5 + widths[:, None] * (points - 0.5)
+
+
+def shown(points: Array, widths: Array) -> list[str]:
+    """The first twelve coordinates are large together, or the last twelve small: this is rarer, and
+    commoner the wider parts are. Beyond 1.5 times the width a third loss is met."""
+    at = wider(points, widths)
+    first, last = at[:, :SUMMED].sum(axis=1), (1.0 - at[:, -SUMMED:]).sum(axis=1)
+    far = np.abs(at[:, 30] - 0.5) > 0.75
+    return [
+        "2-2-2" if a > 9.5 else "clipped" if b > 10.2 else "far" if c else ""
+        for a, b, c in zip(first, last, far, strict=True)
+    ]
+
+
+def begun(kind: str, width: float, rng: np.random.Generator) -> LossWalk:
+    points = rng.random((20_000, SIZE))
+    here = [k == kind for k in shown(points, np.full(len(points), width))]
+    return LossWalk.of(kind, width, points[here][:12])
+
+
+def test_boards_that_have_walked_have_the_law_of_lost_boards() -> None:
+    """Each kind alone; of a kind that no board of width 1 shows, none is left."""
+    rng = np.random.default_rng(4)
+    walks = [begun("2-2-2", 2.0, rng), begun("clipped", 2.5, rng), begun("far", 2.5, rng)]
+    large, small, none = walk(walks, shown, rng)
+    assert len(none) == 0
+    for points, threshold, mine in (
+        (large, 9.5, large[:, :SUMMED]),
+        (small, 10.2, 1.0 - small[:, -SUMMED:]),
+    ):
+        assert (mine.sum(axis=1) > threshold).all()
+        beyond = quad(lambda s: irwin_hall(SUMMED, s), threshold, SUMMED)[0]
+        mean = threshold + beyond / irwin_hall(SUMMED, threshold)
+        assert mine.sum(axis=1).mean() == pytest.approx(mean, abs=0.05)
+        assert mine.mean(axis=0) == pytest.approx(mean / SUMMED, abs=0.06)
+        middle = points[:, SUMMED:-SUMMED]
+        assert middle.mean(axis=0) == pytest.approx(0.5, abs=0.15)
+        assert middle.std() == pytest.approx(12**-0.5, abs=0.02)
