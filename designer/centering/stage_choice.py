@@ -111,8 +111,9 @@ def synthesise(
     for kind in able:
         with part(f"with the {kind} stage"):
             try:
+                met = forecasts[0].synthesis.model_responses if forecasts else None
                 made = synthesis_result.synthesise(
-                    with_stage(modelfile, kind), catalog, all_found=all_found, jobs=jobs
+                    with_stage(modelfile, kind), catalog, all_found=all_found, jobs=jobs, shown=met
                 )
                 forecasts.append(forecast(made, jobs))
             except Unreachable as error:
@@ -147,9 +148,9 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
     (kind,) = (each for each in able if each != stated)
     with part(f"with the {kind} stage"):
         try:
-            other = synthesis_result.synthesise(
-                with_stage(modelfile, kind), synthesis.catalog, jobs=jobs, told=False
-            )
+            there = with_stage(modelfile, kind), synthesis.catalog
+            met = synthesis.model_responses
+            other = synthesis_result.synthesise(*there, jobs=jobs, told=False, shown=met)
             others = boards_that_keep(other, jobs)
         except (InputError, Unreachable):
             return ""

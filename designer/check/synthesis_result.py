@@ -66,12 +66,13 @@ def synthesise(
     all_found: bool = False,
     jobs: int = 1,
     told: bool = True,
+    shown: tuple[ModelResponse, ...] | None = None,
 ) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
 
     all_found : whether there have to be all of them before a part is chosen; one that is not there
     has the swing of what was found instead otherwise. jobs : threads; no part depends on it.
-    told : whether who watches hears that parts stand.
+    told : whether who watches hears that parts stand. shown : the responses, where they are known.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def synthesise(
         choice = modelfile.model, modelfile.circuit, catalog
         check_choices(*choice)
         check_names(modelfile, unit_circuit(*choice), catalog)
-        responses = find(modelfile.model, modelfile.responses)
+        responses = find(modelfile.model, modelfile.responses) if shown is None else shown
         if all_found:
             need_found(dict(enumerate(responses, start=1)), modelfile.si, modelfile.source)
         held = peaks(modelfile.model, responses)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -11,10 +12,11 @@ from designer.catalog.design_rules import BY_ID
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast
-from designer.check import checked_design
+from designer.check import checked_design, synthesis_result
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.dynamics.counts import Counts
+from designer.model import find_responses
 from designer.model.model_file import parse_model_file
 from designer.verbs.simulate import simulate
 from designer.verdicts import exact_rung
@@ -65,6 +67,29 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
         answers = exact_rung.block(plan, range(40), 2)
         kept[kind] = sum(answer.verdict is Verdict.OK for answer in answers)
     assert kept["rectifier"] > kept["saturation"]
+
+
+def test_the_model_is_asked_once_for_both_stages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the parts are those of a stage that asks for itself."""
+    asked: list[object] = []
+
+    def find(*arguments: Any) -> Any:
+        asked.append(arguments)
+        return find_responses.find(*arguments)
+
+    monkeypatch.setattr(synthesis_result, "find", find)
+    even = clearance("A", "a", "ground", upper=0.5, lower=0.5, stiffness=9.0)
+    modelfile = parse_model_file(system_text(*ONE, even, table("response", omega=1.3)))
+    made = stage_choice.synthesise(modelfile, CATALOG)
+    assert len(asked) == 1
+    for kind in ("saturation", "rectifier"):
+        alone = synthesis_result.synthesise(with_stage(modelfile, kind), CATALOG)
+        shared = synthesis_result.synthesise(
+            with_stage(modelfile, kind), CATALOG, shown=made.model_responses
+        )
+        assert shared.design.circuit == alone.design.circuit
+        assert shared.design.errors.errors == alone.design.errors.errors
+    assert len(asked) == 3
 
 
 def test_a_stage_that_alone_makes_the_clearances_is_no_choice() -> None:

@@ -29,7 +29,7 @@ from designer.folders.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
 from designer.verbs.declared import GROUPS
 from designer.verdicts.cross_check import OWN_SAMPLES
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [bold] ${HOME}"
@@ -91,7 +91,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def finished(home: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """A run with two workers that nobody disturbed, and what it printed."""
     out = home / "finished"
-    model = _model(home, SMALL + COARSE_CIRCUIT)
+    model = _model(home, SMALL + COARSE_RECTIFIER)
     arguments = ["run", str(model), "--out", str(out), "--samples", str(SAMPLES)]
     process = _process(*arguments, "--jobs", "2", "--json")
     stdout, stderr = process.communicate(timeout=300)
@@ -191,7 +191,7 @@ def test_folder_holds_what_the_contract_says(
     board = "bom-kicad.csv bom-jlcpcb.csv board.md schematic.svg schematic.png"
     wanted = {*names.split(), *board.split(), "report.html", "report.md"}
     assert wanted <= set(manifest["files"])
-    assert (out / "model.toml").read_text() == SMALL + COARSE_CIRCUIT
+    assert (out / "model.toml").read_text() == SMALL + COARSE_RECTIFIER
     (placed,) = (out / "kicad").glob("*.kicad_pcb")
     assert "\t(segment" in placed.read_text("utf-8"), "a run routes its board"
     for name in ("design.json", "tolerance.json"):
@@ -388,7 +388,7 @@ def test_simulate_from_rest(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
 def test_a_response_that_is_not_there_is_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    model = _model(tmp_path, BASE + WANTED.replace("1-2-2", "1-7-7") + COARSE_CIRCUIT)
+    model = _model(tmp_path, BASE + WANTED.replace("1-2-2", "1-7-7") + COARSE_RECTIFIER)
     assert entry.status(["simulate", str(model), "--json"]) == 1
     assert _strict(capfd.readouterr().out)["responses"][0]["found"] is False
     out = tmp_path / "out"
@@ -399,7 +399,7 @@ def test_a_response_that_is_not_there_is_exit_1(
 def test_synthesis_without_responses_or_stops(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0") + COARSE_CIRCUIT)
+    model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0") + COARSE_RECTIFIER)
     out = tmp_path / "out"
     assert entry.status(["synthesize", str(model), "--out", str(out), "--json"]) == 0
     answer = _strict(capfd.readouterr().out)
@@ -710,11 +710,15 @@ def test_killed_study_goes_on_and_ends_the_same(
 
 
 @pytest.mark.slow
-def test_ctrl_c_is_exit_130(home: Path) -> None:
-    out = home / "interrupted"
-    arguments = ["run", str(home / "small.toml"), "--out", str(out), "--samples", "500"]
-    process = _process(*arguments, "--jobs", "1")
-    _wait_for(out / "samples.parquet" / "block-000000.parquet", process)
+def test_ctrl_c_is_exit_130(
+    finished: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
+    """In a longer study of a design that stands: what comes before it has its parts' time."""
+    out = Path(shutil.copytree(finished[0], tmp_path / "interrupted"))
+    first = out / "samples.parquet" / "block-000000.parquet"
+    first.unlink()
+    process = _process("run", out, "--samples", "500", "--jobs", "1", "--overwrite")
+    _wait_for(first, process)
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -729,7 +733,7 @@ def test_a_response_that_the_model_does_not_show_is_an_answer_without_a_folder(
 ) -> None:
     """The answer is no, before a part is chosen: the object has what there is instead."""
     model = tmp_path / "wrong.toml"
-    text = BASE + WANTED.replace("1-2-2", "1-5-5") + COARSE_CIRCUIT
+    text = BASE + WANTED.replace("1-2-2", "1-5-5") + COARSE_RECTIFIER
     model.write_text(text, encoding="utf-8")
     out, few = str(tmp_path / "out"), ("--samples", "3", "--json")
     arguments = ["tolerance", str(model), "--out", out, *few]

@@ -13,7 +13,7 @@ import pytest
 from designer.base.environment import python_command
 from designer.cli.app import VERBS
 from designer.explorer.job_processes import JobProcesses
-from tests.shared.model_text import PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = (
@@ -37,7 +37,7 @@ def folder(tmp_path: Path) -> Path:
     for name in sys.stdlib_module_names | {*LIBRARIES}:
         line = f"open({str(folder / RAN)!r}, 'a').write({name!r} + '\\n')\nraise ImportError\n"
         (folder / f"{name}.py").write_text(line)
-    (folder / "paper.toml").write_text(f"format = 1\n{PAPER_TABLE}")
+    (folder / "paper.toml").write_text(f"format = 1\n{PAPER_TABLE}{COARSE_RECTIFIER}")
     return folder
 
 

@@ -9,16 +9,18 @@ from designer.centering.stage_choice import synthesise as choose
 from designer.circuit.design import ConditionCheck
 from designer.explorer.board_box import PartsProcess, board_box, condition_row, expected
 from designer.explorer.place import read_place
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
-FILE = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}")
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
+FILE = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_RECTIFIER}")
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 
 
 def test_the_parts_and_the_yield_are_those_of_the_verbs() -> None:
     messages = list(board_box(FILE, read_place(FILE, {"omega": 0.85}), "1-2-2", choose))
     rows = dict(messages[1]["rows"])
-    design = synthesise(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+    design = synthesise(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_RECTIFIER}"))
     assert design.design is not None
     names = {part.name for part in design.design.circuit.resistors}
     assert names < rows.keys()
@@ -52,8 +54,8 @@ def test_parts_are_chosen_in_a_process_of_their_own() -> None:
     process = PartsProcess()
     process.close()  # one that was never asked
     try:
-        there = process(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+        there = process(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_RECTIFIER}"))
     finally:
         process.close()
-    here = choose(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}"))
+    here = choose(parse_model_file(f"format = 1\n{PAPER_TABLE}{WANTED}{COARSE_RECTIFIER}"))
     assert there.design.circuit == here.design.circuit

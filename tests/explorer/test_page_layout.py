@@ -85,6 +85,8 @@ def test_each_slider_and_the_portrait_are_in_sight_together(
     before = page.evaluate("() => document.documentElement.dataset.drawn")
     page.keyboard.press("ArrowRight")
     page.wait_for_function("n => document.documentElement.dataset.drawn !== n", arg=before)
+    page.select_option("#shown", index=1)
+    page.wait_for_function("() => new URLSearchParams(location.search).get('shown') === '1'")
     page.close()
 
 

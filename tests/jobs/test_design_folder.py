@@ -23,10 +23,10 @@ from designer.centering import stage_choice
 from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
-from designer.folders import bench_tables, design_files
+from designer.folders import design_files
 from designer.folders.design_source import read_design
 from designer.model.model_file import read_model_file
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts
 
@@ -297,7 +297,6 @@ def test_files_stand_before_what_takes_longer(
     """Parts, deck, bill and KiCad project before the other stage is looked at, and its word in the
     answer; only then start recipes are sought."""
     met: dict[str, set[str]] = {}
-    recipes = bench_tables.start_recipes
 
     def files() -> set[str]:
         return {path.name for path in (tmp_path / "made").rglob("*") if path.is_file()}
@@ -306,15 +305,15 @@ def test_files_stand_before_what_takes_longer(
         met["stage"] = files()
         return "The other one is better."
 
-    def sought(*arguments: Any) -> Any:
+    def sought(*_: object) -> list[None]:
         met["recipes"] = files()
-        return recipes(*arguments)
+        return [None]
 
     monkeypatch.setattr(stage_choice, "better_stage", better)
     monkeypatch.setattr(design_files, "start_recipes", sought)
-    text = f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 0.54\n{COARSE_CIRCUIT}"
+    text = f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 0.54\n{COARSE_RECTIFIER}"
     file = tmp_path / "model.toml"
-    file.write_text(text + 'dead_zone = "saturation"\n', encoding="utf-8")
+    file.write_text(text, encoding="utf-8")
     made = designer.synthesise(file, out=tmp_path / "made")
     first = {"circuit.cir", "bom.csv", "model.kicad_sch"}
     assert first <= met["stage"] <= met["recipes"] < files()

@@ -35,7 +35,7 @@ from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Prediction
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
-from tests.report.test_write import Page
+from tests.report.test_write import Page, words_of
 from tests.shared.report_data import changed, plain_report
 
 HOSTILE = "<b>x</b> | `y`"
@@ -166,7 +166,7 @@ def rows_of(table: Table | None) -> tuple[tuple[str, ...], ...]:
 def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
     for part in (kinds, differences, recipes, limits, avoided, corners, maps, boards):
         assert part(plain) is None
-    page = Page(render_html(plain))
+    page = words_of(plain)
     text = page.text + render_markdown(plain)
     for heading in ("Which part is to blame", "Where to sit", "and both engines", "How to reach"):
         assert heading not in text

@@ -104,10 +104,15 @@ def test_a_study_that_went_on_takes_the_design_s_pictures_over(
     assert len(drawn) - at_first > at_first
 
 
-def words_of(data: ReportData) -> Page:
+def without_pictures(data: ReportData) -> str:
     """The page of these data for who asks nothing of its pictures."""
     with blank_figures():
-        return Page(render_html(data))
+        return render_html(data)
+
+
+def words_of(data: ReportData) -> Page:
+    """The same, read."""
+    return Page(without_pictures(data))
 
 
 class Page(HTMLParser):
@@ -243,7 +248,7 @@ def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
         replace(a, verdict=Verdict.LOST if (a.sample, a.question) == (1, 2) else Verdict.OK)
         for a in whole.study.answers
     ]
-    html = render_html(changed(whole, answers=tuple(answers)))
+    html = without_pictures(changed(whole, answers=tuple(answers)))
     bars = html[html.index('<ul class="bars') : html.index('<div class="columns">')]
     assert bars.count("<li") == len(whole.checked) + 1  # and all of them on one board
     assert re.findall(r'<i style="width: ([\d.]+)%">', bars) == ["100.0", "100.0", "75.0", "75.0"]
@@ -255,7 +260,7 @@ def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
 
 def test_commands_have_the_name_of_the_folder(whole: ReportData) -> None:
     data = replace(whole, folder="a rig; <b>")
-    html, text = render_html(data), render_markdown(data)
+    html, text = without_pictures(data), render_markdown(data)
     assert "designer tolerance &#39;a rig; &lt;b&gt;&#39; --samples 1000" in html
     assert "    designer tolerance 'a rig; <b>' --samples 1000\n" in text
     assert "DIR" not in text
@@ -462,7 +467,7 @@ def test_a_response_that_is_left_out_of_the_study(whole: ReportData) -> None:
     data = changed(whole, study=study)
     assert [y is None for y in data.yields] == [False, False, True]
     assert [data.question_of(i) for i in range(3)] == [0, 1, None]
-    assert 'aria-label="Schematic: ' in render_html(data)
+    assert 'aria-label="Schematic: ' in without_pictures(data)
     assert "1 response could not be studied" in render_markdown(data)
 
 

@@ -65,6 +65,7 @@ class Import:
     """Whether only a type checker imports it."""
 
 
+@cache
 def sources() -> dict[str, Path]:
     """Every module in a package, as "package.module"."""
     return {

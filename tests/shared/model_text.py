@@ -24,6 +24,10 @@ side_conditions = ["swing", "load"]
 """For tests that ask nothing of the parts: chosen in a tenth of the time that E24 takes with every
 side condition, within half a per cent of the paper's model."""
 
+COARSE_RECTIFIER = f'{COARSE_CIRCUIT}dead_zone = "rectifier"\n'
+"""The same with the stage that is chosen for the paper's model where the file states none: half of
+the search is for the other one."""
+
 SMALL = (
     "format = 1\n"
     + PAPER_TABLE

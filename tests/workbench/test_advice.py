@@ -11,6 +11,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.model.tuning_bands import Bands
 from designer.verdicts.exact_rung import settled
 from designer.verdicts.verdict import Verdict
+from designer.workbench import advice as advice_module
 from designer.workbench.advice import SURE, Advice, advise
 from designer.workbench.board_fit import BoardFit
 from designer.workbench.board_prior import Prior
@@ -18,6 +19,13 @@ from tests.shared.bench_plans import SPREAD, question
 from tests.shared.paper_cases import subject
 
 P = 2
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fits below leave nothing open, so the boards that a setting is asked of are all alike."""
+    monkeypatch.setattr(advice_module, "SAMPLES", 8)
+    monkeypatch.setattr(advice_module, "FEW", 4)
 
 
 def known_board(z: np.ndarray) -> BoardFit:
