@@ -34,7 +34,7 @@ _OPEN, _CLOSE, _QUOTED, _BARE_ATOM, _WITHOUT_END = range(1, 6)
 _BARE = re.compile(r'[^\s()"#]+[^\s()"]*')
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _MEANS = {"n": "\n", "r": "\r", "t": "\t"}
-_WRITTEN = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+_WRITTEN = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +72,13 @@ class Expression:
     offset: int = field(default=0, compare=False, repr=False)
     """Where it begins there, in characters."""
 
-    @cached_property
+    @property
     def name(self) -> str:
         """The first atom; empty where there is none."""
         first = self.items[0] if self.items else None
         return first.text if isinstance(first, Atom) else ""
 
-    @cached_property
+    @property
     def atoms(self) -> tuple[str, ...]:
         """The texts of the atoms after the name, in order."""
         return tuple(i.text for i in self.items[1:] if isinstance(i, Atom))
@@ -243,9 +243,9 @@ def expression_text(tree: Expression) -> str:
     ------
     ValueError : a bare atom that would not be read as one.
     """
-    lines: list[str] = []
-    _add(tree, 0, lines)
-    return "\n".join(lines) + "\n"
+    pieces: list[str] = []
+    _add(tree, "", pieces)
+    return "".join(pieces) + "\n"
 
 
 def write_all(trees: Iterable[Expression]) -> str:
@@ -253,23 +253,23 @@ def write_all(trees: Iterable[Expression]) -> str:
     return "\n".join(expression_text(each) for each in trees)
 
 
-def _add(tree: Expression, depth: int, lines: list[str]) -> None:
+def _add(tree: Expression, tabs: str, pieces: list[str]) -> None:
     """Atoms stay on the line of their list; each list in it has lines of its own."""
-    tabs = "\t" * depth
-    lines.append(tabs + "(")
-    for number, item in enumerate(tree.items):
+    space, end = tabs + "(", ")"
+    for item in tree.items:
         if isinstance(item, Atom):
-            lines[-1] += ("" if number == 0 else " ") + _atom(item)
+            pieces.append(space + _atom(item))
         else:
-            _add(item, depth + 1, lines)
-    if tree.children:
-        lines.append(tabs)
-    lines[-1] += ")"
+            pieces.append((space if space != " " else "") + "\n")
+            _add(item, tabs + "\t", pieces)
+            end = f"\n{tabs})"
+        space = " "
+    pieces.append(end if tree.items else space + end)
 
 
 def _atom(atom: Atom) -> str:
     if atom.quoted:
-        return '"' + "".join(_WRITTEN.get(c, c) for c in atom.text) + '"'
+        return f'"{atom.text.translate(_WRITTEN)}"'
     if not _BARE.fullmatch(atom.text):
         raise ValueError(f"{atom.text!r} has to be quoted")
     return atom.text

@@ -6,6 +6,7 @@ The other form is made from a board of KiCad 9 by changing its text, line by lin
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from designer.board.kicad_reader import BoardFile, read_board
 from designer.board.net_codes import with_codes, without_codes
 from designer.board.sexpr import expression_text, read
 from designer.design_rules import on_board
-from designer.routing.routed_board import route_board
+from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
 from tests.design_rules.test_rules_board import by_id, custom, drawn
 from tests.shared.rule_cases import base, generic
@@ -45,8 +46,14 @@ def same(a: BoardFile, b: BoardFile) -> None:
     assert (a.outline.sides == b.outline.sides).all()
 
 
+@cache
+def routed() -> RoutedBoard:
+    """The board of KiCad 9."""
+    return route_board(drawn(), base().circuit, custom())
+
+
 def test_a_board_with_named_nets_is_read_as_one_with_numbers(tmp_path: Path) -> None:
-    nine = route_board(drawn(), base().circuit, custom()).text
+    nine = routed().text
     ten = by_name(nine)
     assert "(net 1" not in ten
     same(saved(nine, tmp_path), saved(ten, tmp_path))
@@ -64,7 +71,7 @@ def test_a_board_with_named_nets_is_read_as_one_with_numbers(tmp_path: Path) -> 
 
 
 def test_a_board_with_named_nets_is_routed_in_its_own_form(tmp_path: Path) -> None:
-    nine = route_board(drawn(), base().circuit, custom())
+    nine = routed()
     ten = route_board(by_name(drawn()), base().circuit, custom())
     assert (ten.open, ten.lengths, ten.vias) == (nine.open, nine.lengths, nine.vias)
     assert '(net "GND")' in ten.text
@@ -74,7 +81,7 @@ def test_a_board_with_named_nets_is_routed_in_its_own_form(tmp_path: Path) -> No
 
 
 def test_numbers_come_and_go_without_a_trace() -> None:
-    ten = read(by_name(route_board(drawn(), base().circuit, custom()).text))
+    ten = read(by_name(routed().text))
     back = without_codes(with_codes(ten))
     assert sorted(expression_text(back).split()) == sorted(expression_text(ten).split())
 

@@ -38,6 +38,24 @@ def test_what_is_written_is_read_again(made: Expression) -> None:
     assert read(expression_text(made)) == made
 
 
+def plainly(tree: Expression, depth: int = 0) -> str:
+    """The text of a list, character by character."""
+    out = "("
+    for number, item in enumerate(tree.items):
+        if isinstance(item, Expression):
+            out += "\n" + "\t" * (depth + 1) + plainly(item, depth + 1)
+        else:
+            marks = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+            quoted = '"' + "".join(marks.get(c, c) for c in item.text) + '"'
+            out += " " * (number > 0) + (quoted if item.quoted else item.text)
+    return out + ("\n" + "\t" * depth if tree.children else "") + ")"
+
+
+@given(expressions)
+def test_lists_and_words_are_laid_out_as_one_by_one(made: Expression) -> None:
+    assert expression_text(made) == plainly(made) + "\n"
+
+
 @given(st.lists(expressions, max_size=4))
 def test_several_expressions_are_read_again(made: list[Expression]) -> None:
     assert list(read_all(write_all(made))) == made

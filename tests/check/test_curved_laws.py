@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from designer import simulate, synthesise
 from designer.base.arrays import Array
+from designer.folders import design_files
 from designer.model.cubic_law import cubic_points
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.verbs.simulate import tables
@@ -106,7 +107,9 @@ def test_a_motion_over_few_pieces_is_told(capsys: pytest.CaptureFixture[str]) ->
     assert "coarse_range" not in fine
 
 
-def test_a_circuit_of_it_says_so_too(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("figures_are_blank")
+def test_a_circuit_of_it_says_so_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design_files, "start_recipes", lambda made, *_: [None])
     modelfile = parse_model_file(text(0.1, 0.9))
     made = synthesise(modelfile, out=tmp_path / "made")
     (warning,) = [w for w in made.answer["warnings"] if "cubic spring" in w]

@@ -8,7 +8,6 @@ plotted files say when they are read back all stand between it and the maker.
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,24 +15,29 @@ from pathlib import Path
 
 import pytest
 
-from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.board.board_facts import check_edge
+from designer.board.board_parts import board_circuit
 from designer.board.bom import Line
 from designer.board.bom_layouts import layouts
 from designer.board.component import Component
+from designer.board.footprints import footprint as shape_of
 from designer.board.kicad_reader import check_belongs, read_board
 from designer.board.kicad_rules import CustomRule, board_rules
 from designer.board.sexpr import Expression, expression_text, read
 from designer.catalog.fab import fab_limits, fabs
-from designer.design_rules import on_board
+from designer.check.synthesis_result import synthesise
+from designer.design_rules import on_board, on_fab
+from designer.design_rules.kicad_drc import DesignRuleCheck, check
 from designer.fabrication.kicad_plot import plot
 from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
 from designer.fabrication.order_check import _places
 from designer.fabrication.order_refusal import refusals
-from designer.folders import board_files, design_files
+from designer.folders import board_files
+from designer.folders.kicad_files import texts
+from designer.jobs.board_routing import board_file
 from designer.model.model_file import read_model_file
-from tests.jobs.test_kicad_export import designer
+from designer.routing.routed_board import route_board
 from tests.shared.kicad_python import asked_of_pcbnew
 from tests.shared.stages import CATALOG
 
@@ -58,34 +62,53 @@ class Finished:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    place = tmp_path_factory.mktemp("faults")
-    shutil.copy(MODEL, place / "gap.toml")
-    folder = place / "design"
-    done = designer("export", place / "gap.toml", "--out", folder, "--routed")
-    assert done.returncode == 0, done.stderr
-    synthesis = design_files.load(Folder(folder), read_model_file(folder / "model.toml"), CATALOG)
-    (board,), (sheet,) = ((folder / "kicad").glob(f"*.kicad_{end}") for end in ("pcb", "sch"))
+def finished() -> Finished:
+    """As ``export --routed`` makes it, without the rest of a design folder."""
+    synthesis = synthesise(read_model_file(MODEL), CATALOG)
+    circuit, _ = board_circuit(synthesis)
+    rules = board_rules(circuit, synthesis.modelfile.rules)
+    files, board = texts(synthesis), board_file(synthesis)
+    routed = route_board(files[board], circuit, rules)
+    assert routed.open == {}
     return Finished(
-        board.read_text("utf-8"),
-        sheet.read_text("utf-8"),
+        routed.text,
+        files[board.replace(".kicad_pcb", ".kicad_sch")],
         board_files.listed(synthesis),
-        board_rules(synthesis.design.circuit, synthesis.modelfile.rules),
+        rules,
         board_files.bought(synthesis),
     )
 
 
-def reasons(folder: Path, made: Finished, board: str, sheet: str | None = None) -> tuple[str, ...]:
-    """Why a board is not ordered, as ``export --fab`` comes to it; none where the order stands."""
+@pytest.fixture(scope="module")
+def sound(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> DesignRuleCheck:
+    """What KiCad's check finds on the board without a fault."""
+    path = tmp_path_factory.mktemp("sound") / "board.kicad_pcb"
+    path.write_text(finished.text, encoding="utf-8")
+    path.with_suffix(".kicad_sch").write_text(finished.sheet, encoding="utf-8")
+    shapes = {c.footprint: shape_of(c.footprint) for c in finished.components if c.footprint}
+    limits = fab_limits(["generic"], CATALOG.folders)
+    return check(read_board(path), finished.rules, tuple(shapes.values()), limits)
+
+
+def reasons(
+    folder: Path, made: Finished, board: str, by_kicad: DesignRuleCheck | None = None
+) -> tuple[str, ...]:
+    """Why a board is not ordered, as ``export --fab`` comes to it; none where the order stands.
+
+    by_kicad : what KiCad's check is made to say of the board; None to ask it.
+    """
     path = folder / "board.kicad_pcb"
     path.write_text(board, encoding="utf-8")
-    path.with_suffix(".kicad_sch").write_text(sheet or made.sheet, encoding="utf-8")
+    path.with_suffix(".kicad_sch").write_text(made.sheet, encoding="utf-8")
     limits = fab_limits(["generic"], CATALOG.folders)
     try:
         file = read_board(path)
         check_edge(file)
         check_belongs(file, made.components)
-        found = on_board.checked(file, made.components, made.rules, {}, limits)
+        if by_kicad is None:
+            found = on_board.checked(file, made.components, made.rules, {}, limits)
+        else:
+            found = on_board.on_board(file, made.components, made.rules, {}, by_kicad, limits)
     except InputError as error:
         return (str(error),)
     if refused := refusals(found):
@@ -455,6 +478,8 @@ FAULTS: dict[str, tuple[Change, str]] = {
     "a file of a version that nobody knows": (put("(version 20991231)"), "version"),
 }  # fmt: skip
 """A change of the board, and what one of the reasons names."""
+READ_FROM_THE_FILE = {*on_board.READ, *on_board.MEASURED, *on_fab.READ}
+"""Rules that KiCad is not asked about."""
 HARMLESS: tuple[Change, ...] = (
     at_middle("v1", '(gr_circle (center {x} {y}) (end {r} {y}) (stroke (width 0.1) (type solid))'
               ' (fill no) (layer "Dwgs.User") ' + ID + ")"),
@@ -472,9 +497,13 @@ def _tree(text: str) -> Expression:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_no_faulty_board_is_ordered(fault: str, finished: Finished, tmp_path: Path) -> None:
+def test_no_faulty_board_is_ordered(
+    fault: str, finished: Finished, sound: DesignRuleCheck, tmp_path: Path
+) -> None:
+    """What a rule of ours reads from the file is told though KiCad finds nothing."""
     change, told = FAULTS[fault]
-    found = reasons(tmp_path, finished, expression_text(change(_tree(finished.text))))
+    by_kicad = sound if told in READ_FROM_THE_FILE else None
+    found = reasons(tmp_path, finished, expression_text(change(_tree(finished.text))), by_kicad)
     assert found, "an order was written"
     assert any(re.search(told, reason) for reason in found), found
 

@@ -23,7 +23,7 @@ from tests.shared.model_text import SMALL
 from tests.shared.rule_cases import TEXT, base, subject_of
 from tests.shared.stages import PAPER, bought, rectifier, stage
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 LOW_SWING = '[rules.swing]\nlimit = "1 V"\nreason = "a test"\n'
 

@@ -15,6 +15,7 @@ import pytest
 from designer.cli import entry
 from tests.jobs.test_damaged_folder import BLOCK, EXACT, MODEL
 from tests.shared.damaged import cells_swapped, damaged, json_of, swapped
+from tests.shared.exploring import EXPLORING
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stopped_work import work_stopped
@@ -41,7 +42,7 @@ VERBS = (
     ["bifurcation", "{}", "--circuit", "--from", "1", "--to", "0.9", "--steps", "3"],
     ["search", "{}", "--yield", "0.9"],
 )
-FEW, MANY, EACH = 4, 7, 100
+FEW, MANY, EACH = 4, 7 if EXPLORING else 5, 100
 """Runs of the quick tests, of the slow ones, and folders of each."""
 
 

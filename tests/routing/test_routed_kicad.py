@@ -23,13 +23,19 @@ from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
 from designer.routing.board_layers import with_layers
 from designer.routing.routed_board import route_board
+from tests.shared.exploring import EXPLORING
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
 from tests.shared.rule_cases import generic
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+HARDEST = "through-hole", "SMA jacks", "BNC jacks", "singles", "duals on the surface", "four masses"
+"""Cases that ask most of the router: everything in holes, the largest pads, the most packages, the
+narrowest pads, the largest board. The others are a few parts of these more or less; what is theirs
+alone is in their nets, which ``tests/schematic/test_kicad_cli.py`` has of every case."""
+ROUTED = [name for name in CASES if name in HARDEST or (EXPLORING and name != "surface")]
 OFTEN = [("paper", 4), ("surface", 2)]
 """Boards of every run and their layers; the others are routed with the slow tests."""
-SELDOM = [("through-hole", 4), *((name, 2) for name in CASES if name != "surface")]
+SELDOM = [("through-hole", 4), *((name, 2) for name in ROUTED)]
 
 
 @pytest.mark.kicad
