@@ -271,7 +271,7 @@ def rare_losses(
     plan: StudyPlan,
     number: int,
     *,
-    most: int = MOST_BOARDS,
+    most: int | None = None,
     target: float = TARGET,
     bound: float | None = None,
     jobs: int = 1,
@@ -279,9 +279,10 @@ def rare_losses(
 ) -> RareLosses:
     """How many boards lose question ``number`` of a plan, on the exact circuit.
 
-    most : boards that the estimate may take. target : half-width of the 95 % interval over the
-    estimate at which it ends. bound : a share; it ends as well where the interval lies on one side
-    of it, which favours that side a little. progress : called once a board that was asked.
+    most : boards that the estimate may take; ``MOST_BOARDS`` where none is given. target :
+    half-width of the 95 % interval over the estimate at which it ends. bound : a share; it ends as
+    well where the interval lies on one side of it, which favours that side a little. progress :
+    called once a board that was asked.
 
     Raises
     ------
@@ -290,6 +291,7 @@ def rare_losses(
     if plan.census or plan.labels:
         raise ValueError("measured boards are counted, not drawn")
     began = time.perf_counter()
+    most = MOST_BOARDS if most is None else most
     question = plan.questions[number]
     drawing = _Drawing(plan, question, jobs, progress)
     stream = crc32(question.stream.encode("utf-8"))

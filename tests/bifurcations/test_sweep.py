@@ -169,8 +169,9 @@ def test_starts_show_what_coexists() -> None:
     assert {w.track for w in made.windows} == {"starts"}
 
 
-def test_one_worker_or_many(tmp_path: Path) -> None:
-    plan = _plan(0.9, 1.1, 150, "down", "up", course=QUICK)
+def test_one_worker_or_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep, "BLOCK", 8)
+    plan = _plan(0.9, 1.1, 20, "down", "up", course=QUICK)
     some, many = sweep.run(plan, jobs=1), sweep.run(plan, jobs=3)
     assert _text(some) == _text(many)
 
@@ -180,9 +181,12 @@ def _text(made: Sweep) -> str:
 
 
 @pytest.mark.parametrize("tracks", [("down", "up"), ("start 0",)])
-def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]) -> None:
+def test_goes_on_from_any_finished_block(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tracks: tuple[str, ...]
+) -> None:
     """Chaotic steps: what comes after a block depends on its last digit."""
-    plan = _plan(0.9, 1.1, 130, *tracks, course=QUICK)
+    monkeypatch.setattr(sweep, "BLOCK", 8)
+    plan = _plan(0.9, 1.1, 18, *tracks, course=QUICK)
     assert len(plan.blocks(tracks[0])) == 3
 
     def store(name: str, work: str = "w") -> SweepStore:
@@ -204,7 +208,7 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
                     assert other.read_bytes() == path.read_bytes()
     foreign = store("whole", "another")
     assert foreign.read(tracks[0], 0) is None  # of another sweep
-    assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 131, *tracks).as_dict())
+    assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 19, *tracks).as_dict())
 
 
 def _flipped(path: Path) -> bytes:
@@ -215,10 +219,11 @@ def _flipped(path: Path) -> bytes:
     return whole
 
 
-def test_damaged_blocks_are_computed_again(tmp_path: Path) -> None:
+def test_damaged_blocks_are_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a sweep and of a map; the other blocks are taken, and the files are again as they were."""
+    monkeypatch.setattr(sweep, "BLOCK", 8)
     notes: list[str] = []
-    plan = _plan(1.0, 0.9, 100, "down", course=QUICK)
+    plan = _plan(1.0, 0.9, 12, "down", course=QUICK)
     steps = SweepStore(WorkFiles(tmp_path, "w", {}, notes.append), "omega")
     whole = sweep.run(plan, store=steps)
     assert len(plan.blocks("down")) > 1

@@ -45,6 +45,7 @@ STIFF = system_text(
 """A stiff stop on one side: offsets and the leftover slope spoil the saturating stage."""
 
 
+@pytest.mark.usefixtures("designs_are_made_once")
 def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its reason names both, and a study of other boards bears it out."""
     # The catalogue that is given, for the stage that is not stated too: no other is read.

@@ -82,8 +82,9 @@ SHAKEN = (
 )
 
 
-@pytest.mark.parametrize("objective", ["margin", "match"])
-@pytest.mark.parametrize("text", [ONE, LINKED], ids=["to ground", "between masses"])
+@pytest.mark.parametrize(
+    ("text", "objective"), [(ONE, "margin"), (ONE, "match"), (LINKED, "margin")]
+)
 def test_stops_too_unequal_for_one_output_get_one_each(text: str, objective: str) -> None:
     """Ten times as steep as the other one: what the circuit does is what the model does, in the
     file's own clearance."""

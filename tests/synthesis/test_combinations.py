@@ -3,6 +3,7 @@ model file to parts that do what the model does."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -43,9 +44,16 @@ TEXTS = {
     "a law": MATRICES
     + SIDE
     + table("law", name="rock", points=[[-1, -0.4], [-0.2, 0], [0.2, 0], [1, 0.4]])
-    + "of = { left = 0.5, right = 0.5 }\n"
+    + "of = { left = 0.5, right = 0.25 }\n"
     + DRIVE,
 }
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[SpicePool]:
+    """Workers that import the package once, for all tests of this file."""
+    with SpicePool(2) as workers:
+        yield workers
 
 
 @cache
@@ -56,23 +64,21 @@ def made(text: str) -> Synthesis:
 @pytest.mark.parametrize(
     "name", [*TEXTS, pytest.param("gears", marks=pytest.mark.slow)]
 )  # fmt: skip
-def test_chosen_parts_do_what_the_model_does(name: str) -> None:
+def test_chosen_parts_do_what_the_model_does(name: str, pool: SpicePool) -> None:
     """By the reduction of the parts, and by ngspice's own transfer functions, which are of a mass
     that the drive moves: the first one stands still while the gears do not touch."""
     result = made(TEXTS.get(name, GEARS))
     shows_what_the_model_does(result)
-    with SpicePool(2) as pool:
-        check = equation_check.check(result.design, result.model_responses, pool)
+    check = equation_check.check(result.design, result.model_responses, pool)
     assert check.passed, check.problem
     assert all(np.isfinite(finding.deviation) for finding in check.findings)
 
 
 @pytest.mark.slow
-def test_a_line_ends_before_an_amplifier_that_sums_clips() -> None:
+def test_a_line_ends_before_an_amplifier_that_sums_clips(pool: SpicePool) -> None:
     """With one stop the sum of displacements goes far on the other side, while others are open."""
     result = synthesise(parse_model_file(draw(1, 12, "linked").text), jobs=2)
-    with SpicePool(2) as pool:
-        check = equation_check.check(result.design, result.model_responses, pool)
+    check = equation_check.check(result.design, result.model_responses, pool)
     assert check.passed, check.problem
 
 
@@ -150,7 +156,7 @@ def test_what_cancels_in_the_couplings_is_nothing() -> None:
 @pytest.mark.parametrize("turn", [1.0, -1.0])
 def test_the_picture_of_a_law_is_of_what_it_depends_on(turn: float) -> None:
     """As the board makes it, within its errors, whatever the factors and couplings."""
-    text = TEXTS["a law"].replace("0.5, right = 0.5", f"{0.5 * turn}, right = {0.25 * turn}")
+    text = TEXTS["a law"].replace("0.5, right = 0.25", f"{0.5 * turn}, right = {0.25 * turn}")
     design = made(text).design
     (curve,) = law_curves(design, [], si=False)
     assert curve.symbol == "0.5 x₁ + 0.25 x₂"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import permutations
@@ -64,6 +65,13 @@ TEXTS = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def pool() -> Iterator[SpicePool]:
+    """Workers that import the package once, for all tests of this file."""
+    with SpicePool(2) as workers:
+        yield workers
+
+
 @cache
 def made(name: str) -> Synthesis:
     return synthesise(parse_model_file(TEXTS[name]))
@@ -96,13 +104,12 @@ def with_damper(result: Synthesis, factor: float) -> Synthesis:
 
 
 @pytest.mark.parametrize("name", ["restitution", "both sides"])
-def test_ngspice_s_transfer_functions_know_the_damper(name: str) -> None:
+def test_ngspice_s_transfer_functions_know_the_damper(name: str, pool: SpicePool) -> None:
     """In each contact they are the model's; with another damper they are not, and only there."""
-    with SpicePool(2) as pool:
-        right, wrong = (
-            equation_check.check(each.design, each.model_responses, pool)
-            for each in (made(name), with_damper(made(name), 1.1))
-        )
+    right, wrong = (
+        equation_check.check(each.design, each.model_responses, pool)
+        for each in (made(name), with_damper(made(name), 1.1))
+    )
     assert right.passed, right.problem
     assert {f.name.split(",")[0] for f in wrong.findings if not f.passed} == {"transfer"}
     assert not any(f.name == "transfer, open" for f in wrong.findings if not f.passed)
@@ -155,9 +162,9 @@ def test_boards_that_leap_are_those_of_the_general_kernel(name: str) -> None:
     result = made(name)
     design, (response,) = result.design, result.model_responses
     orbit = on_circuit(nominal_reduction(design).system(), design, response)
-    boards = draw_many(design.circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 5, range(6))
+    boards = draw_many(design.circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 5, range(3))
     drive = excitation_of(result).drive
-    asked = range(6), [drive] * 6, np.tile(orbit.start, (6, 1))
+    asked = range(3), [drive] * 3, np.tile(orbit.start, (3, 1))
     fast, slow = Ensemble(boards), Ensemble(boards, fast=False)
     for a, b in zip(fast.settle(*asked), slow.settle(*asked), strict=True):
         assert a.status is b.status is OrbitStatus.PERIODIC

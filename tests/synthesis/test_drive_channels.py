@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -93,6 +94,13 @@ TEXTS = {
 }
 SECOND = ("two phases", "force beside base", "three phases")
 """Those that take two channels."""
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[SpicePool]:
+    """Workers that import the package once, for all tests of this file."""
+    with SpicePool(2) as workers:
+        yield workers
 
 
 @cache
@@ -195,25 +203,24 @@ def test_the_sheet_s_generators_are_those_of_the_deck() -> None:
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_ngspice_s_transfer_functions_are_the_model_s(name: str) -> None:
+def test_ngspice_s_transfer_functions_are_the_model_s(name: str, pool: SpicePool) -> None:
     """Of each channel; with another resistor in the second one they are not, and only there."""
-    with SpicePool(2) as pool:
-        right = equation_check.check(made(name).design, made(name).model_responses, pool)
-        assert right.passed, right.problem
-        names = [f.name for f in right.findings]
-        assert ("transfer, open, second channel" in names) is (name in SECOND)
-        assert "transfer, open" in names
-        if name not in SECOND:
-            return
-        design = made(name).design
-        odd = design.model.second_order().drive_force(1.3, 1).nonzero()[0][-1]
-        parts = tuple(
-            replace(p, value=1.2 * p.value)
-            if isinstance(p, Resistor) and p.name == f"R{170 + odd}" else p
-            for p in design.circuit.parts
-        )  # fmt: skip
-        wrong = replace(design, circuit=replace(design.circuit, parts=parts))
-        found = equation_check.check(wrong, made(name).model_responses, pool)
+    right = equation_check.check(made(name).design, made(name).model_responses, pool)
+    assert right.passed, right.problem
+    names = [f.name for f in right.findings]
+    assert ("transfer, open, second channel" in names) is (name in SECOND)
+    assert "transfer, open" in names
+    if name not in SECOND:
+        return
+    design = made(name).design
+    odd = design.model.second_order().drive_force(1.3, 1).nonzero()[0][-1]
+    parts = tuple(
+        replace(p, value=1.2 * p.value)
+        if isinstance(p, Resistor) and p.name == f"R{170 + odd}" else p
+        for p in design.circuit.parts
+    )  # fmt: skip
+    wrong = replace(design, circuit=replace(design.circuit, parts=parts))
+    found = equation_check.check(wrong, made(name).model_responses, pool)
     assert [f.name for f in found.findings if not f.passed] == ["transfer, open, second channel"]
 
 

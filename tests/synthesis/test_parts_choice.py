@@ -109,10 +109,8 @@ def test_the_paper_s_case(series: tuple[str, ...]) -> None:
     assert design.amplitude() <= 5.0
 
 
-@pytest.mark.slow
 def test_the_same_input_gives_the_same_parts() -> None:
-    spec = CircuitSpec(resistors=("E24",))
-    a, b = (synthesise(PAPER, spec, CATALOG, PEAKS) for _ in range(2))
+    a, b = coarse(), synthesise(PAPER, E12, CATALOG, PEAKS)
     assert a.circuit == b.circuit
     assert a.errors.max_error == b.errors.max_error
 
@@ -151,24 +149,13 @@ def random_case(seed: int) -> tuple[Dimensionless, CircuitSpec, Peaks]:
 SLOW = pytest.mark.slow
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(k, marks=SLOW) for k in range(3, 8))])
+@pytest.mark.parametrize(
+    "seed", [0, 1, 2, *(pytest.param(k, marks=SLOW) for k in (*range(3, 9), 10, 16, 19))]
+)
 def test_random_targets(seed: int) -> None:
+    """Every pair of series and driven masses, and three that were once refused."""
     model, spec, held = random_case(seed)
     check(synthesise(model, spec, CATALOG, held), spec, held)
-
-
-@pytest.mark.slow
-def test_many_random_targets() -> None:
-    refused = []
-    for seed in range(8, 20):
-        model, spec, held = random_case(seed)
-        try:
-            design = synthesise(model, spec, CATALOG, held)
-        except Unreachable as error:
-            refused.append(f"{seed}: {error}")
-            continue
-        check(design, spec, held)
-    assert len(refused) <= 2, refused
 
 
 # Refusals.
@@ -215,6 +202,12 @@ def test_what_cannot_be_built_is_refused_by_name(changes: dict[str, object], fie
 E12 = CircuitSpec(resistors=("E12",))
 
 
+@cache
+def coarse() -> Design:
+    """The paper's case without a wish, for all that compare with it."""
+    return synthesise(PAPER, E12, CATALOG, PEAKS)
+
+
 def test_matched_parts_are_equal() -> None:
     groups = (("R1", "R7", "R100"), ("C1", "C2"), ("R208", "R209"), ("R2", "R207"))
     values = synthesise(PAPER, replace(E12, matched=groups), CATALOG, PEAKS).circuit.values
@@ -235,7 +228,7 @@ def kinds(design: Design, preferred: tuple[float, ...] = ()) -> int:
 
 
 def test_a_limit_on_distinct_values_is_kept_or_refused_by_name() -> None:
-    most = kinds(synthesise(PAPER, E12, CATALOG, PEAKS)) - 2
+    most = kinds(coarse()) - 2
     assert kinds(synthesise(PAPER, replace(E12, most_values=most), CATALOG, PEAKS)) <= most
     with pytest.raises(Unreachable, match="distinct values"):
         synthesise(PAPER, replace(E12, most_values=3), CATALOG, PEAKS)
@@ -243,14 +236,14 @@ def test_a_limit_on_distinct_values_is_kept_or_refused_by_name() -> None:
 
 def test_preferred_values_are_used_more() -> None:
     preferred = (1e4, 2.2e4, 1e-8)
-    plain = synthesise(PAPER, E12, CATALOG, PEAKS)
+    plain = coarse()
     wished = synthesise(PAPER, replace(E12, preferred=preferred), CATALOG, PEAKS)
     assert kinds(wished, preferred) <= kinds(plain, preferred)
     assert wished.errors.max_error == pytest.approx(plain.errors.max_error, abs=1e-6)
 
 
 def test_slack_buys_fewer_distinct_values() -> None:
-    plain = synthesise(PAPER, E12, CATALOG, PEAKS)
+    plain = coarse()
     loose = synthesise(PAPER, replace(E12, slack=2e-2), CATALOG, PEAKS)
     assert kinds(loose) < kinds(plain)
     assert loose.errors.max_error <= plain.errors.max_error + 2e-2 + 1e-6
@@ -351,7 +344,7 @@ def test_a_stop_that_no_resistor_makes_is_refused_at_once() -> None:
 def test_a_signal_as_small_as_the_offset_is_refused() -> None:
     wide = replace(PAPER, b=1e6)
     with pytest.raises(Unreachable, match=r"model\.b"):
-        synthesise(wide, CircuitSpec(), CATALOG, PAPER_PEAKS)
+        synthesise(wide, E12, CATALOG, PAPER_PEAKS)
 
 
 def test_no_drawn_output_passes_its_rail() -> None:

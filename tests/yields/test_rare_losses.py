@@ -259,7 +259,8 @@ def test_plenty_of_losses_are_counted_as_they_are() -> None:
 def test_the_verb_writes_it_and_takes_it_over(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 600)
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 200)
+    monkeypatch.setattr(rare_losses, "BLOCK", 100)
     monkeypatch.setattr(rare_losses, "PILOT", 100)
     monkeypatch.setattr(rare_losses, "EXPLORED", 128)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
