@@ -15,6 +15,8 @@ from designer.jobs import export_job
 from designer.jobs.rules_job import RulesAnswer
 from tests.jobs.test_kicad_export import MODEL, Done, designer, snapshot
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -39,6 +41,24 @@ def routed(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def own(routed: Path, tmp_path: Path) -> Path:
     """A copy of it that is a test's own."""
     return Path(shutil.copytree(routed, tmp_path / "design"))
+
+
+@pytest.fixture(scope="module")
+def of_both(routed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The same ordered from two fabs, and what ``export`` said of it."""
+    folder = tmp_path_factory.mktemp("ordered") / "design"
+    shutil.copytree(routed, folder)
+    with pytest.MonkeyPatch.context() as patched:
+        finished(patched)
+        done = ordered(folder, "--fab", "jlcpcb", "--fab", "generic")
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+@pytest.fixture
+def own_orders(of_both: tuple[Path, str], tmp_path: Path) -> Path:
+    """A copy of it that is a test's own."""
+    return Path(shutil.copytree(of_both[0], tmp_path / "design"))
 
 
 def finished(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,10 +119,10 @@ def test_orders_are_written_once_each_in_a_stage_of_its_own(
 
 @pytest.mark.kicad
 def test_another_board_is_ordered_with_overwrite_alone_and_other_orders_stay(
-    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    own_orders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     finished(monkeypatch)
-    assert ordered(own, "--fab", "jlcpcb", "--fab", "generic").returncode == 0
+    own = own_orders
     kept = {n: c for n, c in snapshot(own).items() if "jlcpcb/" in n}
     assert kept
     moved = tmp_path / "mine.kicad_pcb"
@@ -118,11 +138,10 @@ def test_another_board_is_ordered_with_overwrite_alone_and_other_orders_stay(
 
 @pytest.mark.kicad
 def test_orders_in_the_one_stage_of_earlier_versions_are_read_as_one_each(
-    own: Path, monkeypatch: pytest.MonkeyPatch
+    of_both: tuple[Path, str], own_orders: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Version 1 of the folder had one stage for all orders, with the names of the fabs."""
-    finished(monkeypatch)
-    first = json.loads(ordered(own, "--fab", "jlcpcb", "--fab", "generic").stdout)
+    own, first = own_orders, json.loads(of_both[1])
     file = own / "manifest.json"
     manifest = json.loads(file.read_text())
     entries = [manifest["stages"].pop(f"fabrication/{name}") for name in ("generic", "jlcpcb")]

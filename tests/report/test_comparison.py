@@ -32,6 +32,8 @@ from designer.report import compare_plots, compare_table, comparison
 from designer.report.comparison import OURS, DesignColumn, comparison_json
 from tests.shared.model_text import COARSE_CIRCUIT
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 CATALOG = load_catalog()
 PAPER, SPEC = paper_values.MODEL, CircuitSpec()
 BASE = (
