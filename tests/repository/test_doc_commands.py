@@ -51,7 +51,7 @@ SMALLER = {
         for name in ("restitution", "two-shakers")
     },
     "run examples/double-well.toml --out out/double-well-board": (
-        "synthesise examples/double-well.toml"
+        "synthesise examples/double-well.toml --out out/double-well-board"
     ),
     # the parts of these two are chosen in tests/yields/test_without_period.py and
     # tests/synthesis/test_combinations.py
