@@ -40,7 +40,7 @@ from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
 from tests.shared import paper_cases
 from tests.shared.mechanism_file import HAMMER
-from tests.shared.model_text import SMALL
+from tests.shared.model_text import COARSE_CIRCUIT, COARSE_RECTIFIER, SMALL
 
 CATALOG = load_catalog()
 
@@ -225,7 +225,7 @@ def test_a_folder_of_ones_own_replaces_single_prices(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["saturation", "rectifier"])
 def test_a_stage_that_was_chosen_for_the_file_stays(kind: DeadZone) -> None:
     """A file that states no stage is cured with the one that its design has."""
-    unstated = parse_model_file(SMALL + "[[response]]\nomega = 0.85\n")
+    unstated = parse_model_file(SMALL.replace(COARSE_RECTIFIER, COARSE_CIRCUIT))
     assert unstated.circuit.dead_zone is None
     cured = upgraded_file(with_stage(unstated, kind), Upgrades(opamp="OPA4192"))
     assert (cured.circuit.opamp, cured.circuit.dead_zone) == ("OPA4192", kind)

@@ -31,7 +31,7 @@ from designer.model.model_file import ModelFile, parse_model_file
 from tests.explorer import opened_page as live
 from tests.explorer.opened_page import chromium
 from tests.explorer.served import EXAMPLES
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
 OMEGAS = (0.82, 0.85, 0.88, 1.55, 1.6)
 TITLE = "</script><script>document.title = 'hurt'</script>"
@@ -46,7 +46,7 @@ def unpacked(column: dict[str, object]) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def modelfile() -> ModelFile:
-    text = f'format = 1\ntitle = "{TITLE}"\n{PAPER_TABLE}{WANTED}{COARSE_CIRCUIT}'
+    text = f'format = 1\ntitle = "{TITLE}"\n{PAPER_TABLE}{WANTED}{COARSE_RECTIFIER}'
     return parse_model_file(text, Path("small.toml"))
 
 
@@ -117,7 +117,7 @@ def test_half_the_size_keeps_the_picture() -> None:
 
 
 def test_a_file_without_responses_says_why_it_has_no_yields(modelfile: ModelFile) -> None:
-    bare = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_CIRCUIT}", None)
+    bare = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_RECTIFIER}", None)
     assert yields(bare, Options(samples=1), Progress()).words == "the model file wants no response"
 
 

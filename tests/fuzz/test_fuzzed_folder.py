@@ -16,7 +16,7 @@ from designer.cli import entry
 from tests.jobs.test_damaged_folder import BLOCK, EXACT, MODEL
 from tests.shared.damaged import cells_swapped, damaged, json_of, swapped
 from tests.shared.exploring import EXPLORING
-from tests.shared.model_text import COARSE_CIRCUIT
+from tests.shared.model_text import COARSE_RECTIFIER
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stopped_work import work_stopped
 
@@ -49,7 +49,7 @@ FEW, MANY, EACH = 4, 7 if EXPLORING else 5, 100
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a design and a study."""
-    out = quick_folder(MODEL + COARSE_CIRCUIT, tmp_path_factory.mktemp("fuzzed") / "design")
+    out = quick_folder(MODEL + COARSE_RECTIFIER, tmp_path_factory.mktemp("fuzzed") / "design")
     assert entry.status(["tolerance", str(out), *EXACT, "-q"]) in (0, 1)
     return out
 

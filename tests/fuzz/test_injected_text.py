@@ -23,7 +23,7 @@ from designer.base.toml_writer import toml_text
 from designer.board.sexpr import read
 from designer.cli import entry
 from designer.model.model_file import ModelFile, parse_model_file
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import quick_folder
 
 pytestmark = [
@@ -38,9 +38,6 @@ PIECES = (
     "> x", "=1+1", "+1", "-1", "@SUM(A1)", ".include /etc/passwd", ".end", ".control", "*", "R1",
     "+ R1 0 0 1", "../../x", "/etc/x", "C:\\x", "~", "CON", "\u202e", "\u00a0", "µΩ", "𝛀", "x",
 )  # fmt: skip
-TEXT = (
-    "format = 1\n" + PAPER_TABLE + '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n' + COARSE_CIRCUIT
-)
 hostile_text = (
     st.lists(st.sampled_from(PIECES), min_size=1, max_size=8)
     .map(" ".join)
@@ -49,7 +46,7 @@ hostile_text = (
 
 
 def file(title: str) -> ModelFile:
-    data = parse_model_file(TEXT).data
+    data = parse_model_file(SMALL).data
     data["rules"] = {"offset-force": {"limit": 0.5, "reason": title}}
     return parse_model_file(toml_text({"format": data.pop("format"), "title": title, **data}))
 

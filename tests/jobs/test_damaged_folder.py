@@ -17,7 +17,7 @@ import pytest
 from designer.base.design_folder import Folder
 from designer.base.seal import BLANK, MARK
 from designer.cli import entry as cli
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stopped_work import work_stopped
 
@@ -55,7 +55,7 @@ def words(verb: str, folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    out = quick_folder(MODEL + COARSE_CIRCUIT, tmp_path_factory.mktemp("whole") / "design")
+    out = quick_folder(MODEL + COARSE_RECTIFIER, tmp_path_factory.mktemp("whole") / "design")
     assert cli.status([*words("tolerance", out), "-q"]) in (0, 1)
     return Finished(out, json.loads((out / "tolerance.json").read_text()))
 

@@ -23,7 +23,7 @@ from designer.verdicts.verdict import Answer, StudyPlan
 from designer.yields.layers import LocalRunner, fill, samples_task
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.verdicts.test_verdict import nothing, plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -114,7 +114,7 @@ def test_a_scheduler_that_dies_is_said() -> None:
 def test_nobody_at_the_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Exit 3 and nothing written: neither anew nor over what is there."""
     model, out = tmp_path / "small.toml", tmp_path / "out"
-    model.write_text(f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 1.55\n{COARSE_CIRCUIT}")
+    model.write_text(f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 1.55\n{COARSE_RECTIFIER}")
     words = ["tolerance", str(model), "--out", str(out), "--rung", "exact", "--samples", "5"]
     assert entry.status([*words, "--cluster", "tcp://127.0.0.1:9", "-q"]) == 3
     assert "no cluster at tcp://127.0.0.1:9" in capfd.readouterr().err

@@ -31,14 +31,14 @@ from designer.model.measured_values import MeasuredBoards
 from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
 from designer.verdicts.verdict import Verdict
 from tests.shared.house import ORDER
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 HOSTILE = "<script>alert(1)</script> & co"
 TWO = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n[[response]]\nomega = 1.55\nexpect = "1-1-1"\n'
-TEXT = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}{TWO}{COARSE_CIRCUIT}'
+TEXT = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}{TWO}{COARSE_RECTIFIER}'
 SAMPLES = 5
 
 

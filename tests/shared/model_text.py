@@ -36,7 +36,7 @@ SMALL = (
 omega = 0.85
 expect = "1-2-2"
 """
-    + COARSE_CIRCUIT
+    + COARSE_RECTIFIER
 )
 """A whole file: one response of the paper, coarse parts, no title."""
 
