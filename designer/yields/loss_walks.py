@@ -9,7 +9,7 @@ walk at random among lost boards (conditional sampling: I. Papaioannou et al., P
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -63,6 +63,8 @@ class LossWalk:
     reach: float = REACH
     tries: int = 0
     """Steps, one after the other, of which too few stayed."""
+    kept: list[Array] = field(default_factory=list)
+    """(N, coordinates) boards of width 1, after some moves each."""
 
     @classmethod
     def of(cls, kind: str, width: float, points: Array) -> LossWalk:
@@ -97,8 +99,10 @@ class LossWalk:
         self.normal = kept[np.arange(BOARDS) % len(kept)]
 
 
-def walk(walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator) -> tuple[Array, ...]:
-    """Lead all walks to the width 1, as far as they come.
+def walk(
+    walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator, moves: int = LAST_MOVES
+) -> tuple[Array, ...]:
+    """Lead all walks to the width 1, as far as they come. moves : of each board at that width.
 
     Returns for each walk (N, coordinates) lost boards of width 1, spread as lost boards of its kind
     are; none where it ended on its way. Boards that are near each other in it are not independent.
@@ -110,12 +114,12 @@ def walk(walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator) -> t
         for _ in range(MOVES):
             _moved(going, shown, rng)
     there = [w for w in walks if w.width == 1.0]
-    states: dict[int, list[Array]] = {id(w): [] for w in walks}
-    for k in range(LAST_MOVES if there else 0):
+    for move in range(moves if there else 0):
         _moved(there, shown, rng)
-        for each in there if (k + 1) % KEPT == 0 else ():
-            states[id(each)].append(each.points)
-    return tuple(np.concatenate(states[id(w)]) if states[id(w)] else w.normal[:0] for w in walks)
+        if (move + 1) % KEPT == 0:
+            for each in there:
+                each.kept.append(each.points)
+    return tuple(np.concatenate([w.normal[:0], *w.kept]) for w in walks)
 
 
 def _asked(

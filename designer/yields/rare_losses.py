@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 from zlib import crc32
 
@@ -31,7 +32,7 @@ from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
-from designer.yields.loss_walks import INDEPENDENT, LossWalk, walk
+from designer.yields.loss_walks import INDEPENDENT, LAST_MOVES, LossWalk, walk
 from designer.yields.margins import nominal_limits
 from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
@@ -72,6 +73,8 @@ EXPLORED = 512
 """Boards of a width."""
 SCOUTED = 40_000
 """Steps that a board may take which only says where to draw."""
+FEW_MOVES = 40
+"""Last moves of lost boards where each answer takes long."""
 OPEN = "open"
 """Stands for what clips or has no period: to say which takes long."""
 MOST_REGIONS = 8
@@ -217,6 +220,13 @@ class _Drawing:
     def names(self) -> tuple[str, ...]:
         return self.plan.spread.coordinates(self.plan.circuit)
 
+    @cached_property
+    def quick(self) -> bool:
+        """Whether most boards have a compiled way to their answers."""
+        return (
+            self.question.excitation.drive.is_sine and Ensemble(self.plan.boards(range(1))).compiled
+        )
+
     def boards(self, points: Array) -> Boards:
         return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
 
@@ -235,15 +245,16 @@ class _Drawing:
     def foretold(self, boards: Boards) -> list[str]:
         """What each board shows where it is lost, ``OPEN`` where that takes long to say, "" where
         it is fine."""
-        q = self.question
-        ensemble = Ensemble(boards, jobs=self.jobs)
-        if not ensemble.compiled:
+        if not self.quick:
             verdicts = self.asked(boards, within=SCOUTED)
             return [r if v is not Verdict.OK else "" for v, r in verdicts]
+        q, ensemble = self.question, Ensemble(boards, jobs=self.jobs)
         every = range(len(boards))
         starts = np.tile(q.start.start, (len(boards), 1))
         drives = [q.excitation.drive] * len(boards)
         orbits = ensemble.quick(every, drives, starts, jobs=self.jobs)
+        for _ in every:
+            self.progress()
         judged = (None if o is None else (q.judge(o)[0], o.response) for o in orbits)
         return [OPEN if j is None else "" if j[0] is Verdict.OK else j[1] for j in judged]
 
@@ -511,7 +522,8 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
         return drawing.foretold(between(drawing.boards(points), widths))
 
     found, may = list[_Region](), _tiltable(drawing.names)
-    for each, points in zip(walks, walk(walks, shown, rng), strict=True):
+    moves = LAST_MOVES if drawing.quick else FEW_MOVES
+    for each, points in zip(walks, walk(walks, shown, rng, moves), strict=True):
         lost = drawing.scouted(points, np.zeros(len(points), dtype=int)).lost
         asked += len(points)
         even = np.ones(len(points))

@@ -103,6 +103,7 @@ def estimated(
     )  # fmt: skip
     monkeypatch.setattr(rare_losses._Drawing, "asked", asked)
     monkeypatch.setattr(rare_losses._Drawing, "foretold", foretold)
+    monkeypatch.setattr(rare_losses._Drawing, "quick", True)
     monkeypatch.setattr(rare_losses, "between", wider)
     return rare_losses.rare_losses(plan, 0, **how)
 
@@ -264,7 +265,7 @@ def test_the_verb_writes_it_and_takes_it_over(
     monkeypatch.setattr(rare_losses, "PILOT", 100)
     monkeypatch.setattr(rare_losses, "EXPLORED", 128)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
-    monkeypatch.setattr(loss_walks, "LAST_MOVES", 20)
+    monkeypatch.setattr(rare_losses, "LAST_MOVES", 20)
     model, folder = tmp_path / "model.toml", tmp_path / "d"
     model.write_text(SMALL, "utf-8")
     command = ["tolerance", str(model), "--out", str(folder), "--rung", "exact", "--samples", "20"]
