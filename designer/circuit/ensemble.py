@@ -120,8 +120,8 @@ class Ensemble:
     ) -> list[SettledBoard]:
         """``settle``, with the displacement that each orbit draws.
 
-        within : steps of a trial, such as `BRIEF`. What takes longer is not settled, and chaos is
-        not watched until it may end. None: no trial.
+        within : steps of a trial, such as `BRIEF`. What the compiled way leaves open and takes
+        longer is not settled, and chaos is not watched until it may end. None: no trial.
         """
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)

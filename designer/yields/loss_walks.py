@@ -22,8 +22,10 @@ MOVES = 2
 """Moves of each board at a width."""
 LAST_MOVES, KEPT = 240, 20
 """Moves at the last width, and between two of which the boards are kept."""
-INDEPENDENT = 0.25
-"""Independent boards for each that is kept: the rest is what copies of one board have in common."""
+FEWEST_APART, MOST_APART = 0.08, 0.5
+"""Independent boards for each that is kept, at least and at most: copies have much in common."""
+CHI = 0.455
+"""Median of the square of a standard normal number."""
 NARROWED = 0.8
 """The next width over that before, at first."""
 STAY, FEW_STAY = 0.5, 0.08
@@ -32,7 +34,8 @@ shorter one is tried."""
 SHORTER = 0.5
 """Power of the step that is tried instead."""
 TRIES = 4
-"""Steps of which too few boards stay lost, one after the other, at which a walk ends."""
+"""Steps of which too few boards stay lost, one after the other, at which a walk takes every kind of
+loss, and then ends."""
 SHORTEST, LONGEST = 0.97, 0.6
 """Steps of the width."""
 REACH = 0.4
@@ -63,6 +66,8 @@ class LossWalk:
     reach: float = REACH
     tries: int = 0
     """Steps, one after the other, of which too few stayed."""
+    any_loss: bool = False
+    """Whether every lost board is one of it: those of its kind alone came no further."""
     kept: list[Array] = field(default_factory=list)
     """(N, coordinates) boards of width 1, after some moves each."""
 
@@ -86,11 +91,17 @@ class LossWalk:
     def next_width(self) -> float:
         return max(1.0, self.width * self.step)
 
+    def takes(self, shown: str) -> bool:
+        """Whether a board that shows this, "" where it is fine, is one of the walk's."""
+        return shown == self.kind or (self.any_loss and shown != "")
+
     def narrow(self, stay: Mask) -> None:
         """Go to the next width with the boards that stay lost there; (N,) which do."""
         if stay.mean() < FEW_STAY:
             self.tries += 1
             self.step = min(self.step**SHORTER, SHORTEST)
+            if self.tries == TRIES and not self.any_loss:
+                self.any_loss, self.tries, self.step = True, 0, NARROWED
             return
         self.width, self.tries = self.next_width, 0
         if stay.mean() > STAY:
@@ -122,13 +133,24 @@ def walk(
     return tuple(np.concatenate([w.normal[:0], *w.kept]) for w in walks)
 
 
+def independent(points: Array) -> float:
+    """Effective number of these boards (N, coordinates), of which many are copies that have moved.
+
+    Most coordinates have nothing to do with a loss: their means, as normal numbers, are as far from
+    0 as so many independent boards have them.
+    """
+    means = ndtri(np.clip(points, EDGE, 1.0 - EDGE)).mean(axis=0)
+    apart = CHI / max(float(np.median(means**2)), EDGE)
+    return float(np.clip(apart, FEWEST_APART * len(points), MOST_APART * len(points)))
+
+
 def _asked(
     walks: Sequence[LossWalk], points: Sequence[Array], shown: Shown, widths: Sequence[float]
 ) -> list[Mask]:
     """Which of each walk's boards (N, coordinates) show its kind of loss, all asked at once."""
     shows = iter(shown(np.concatenate(points), np.repeat(widths, [len(p) for p in points])))
     return [
-        np.array([next(shows) == each.kind for _ in mine], dtype=bool)
+        np.array([each.takes(next(shows)) for _ in mine], dtype=bool)
         for each, mine in zip(walks, points, strict=True)
     ]
 

@@ -16,6 +16,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from itertools import compress
+from operator import not_
 from typing import Any
 from zlib import crc32
 
@@ -26,13 +28,13 @@ from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import wilson
 from designer.circuit.board_arrays import Boards
-from designer.circuit.ensemble import Ensemble
-from designer.dynamics.orbit import OrbitStatus
+from designer.circuit.ensemble import BRIEF, Ensemble
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
 from designer.verdicts.exact_rung import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
-from designer.yields.loss_walks import INDEPENDENT, LAST_MOVES, LossWalk, walk
+from designer.yields.loss_walks import LossWalk, Shown, independent, walk
 from designer.yields.margins import nominal_limits
 from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
@@ -73,12 +75,14 @@ EXPLORED = 512
 """Boards of a width."""
 SCOUTED = 40_000
 """Steps that a board may take which only says where to draw."""
-FEW_MOVES = 40
+TRIED = 64
+"""Boards as they are that say whether answers come quickly."""
+FEW_MOVES = 60
 """Last moves of lost boards where each answer takes long."""
-OPEN = "open"
-"""Stands for what clips or has no period: to say which takes long."""
-MOST_REGIONS = 8
-"""Components of the mixture beside the plain one."""
+OTHER = "no n-p-q"
+"""The kind of loss of all boards that neither clip nor have an n-p-q."""
+MOST_WALKS, MOST_REGIONS = 6, 12
+"""Walks of lost boards, and components of the mixture beside the plain one."""
 SHOWN_PARTS = 5
 """Parts of a region that are named."""
 WIDEST = 10.0
@@ -187,6 +191,19 @@ class _Region:
 
 
 @dataclass(frozen=True)
+class _Found:
+    """Where boards are lost, and what it took to find it."""
+
+    regions: list[_Region]
+    boards: int
+    """Boards that were asked."""
+    plain: int
+    """Of these, plain ones of pilot rounds."""
+    strays: Array
+    """(N, coordinates) of those the lost ones."""
+
+
+@dataclass(frozen=True)
 class _Sample:
     """Boards that were asked. points : (N, coordinates). responses : of each what it shows."""
 
@@ -222,10 +239,26 @@ class _Drawing:
 
     @cached_property
     def quick(self) -> bool:
-        """Whether most boards have a compiled way to their answers."""
-        return (
-            self.question.excitation.drive.is_sine and Ensemble(self.plan.boards(range(1))).compiled
-        )
+        """Whether the compiled way answers for boards as they are."""
+        if not self.question.excitation.drive.is_sine:
+            return False
+        ensemble = Ensemble(self.plan.boards(range(TRIED)), jobs=self.jobs)
+        open_ = sum(orbit is None for orbit in self._quickly(ensemble))
+        return ensemble.compiled and open_ <= 1
+
+    @property
+    def within(self) -> int:
+        """Steps that a scouted board may take: chaos that is wanted has to be known for it."""
+        return SCOUTED if self.question.periodic else BRIEF
+
+    def _quickly(self, ensemble: Ensemble) -> list[Orbit | None]:
+        """What the compiled way says of these boards, None where it leaves it open."""
+        count, q = len(ensemble), self.question
+        starts = np.tile(q.start.start, (count, 1))
+        orbits = ensemble.quick(range(count), [q.excitation.drive] * count, starts, jobs=self.jobs)
+        for _ in orbits:
+            self.progress()
+        return orbits
 
     def boards(self, points: Array) -> Boards:
         return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
@@ -242,21 +275,22 @@ class _Drawing:
             out += [(verdict, orbit.response) for orbit, verdict, _ in rows]
         return out
 
-    def foretold(self, boards: Boards) -> list[str]:
-        """What each board shows where it is lost, ``OPEN`` where that takes long to say, "" where
-        it is fine."""
-        if not self.quick:
-            verdicts = self.asked(boards, within=SCOUTED)
-            return [r if v is not Verdict.OK else "" for v, r in verdicts]
-        q, ensemble = self.question, Ensemble(boards, jobs=self.jobs)
-        every = range(len(boards))
-        starts = np.tile(q.start.start, (len(boards), 1))
-        drives = [q.excitation.drive] * len(boards)
-        orbits = ensemble.quick(every, drives, starts, jobs=self.jobs)
-        for _ in every:
-            self.progress()
-        judged = (None if o is None else (q.judge(o)[0], o.response) for o in orbits)
-        return [OPEN if j is None else "" if j[0] is Verdict.OK else j[1] for j in judged]
+    def foretold(self, boards: Boards, *, whole: bool) -> list[str]:
+        """The kind of loss of each board, "" where it is fine. whole : whether boards are asked
+        that the compiled way leaves open; they count as fine otherwise."""
+        out = [""] * len(boards)
+        slow = list(range(len(boards)))
+        if self.quick:
+            orbits = self._quickly(Ensemble(boards, jobs=self.jobs))
+            slow = [k for k, orbit in enumerate(orbits) if orbit is None]
+            for k, orbit in enumerate(orbits):
+                if orbit is not None and self.question.judge(orbit)[0] is not Verdict.OK:
+                    out[k] = _kind_of(orbit.response)
+        if slow and (whole or not self.quick):
+            asked = self.asked(boards.take(np.array(slow)), within=self.within)
+            for k, (verdict, response) in zip(slow, asked, strict=True):
+                out[k] = "" if verdict is Verdict.OK else _kind_of(response)
+        return out
 
     def scouted(self, points: Array, component: Index, wide: Array | None = None) -> _Sample:
         """These boards asked briefly, which is enough to find where to draw: one that takes long to
@@ -264,7 +298,7 @@ class _Drawing:
         boards = self.boards(points)
         if wide is not None:
             boards = between(boards, wide)
-        verdicts = self.asked(boards, within=SCOUTED)
+        verdicts = self.asked(boards, within=self.within)
         lost = np.array([v is not Verdict.OK for v, _ in verdicts], dtype=bool)
         responses = tuple(response for _, response in verdicts)
         return _Sample(points, component, lost, np.zeros_like(lost), responses)
@@ -308,7 +342,8 @@ def rare_losses(
     stream = crc32(question.stream.encode("utf-8"))
     rng = np.random.default_rng([plan.seed, stream, TAG])
     doing("regions of loss")
-    regions, pilots, clear = _regions(drawing, rng)
+    found = _regions(drawing, rng)
+    regions = found.regions
     cube = _mixture(regions, PLAIN, len(drawing.names))
     sample = drawing.sample(*cube.drawn(BLOCK, rng))
     while True:
@@ -321,11 +356,11 @@ def rare_losses(
         if count >= most or ((narrow or told) and count >= LEAST_BOARDS):
             break
         sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
-    spent = pilots + count
-    elsewhere = (
-        sample.lost & (sample.component == 0) & (cube.densities(sample.points).argmax(1) == 0)
-    )
-    outside = unseen_share(int(elsewhere.sum()), clear + int((sample.component == 0).sum()))
+    spent = found.boards + count
+    plain = sample.component == 0
+    strays = np.concatenate([found.strays, sample.points[plain & sample.lost]])
+    elsewhere = int((cube.densities(strays).argmax(axis=1) == 0).sum())
+    outside = unseen_share(elsewhere, found.plain + int(plain.sum()))
     low, high = _interval(result.mean, result.error, outside)
     gain = math.nan
     if result.mean > 0.0 and result.error > 0.0:
@@ -337,7 +372,7 @@ def rare_losses(
         high=high,
         unanswered=result.unanswered,
         boards=count,
-        pilots=pilots,
+        pilots=found.boards,
         drawn_lost=result.drawn_lost,
         effective=result.effective,
         largest_weight=result.largest,
@@ -423,33 +458,32 @@ def _estimate(cube: TiltedCube, sample: _Sample) -> _Estimate:
             variance += count * float(hits[sample.component == k].var(ddof=1))
     none = float((weights * sample.unanswered).sum()) / total
     answered = max(1.0 - none, 1e-12)
-    squares = float((hits**2).sum())
     return _Estimate(
         float(hits.sum()) / total / answered,
         math.sqrt(variance) / total / answered,
         none,
         int(sample.lost.sum()),
-        float(hits.sum()) ** 2 / squares if squares else 0.0,
+        _effective(hits) if hits.any() else 0.0,
         float(hits.max(initial=0.0)),
     )
 
 
-def _regions(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region], int, int]:
-    """Components of the mixture, the boards that were asked for them, and of those the plain
-    ones."""
-    regions = list(_by_limits(drawing))
-    asked = len(PATH) * len(regions)
+def _regions(drawing: _Drawing, rng: np.random.Generator) -> _Found:
+    """Where boards are lost."""
+    limits = list(_by_limits(drawing))
     wide, spent = _by_wider_boards(drawing, rng)
-    regions, asked = [*regions, *wide], asked + spent
-    clear = 0
+    regions, asked = [*wide, *limits], len(PATH) * len(limits) + spent
+    clear, strays = 0, list[Array]()
     for _ in range(PILOTS):
         some = regions[:MOST_REGIONS]
         cube = _mixture(some, 0.3, len(drawing.names))
         sample = drawing.scouted(*cube.drawn(PILOT, rng))
         asked += len(sample.points)
         clear += int((sample.component == 0).sum())
-        regions = _moved(some, cube, sample, drawing.names) or some
-    return regions[:MOST_REGIONS], asked, clear
+        strays.append(sample.points[(sample.component == 0) & sample.lost])
+        moved = _moved(some, cube, sample, drawing.names) or some
+        regions = sorted(moved, key=lambda region: -region.adds)
+    return _Found(regions[:MOST_REGIONS], asked, clear, np.concatenate(strays))
 
 
 def _mixture(regions: Sequence[_Region], plain: float, size: int) -> TiltedCube:
@@ -516,20 +550,27 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     those boards, led back to what parts may be (``loss_walks``)."""
     walks, asked = _met(drawing, rng)
 
-    def shown(points: Array, widths: Array) -> list[str]:
-        nonlocal asked
-        asked += len(points)
-        return drawing.foretold(between(drawing.boards(points), widths))
+    def shown(whole: bool) -> Shown:
+        def kinds(points: Array, widths: Array) -> list[str]:
+            nonlocal asked
+            asked += len(points)
+            return drawing.foretold(between(drawing.boards(points), widths), whole=whole)
 
+        return kinds
+
+    # What clips or has no n-p-q takes long to say: such boards are fewer, and the others of no use.
+    fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
+    quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
+    ends = [*walk(quick, shown(False), rng), *walk(slow, shown(True), rng, FEW_MOVES)]
     found, may = list[_Region](), _tiltable(drawing.names)
-    moves = LAST_MOVES if drawing.quick else FEW_MOVES
-    for each, points in zip(walks, walk(walks, shown, rng, moves), strict=True):
+    for each, points in zip([*quick, *slow], ends, strict=True):
         lost = drawing.scouted(points, np.zeros(len(points), dtype=int)).lost
         asked += len(points)
         even = np.ones(len(points))
-        for mine in _sides(points, even, lost) if lost.any() else ():
-            independent = INDEPENDENT * float(mine.sum())
-            tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), independent)
+        share = independent(points) / len(points) if len(points) else 1.0
+        for mine in _sides(points, even, lost, share) if lost.any() else ():
+            count = share * float(mine.sum())
+            tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), count)
             if tilt.any():
                 found.append(_Region(tilt, f"boards {each.met:g} times as far off"))
     return found, asked
@@ -546,7 +587,7 @@ def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], i
         sample = drawing.scouted(points, component, np.full(len(points), wide))
         asked += len(points)
         shows = [r if lost else "" for r, lost in zip(sample.responses, sample.lost, strict=True)]
-        kinds = [_kind_of(shown) for shown in shows]
+        kinds = [_kind_of(shown) if shown else "" for shown in shows]
         for kind in {*kinds} - {""}:
             here = points[[each == kind for each in kinds]]
             before = len(met[kind][1]) if kind in met else MET - 1
@@ -557,20 +598,16 @@ def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], i
                 break
             last = True
     walks = list[LossWalk]()
-    for _, (wide, boards) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
+    for kind, (wide, boards) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
         even = np.ones(len(boards))
-        wider = between(drawing.boards(boards), np.full(len(boards), wide))
-        foretold, asked = np.array(drawing.foretold(wider)), asked + len(boards)
-        (kind, _), *_ = Counter(foretold.tolist()).most_common()
-        for side in _sides(boards, even, foretold == kind) if kind else ():
-            walks.append(LossWalk.of(kind, wide, boards[side]))
-    return walks[:MOST_REGIONS], asked
+        walks += [LossWalk.of(kind, wide, boards[side]) for side in _sides(boards, even, even > 0)]
+    return walks[:MOST_WALKS], asked
 
 
 def _kind_of(shown: str) -> str:
-    """The kind of loss of a board that shows this: one of all that have no period."""
-    named = not shown or shown == OrbitStatus.CLIPPED or shown[0].isdigit()
-    return shown if named else OPEN
+    """The kind of loss of a board that shows this."""
+    named = shown == OrbitStatus.CLIPPED or shown[:1].isdigit()
+    return shown if named else OTHER
 
 
 def _tilts(sample: _Sample, weights: Array, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
@@ -588,15 +625,16 @@ def _tilts(sample: _Sample, weights: Array, names: Sequence[str]) -> Iterator[tu
                 yield response, tilt
 
 
-def _sides(points: Array, weights: Array, here: Mask) -> Iterator[Mask]:
+def _sides(points: Array, weights: Array, here: Mask, share: float = 1.0) -> Iterator[Mask]:
     """Lost boards of one kind in two, where they lie on both sides of the middle: losses by a part
     that is too large, and by one that is too small, have a mean that says nothing.
 
     They do where their spread along one way is more than chance makes of so many boards (V. A.
-    Marchenko, L. A. Pastur, 1967), and both sides have enough of them.
+    Marchenko, L. A. Pastur, 1967), and both sides have enough of them. share : of them, those that
+    are independent.
     """
     off, w = points[here] - 0.5, weights[here] / weights[here].sum()
-    count = 1.0 / (w**2).sum()
+    count = share * _effective(w)
     values, ways = np.linalg.eigh((off.T * w) @ off)
     edge = (1.0 + math.sqrt(points.shape[1] / count)) ** 2 / 12.0
     along = (points - 0.5) @ ways[:, -1] > 0.0

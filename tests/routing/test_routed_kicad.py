@@ -32,7 +32,7 @@ HARDEST = "through-hole", "SMA jacks", "BNC jacks", "singles", "duals on the sur
 """Cases that ask most of the router: everything in holes, the largest pads, the most packages, the
 narrowest pads, the largest board. The others are a few parts of these more or less; what is theirs
 alone is in their nets, which ``tests/schematic/test_kicad_cli.py`` has of every case."""
-ROUTED = [name for name in CASES if name in HARDEST or (EXPLORING and name != "surface")]
+ROUTED = [*HARDEST, *(name for name in CASES if EXPLORING and name not in (*HARDEST, "surface"))]
 OFTEN = [("paper", 4), ("surface", 2)]
 """Boards of every run and their layers; the others are routed with the slow tests."""
 SELDOM = [("through-hole", 4), *((name, 2) for name in ROUTED)]

@@ -124,6 +124,6 @@ def test_rungs_with_a_memory_after_what_is_predicted(pool: SpicePool, rung: Rung
 @pytest.mark.slow
 def test_a_worker_s_memory_is_flat() -> None:
     who = subject(1)
-    sizes = memory(who, SolverSettings("trap", who.period / 200.0), 100)
-    # Kept plots would be 60 runs × 1600 points × 7 vectors × 8 bytes = 5 MB.
+    sizes = memory(who, SolverSettings("trap", who.period / 200.0), 160)
+    # Kept plots would be 120 runs × 1600 points × 7 vectors × 8 bytes = 11 MB.
     assert max(sizes[40:]) - sizes[40] < 3.0

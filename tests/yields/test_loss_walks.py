@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from designer.base.arrays import Array
-from designer.yields.loss_walks import LossWalk, walk
+from designer.yields.loss_walks import LossWalk, independent, walk
 from tests.shared.closed_forms import irwin_hall
 
 SIZE, SUMMED = 60, 12
@@ -53,3 +53,25 @@ def test_boards_that_have_walked_have_the_law_of_lost_boards() -> None:
         middle = points[:, SUMMED:-SUMMED]
         assert middle.mean(axis=0) == pytest.approx(0.5, abs=0.15)
         assert middle.std() == pytest.approx(12**-0.5, abs=0.02)
+
+
+def test_a_loss_that_is_called_otherwise_on_better_parts_is_followed() -> None:
+    """Far beyond the limit, where bad parts lie, it shows another kind."""
+
+    def called(points: Array, widths: Array) -> list[str]:
+        sums = wider(points, widths)[:, :SUMMED].sum(axis=1)
+        return ["4-4-4" if s > 12.0 else "2-2-2" if s > 9.5 else "" for s in sums]
+
+    rng = np.random.default_rng(8)
+    points = rng.random((200_000, SIZE))
+    far = [k == "4-4-4" for k in called(points, np.full(len(points), 2.0))]
+    (found,) = walk([LossWalk.of("4-4-4", 2.0, points[far][:12])], called, rng, moves=40)
+    assert set(called(found, np.ones(len(found)))) == {"2-2-2"}
+
+
+@pytest.mark.parametrize(("copies", "least", "most"), [(1, 96, 96), (8, 15.36, 45.0)])
+def test_copies_are_no_independent_boards(copies: int, least: float, most: float) -> None:
+    """Of 192 boards, of which some are alike: at most half count, and 24 different ones as about
+    24."""
+    points = np.random.default_rng(3).random((192 // copies, SIZE))
+    assert least <= independent(np.tile(points, (copies, 1))) <= most

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,15 +16,21 @@ from hypothesis import given, strategies as st
 from scipy.integrate import quad
 
 from designer.base.arrays import Array
+from designer.check.synthesis_result import synthesise
 from designer.cli import entry
+from designer.model.model_file import parse_model_file
+from designer.spread.board_quantities import between
 from designer.verdicts.verdict import Verdict
 from designer.yields import loss_walks, rare_losses
 from designer.yields.margins import Margin
 from designer.yields.rare_losses import counted_losses
+from designer.yields.study import plan_study
 from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
+from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
-from tests.shared.model_text import SMALL
+from tests.shared.model_text import COARSE_RECTIFIER, SMALL
+from tests.shared.system_text import clearance, system_text, table
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -88,7 +95,7 @@ def estimated(
     ) -> list[tuple[Verdict, str]]:
         return [(Verdict.LOST if r else Verdict.OK, r) for r in lost(boards.points)]
 
-    def foretold(_: object, boards: _Boards) -> list[str]:
+    def foretold(_: object, boards: _Boards, *, whole: bool) -> list[str]:
         return lost(boards.points)
 
     def wider(boards: _Boards, share: Array) -> _Boards:
@@ -254,6 +261,46 @@ def test_plenty_of_losses_are_counted_as_they_are() -> None:
 
 
 # ---------------------------------------------------------------------------------------------
+# On boards
+
+
+def drawing_of(text: str) -> rare_losses._Drawing:
+    """Boards of the one response of a model file."""
+    modelfile = parse_model_file(text)
+    made = synthesise(modelfile)
+    plan = plan_study(modelfile, made.design, check(made, None), made.catalog, samples=1, seed=1)
+    return rare_losses._Drawing(plan, plan.questions[0], 1, lambda: None)
+
+
+def test_what_is_foretold_of_boards_is_what_they_show() -> None:
+    """For any number of threads; but for what the compiled way leaves open, if that is not asked
+    about: it is no loss then."""
+    drawing = drawing_of(SMALL)
+    assert drawing.quick
+    points = np.random.default_rng(5).random((96, len(drawing.names)))
+    boards = between(drawing.boards(points), np.full(96, 8.0))
+    known = drawing.asked(boards, within=rare_losses.SCOUTED)
+    lost = ["" if v is Verdict.OK else rare_losses._kind_of(r) for v, r in known]
+    assert {"", "clipped", rare_losses.OTHER} < set(lost)
+    assert replace(drawing, jobs=3).foretold(boards, whole=True) == lost
+    quickly = drawing.foretold(boards, whole=False)
+    assert all(a in (b, "") for a, b in zip(quickly, lost, strict=True))
+    assert {"", "1-1-1"} == set(quickly)
+
+
+def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
+    ground = ("a", "ground")
+    text = system_text(
+        {"a": 1.0}, {ground: 1.0}, {ground: 0.2},
+        clearance("A", *ground, upper=0.5, lower=0.5, stiffness=9.0),
+        table("force", on="a", amplitude=1.0, harmonics=[[3, 0.2, 0.1]]),
+        table("response", omega=1.3),
+        COARSE_RECTIFIER,
+    )  # fmt: skip
+    assert not drawing_of(text).quick
+
+
+# ---------------------------------------------------------------------------------------------
 # In a folder
 
 
@@ -265,7 +312,7 @@ def test_the_verb_writes_it_and_takes_it_over(
     monkeypatch.setattr(rare_losses, "PILOT", 100)
     monkeypatch.setattr(rare_losses, "EXPLORED", 128)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
-    monkeypatch.setattr(rare_losses, "LAST_MOVES", 20)
+    monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
     model, folder = tmp_path / "model.toml", tmp_path / "d"
     model.write_text(SMALL, "utf-8")
     command = ["tolerance", str(model), "--out", str(folder), "--rung", "exact", "--samples", "20"]
