@@ -558,7 +558,7 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
 
         return kinds
 
-    # What clips or has no n-p-q takes long to say: such boards are fewer, and the others of no use.
+    # It takes long to say what clips or has no n-p-q: those walks are shorter.
     fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
     quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
     ends = [*walk(quick, shown(False), rng), *walk(slow, shown(True), rng, FEW_MOVES)]
