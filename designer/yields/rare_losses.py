@@ -564,10 +564,11 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     ends = [*walk(quick, shown(False), rng), *walk(slow, shown(True), rng, FEW_MOVES)]
     found, may = list[_Region](), _tiltable(drawing.names)
     for each, points in zip([*quick, *slow], ends, strict=True):
+        if not len(points):  # it ended on its way
+            continue
         lost = drawing.scouted(points, np.zeros(len(points), dtype=int)).lost
         asked += len(points)
-        even = np.ones(len(points))
-        share = independent(points) / len(points) if len(points) else 1.0
+        even, share = np.ones(len(points)), independent(points) / len(points)
         for mine in _sides(points, even, lost, share) if lost.any() else ():
             count = share * float(mine.sum())
             tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), count)
@@ -586,10 +587,10 @@ def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], i
         points, component = plain.drawn(EXPLORED, rng)
         sample = drawing.scouted(points, component, np.full(len(points), wide))
         asked += len(points)
-        shows = [r if lost else "" for r, lost in zip(sample.responses, sample.lost, strict=True)]
-        kinds = [_kind_of(shown) if shown else "" for shown in shows]
+        each = zip(sample.responses, sample.lost, strict=True)
+        kinds = [_kind_of(response) if lost else "" for response, lost in each]
         for kind in {*kinds} - {""}:
-            here = points[[each == kind for each in kinds]]
+            here = points[[shown == kind for shown in kinds]]
             before = len(met[kind][1]) if kind in met else MET - 1
             if before < min(len(here), MANY):
                 met[kind] = (wide, here)
