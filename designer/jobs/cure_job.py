@@ -39,7 +39,7 @@ from designer.jobs import folder_numbers, rung_choice, usual_times
 from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
-from designer.model.model_file import errors_in, need_responses
+from designer.model.model_file import ModelFile, errors_in, need_responses
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,8 +116,7 @@ def cure(
         other inputs, or ``out`` holds a design, and nothing is said about what to do.
     """
     path = Path(folder)
-    if ppm is not None:
-        yield_ = _yield_of(ppm, yield_)
+    yield_ = target_of(yield_, ppm)
     limits = () if overwrite else ("budget", "without")
     defaults: dict[str, Any] = {}
     if is_design_folder(path):
@@ -160,14 +159,7 @@ def cure_into(
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place where something else stands
     base = read_design(path, progress=progress)
-    need_responses(base.modelfile)
-    listed = base.modelfile.measured
-    if listed is not None and listed.labels and is_rare(target):
-        expected = "no list of measured boards, which are as many as there are"
-        found = f"{len(listed.labels)} boards"
-        raise InputError(base.modelfile.source, "spread.measured", found, expected)
-    with errors_in(base.modelfile):
-        need_periods(base.modelfile.responses)
+    check_wish(base.modelfile, target, budget, without)
     folder = Folder(path)
     inputs = {
         "design": design_inputs_of(folder),
@@ -283,8 +275,37 @@ def _write_design(
             write_design(folder, synthesis, stages, options, progress, other)
 
 
-def _yield_of(ppm: float, yield_: float | None) -> float:
-    """The yield where so many boards of a million may be lost."""
+def check_wish(
+    modelfile: ModelFile, target: float, budget: float | None, without: Collection[str]
+) -> None:
+    """Refuse what no cure of a design of this model file can reach.
+
+    Raises
+    ------
+    InputError : as of ``cure``, but for what concerns a folder.
+    """
+    _checked(target, budget, without)
+    need_responses(modelfile)
+    listed = modelfile.measured
+    if listed is not None and listed.labels and is_rare(target):
+        expected = "no list of measured boards, which are as many as there are"
+        raise InputError(
+            modelfile.source, "spread.measured", f"{len(listed.labels)} boards", expected
+        )
+    with errors_in(modelfile):
+        need_periods(modelfile.responses)
+
+
+def target_of(yield_: float | None, ppm: float | None) -> float | None:
+    """The yield that is wanted, None where nothing is said. ppm : the boards of a million that may
+    be lost, instead.
+
+    Raises
+    ------
+    InputError : both are given, or so few boards that none can be counted.
+    """
+    if ppm is None:
+        return yield_
     if yield_ is not None:
         raise InputError(None, "--ppm", ppm, "no --yield beside it: both say what may be lost")
     if not FEWEST_LOST <= ppm < 1e6:

@@ -54,6 +54,14 @@ class Options:
     """Whether a stored blame without noise is made anew: ``--blame`` was said."""
     measured: Path | None = None
     """File of a list of boards that are studied instead of random ones."""
+    yield_: float | None = None
+    """Of a search: the yield for which the found design is cured; None: it stays as it is."""
+    ppm: float | None = None
+    """The same as the boards of a million that may be lost."""
+    budget: float | None = None
+    """The most that the cure may cost [euro]."""
+    without: tuple[str, ...] = ()
+    """Kinds of upgrades that the cure is not to have."""
 
     @property
     def workers(self) -> int:

@@ -238,7 +238,13 @@ def _stated(word: Word, value: Any) -> list[str]:
         return [text for each in value for text in _stated(word, each)]
     if isinstance(value, Path):
         value = _last_name(value)
-    return [*word.names[-1:], f"{value:g}" if isinstance(value, float) else str(value)]
+    return [*word.names[-1:], _number(value) if isinstance(value, float) else str(value)]
+
+
+def _number(value: float) -> str:
+    """A number as short as it is read again."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def _last_name(path: Path) -> str:

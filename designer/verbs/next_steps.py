@@ -61,6 +61,12 @@ def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     yield from after_board(folder)
 
 
+def after_cure(folder: Path) -> Iterator[Step]:
+    """With a cured design in a folder of its own."""
+    yield _step("how many of its boards will work", "tolerance", folder)
+    yield _step("its KiCad project, its board routed", "export", folder, "--routed")
+
+
 def after_failed_rules(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     """With design rules that fail on the circuit. answer : with ``failed_rules``; older ones have
     none."""

@@ -1,8 +1,8 @@
-"""The verb ``search``: the design of the highest yield, or the cheapest cure of a design."""
+"""The verb ``search``: the design of the highest yield, the cheapest cure of a design, or both."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,9 +20,13 @@ from designer.verbs.tables import design_written, drive_cells, whole_job
 if TYPE_CHECKING:
     from designer.jobs.cure_job import CureResult
     from designer.jobs.job_outcome import JobOutcome
+    from designer.jobs.options import Options
+    from designer.model.model_file import ModelFile
 
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
+CURED = "cured"
+"""Folder of the cured design, in that of the search whose design is cured."""
 
 
 def search(
@@ -33,11 +37,11 @@ def search(
         int | None, option("--samples", "N", f"Fresh boards at the end [{SEARCH_SAMPLES}].")
     ] = None,
     yield_: Annotated[
-        float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
+        float | None, option("--yield", "Y", "The cheapest cure: the yield wanted.")
     ] = None,
     ppm: Annotated[
         float | None,
-        option("--ppm", "N", "Cure this design folder: boards of a million that may be lost."),
+        option("--ppm", "N", "The cheapest cure: boards of a million that may be lost."),
     ] = None,
     budget: Annotated[
         float | None, option("--budget", "PRICE", "The most that a cure may cost.")
@@ -63,10 +67,11 @@ def search(
     resume: Resume = False,
     progress: Progress | None = None,
 ) -> JobOutcome | CureResult:
-    """Find the design of the highest yield; with --yield or --ppm, the cheapest cure of a folder.
+    """Find the design of the highest yield; with --yield or --ppm, its cheapest cure too.
 
-    A model file is searched, and written into ``out``. A design folder is cured, as ``cure`` does
-    it.
+    A model file is searched, and written into ``out``. With ``yield_`` or ``ppm`` the found design
+    is then cured: the cured one is a design folder of its own, ``out``/cured. A design folder is
+    cured, as ``cure`` does it.
 
     Raises
     ------
@@ -100,20 +105,57 @@ def search(
     from designer.jobs import folder_numbers, search_job, usual_times
     from designer.jobs.options import Options, stated_options
 
-    expected = "a design folder to cure; a model file gets its highest yield"
-    _refuse({"--yield": yield_, "--ppm": ppm, "--budget": budget, "--without": without}, expected)
+    if yield_ is None and ppm is None:
+        _refuse({"--budget": budget, "--without": without}, "--yield or --ppm beside it")
     words = {"samples": samples, "seed": seed}
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, rung=rung or "auto")
+    options = Options(
+        jobs=jobs,
+        overwrite=overwrite,
+        resume=resume,
+        rung=rung or "auto",
+        yield_=yield_,
+        ppm=ppm,
+        budget=budget,
+        without=tuple(without),
+    )
     options = replace(options, **{"samples": SEARCH_SAMPLES} | stated_options(words))
     options.check()
     place = None if out is None else Path(out)
     modelfile, folder = source(path, place)
+    cure = _asked_cure(modelfile, options)
     options = folder_numbers.of_search(folder, options, words)
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(VERB.command, model=name, out=place)
     progress = Progress() if progress is None else progress
-    with progress.whole(usual_times.SEARCH):
-        return search_job.search_into(modelfile, folder, options, progress, command)
+    usual = usual_times.SEARCH if cure is None else {**usual_times.SEARCH, **usual_times.CURED}
+    with progress.whole(usual):
+        found = search_job.search_into(modelfile, folder, options, progress, command)
+        if cure is None:
+            return found
+        cured = cure(folder, out=folder / CURED, options=options, progress=progress)
+    return replace(
+        found,
+        answer={**found.answer, "cure": cured.answer},
+        satisfied=found.satisfied and cured.satisfied,
+        reused=found.reused and cured.reused,
+    )
+
+
+def _asked_cure(modelfile: ModelFile, options: Options) -> Callable[..., CureResult] | None:
+    """``cure_into`` with what is asked of the found design; None where nothing is.
+
+    Raises
+    ------
+    InputError : no cure of a design of this model file can reach it.
+    """
+    if options.yield_ is None and options.ppm is None:
+        return None
+    from designer.jobs import cure_job  # a search need not import the cure
+
+    target = cure_job.target_of(options.yield_, options.ppm)
+    wish: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
+    cure_job.check_wish(modelfile, **wish)
+    return partial(cure_job.cure_into, **wish)
 
 
 def _refuse(options: Mapping[str, object], expected: str) -> None:
@@ -128,15 +170,28 @@ def show(result: JobOutcome | CureResult) -> None:
     from designer.jobs.job_outcome import JobOutcome  # a search need not import the cure
 
     if isinstance(result, JobOutcome):
-        design_written(result, result.answer, tables, next_steps.after_study)
+        design_written(result, result.answer, tables, _after)
     else:
-        from designer.centering import cure_table
+        _cure_told(result.answer)
 
-        tell(cure_table.text(result.answer))
+
+def _cure_told(cure: Mapping[str, Any]) -> None:
+    from designer.centering import cure_table
+
+    tell(cure_table.text(cure))
+
+
+def _after(folder: Path, answer: Mapping[str, Any]) -> Iterator[next_steps.Step]:
+    """What may be done next: with the cured design, where there is one."""
+    if answer.get("cure", {}).get("reached"):
+        yield from next_steps.after_cure(folder / CURED)
+    else:
+        yield from next_steps.after_study(folder, answer)
 
 
 def tables(answer: Mapping[str, Any]) -> None:
-    """A run; then the responses at their places, what limits them, what each lever is worth."""
+    """A run; then the responses at their places, what limits them, what each lever is worth; then
+    the cure, where one was asked for."""
     whole_job(answer)
     search = answer["search"]
     pairs = zip(search["final"]["responses"], answer["confirmation"]["responses"], strict=True)
@@ -171,6 +226,9 @@ def tables(answer: Mapping[str, Any]) -> None:
             ),
             gap=1,
         )
+    if "cure" in answer:
+        say("")
+        _cure_told(answer["cure"])
 
 
 def _sigmas(distance: float | None) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,10 +24,13 @@ from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
 from designer.jobs import rung_choice
+from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.search_job import confirms, to_confirm
 from designer.jobs.search_stage import searched_into
+from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+from designer.verbs.search import KINDS
 from designer.verdicts.verdict import Verdict
 from tests.shared.search_cases import asked, made
 
@@ -350,8 +354,85 @@ def test_a_match_leaves_no_place_open(tmp_path: Path, capsys: pytest.CaptureFixt
     model.write_text(asked(OPEN, objective="match"), encoding="utf-8")
     assert run("synthesise", model, "--out", tmp_path / "out", "-q") == 2
     assert 'circuit.objective = "yield"' in capsys.readouterr().err
-    assert run("search", model, "--yield", 0.9, "--out", tmp_path / "out", "-q") == 2
-    assert "--yield" in capsys.readouterr().err
+
+
+LISTED = """
+[spread]
+measured = "boards.csv"
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "more", "field"),
+    [
+        (("--budget", 2), "", "--budget"),  # of a cure, which nothing asks for
+        (("--without", "grade"), "", "--without"),
+        (("--yield", 0.9, "--ppm", 10), "", "--ppm"),
+        (("--ppm", 1), "", "--ppm"),
+        (("--yield", 1.5), "", "--yield"),
+        (("--ppm", 10, "--without", "solder"), "", "--without"),
+        (("--ppm", 10), LISTED, "spread.measured"),
+    ],
+)
+def test_a_cure_that_cannot_be_is_refused_before_the_search(
+    words: tuple[object, ...],
+    more: str,
+    field: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(asked(OPEN, more=more), encoding="utf-8")
+    (tmp_path / "boards.csv").write_text("board,part,value\nA,VCC,15.0\n", encoding="utf-8")
+    assert run("search", model, *words, "--out", tmp_path / "out", "-q") == 2
+    assert field in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("response", "target", "reached"),
+    [
+        ('omega = 0.85\nexpect = "1-2-2"', ("--yield", 0.5), True),
+        ('omega = 0.215\nexpect = "1-8-8"', ("--yield", 0.97), False),  # nearly grazes
+    ],
+)
+def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
+    response: str,
+    target: tuple[object, ...],
+    reached: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """What the search itself does is another test's: here a plain choice of parts stands for it."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(asked(response, objective="match"), encoding="utf-8")
+
+    def chosen(file: ModelFile, folder: Path, options: Options, *rest: Any) -> JobOutcome:
+        made_now = synthesise_into(file, folder, options, Progress())
+        commands.append(rest[1](options))
+        return replace(made_now, answer={"responses": []}, satisfied=True)
+
+    commands: list[str] = []
+    monkeypatch.setattr("designer.jobs.search_job.search_into", chosen)
+    monkeypatch.setattr("designer.verbs.search.tables", lambda answer: None)
+    without = [word for kind in KINDS for word in ("--without", kind)]
+    options = ("--out", out, *target, *without, "--jobs", 1, "-q")
+    assert run("search", model, *options, "--json") == (0 if reached else 1)
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["cure"] == read(out / "cure.json")
+    assert answer["cure"]["reached"] is reached
+    assert (out / "cured" / "design.json").exists() is reached
+    assert shlex.join(str(word) for word in target) in commands[0]
+
+    # Again: nothing is done anew, and the same is said.
+    before = files(out)
+    assert run("search", model, *options, "--json") == (0 if reached else 1)
+    assert json.loads(capsys.readouterr().out) == answer
+    assert files(out) == before
+    assert run("search", model, *options[:-1]) == (0 if reached else 1)
+    said = capsys.readouterr().err
+    assert (f"designer tolerance {out / 'cured'}" in said) is reached
 
 
 @pytest.mark.parametrize(
