@@ -23,7 +23,7 @@ from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit
 from designer.dynamics.step_budget import Budget
 from designer.model.hertz_law import POWER
-from designer.model.law_elements import CubicSpring
+from designer.model.law_elements import NonlinearElement, SmoothLaw
 from designer.model.lumped_elements import Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
@@ -166,19 +166,22 @@ def curved_laws(model: MechanicalModel) -> tuple[CurvedLaw, ...]:
     """The cubic springs of a model, then its Hertzian stops."""
     if not isinstance(model, LumpedSystem):
         return ()
-    springs = (_of_spring(model, each) for each in model.cubic_springs)
+    springs = (
+        _of_spring(model, element, element.curve)
+        for element in model.nonlinear.values()
+        if element.curve is not None
+    )
     return (*springs, *(_of_stops(model, gap) for gap in model.gaps if gap.law == "hertz"))
 
 
-def _of_spring(model: LumpedSystem, spring: CubicSpring) -> CurvedLaw:
-    one, other = spring.between
-    upper = [(0.0, 0.0), *(point for point in spring.corners if point[0] > 0.0)]
+def _of_spring(model: LumpedSystem, element: NonlinearElement, curve: SmoothLaw) -> CurvedLaw:
+    upper = [(0.0, 0.0), *(point for point in element.corners if point[0] > 0.0)]
     return CurvedLaw(
-        spring.between,
-        spring.range,
-        model.row_of({one: 1.0, other: -1.0}),
+        element.joins or (),
+        curve.span,
+        model.row_of(element.factors),
         (0.0, 0.0),
-        lambda x: spring.k1 * x + spring.k3 * x**3,
+        curve.force,
         np.array(upper),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from designer.model.law_elements import Law
 from designer.model.lumped_elements import words_of
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def system_sketch(system: Elements) -> str:
     widths = [len(name) + 4 for name in row]
     widths[0] = 1
     springs = {frozenset(spring.between) for spring in system.shown_springs}
-    springs |= {frozenset(spring.between) for spring in system.cubic_springs}
+    laws = system.nonlinear.values()
+    unnamed = [law for law in laws if not isinstance(law, Law)]
+    springs |= {frozenset(law.factors) for law in unnamed if law.drawn == "spring"}
     dampers = {frozenset(damper.between) for damper in system.shown_dampers}
     pairs = [frozenset(name.replace("|", "ground") for name in row[i : i + 2])
              for i in range(len(row) - 1)]  # fmt: skip
@@ -77,8 +80,7 @@ def system_sketch(system: Elements) -> str:
         sides = " and ".join(s for s in ("upper", "lower") if getattr(gap, s) is not None)
         lines.append(f"{gap.name}: {sides} stop, {words_of(gap)}")
     lines += [f"law {law.name}: {words_of(law)}" for law in system.laws]
-    lines += [f"cubic spring: {' to '.join(each.between)}" for each in system.cubic_springs]
-    lines += [f"friction: {' to '.join(each.between)}" for each in system.frictions]
+    lines += [f"{law.WORDS}: {words_of(law)}" for law in unnamed]
     lines += [f"force on {force.on}" for force in system.forces]
     if system.base is not None:
         stops = "with it" if system.base.stops == "base" else "stay"

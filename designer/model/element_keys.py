@@ -1,10 +1,13 @@
-"""What keys accept that several elements have: a name, two bodies, a value of either sign."""
+"""What keys accept that several elements have: a name, two bodies, a value of either sign; and how
+an element is refused."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NoReturn
 
+from designer.base.errors import MISSING, InputError
 from designer.base.schema import Accepts, number, several, text
 
 GROUND = "ground"
@@ -14,6 +17,34 @@ NAME = text(
     "a name: a letter, then letters, digits and _, at most 32 characters",
 )
 """The name of an element."""
+NUMBERS = (1e-60, 1e60)
+"""Least and greatest size of a number that is not 0: the squares of ratios of such are still
+numbers."""
+
+
+def refuse(field: str, found: object, expected: str) -> NoReturn:
+    """InputError of an element; the file is named where it is known."""
+    raise InputError(None, field, found, expected)
+
+
+def check_size(field: str, value: float, what: str = "a number") -> None:
+    """Refuse a number outside ``NUMBERS``."""
+    low, high = NUMBERS
+    if value != 0.0 and not low <= abs(value) <= high:
+        refuse(field, value, f"{what} from {low:g} to {high:g}")
+
+
+def check_joined(
+    field: str, between: tuple[str, str] | None, of: tuple[tuple[str, float], ...] | None
+) -> None:
+    """Refuse an element without one of ``between`` and ``of``, and factors that are no numbers."""
+    if (between is None) == (of is None):
+        found = MISSING if of is None else "between and of"
+        refuse(f"{field}.between", found, "between = [A, B], or of = {A = factor, …}")
+    for name, factor in of or ():
+        if name == GROUND:
+            refuse(f"{field}.of", GROUND, "masses: ground is what their displacements are from")
+        check_size(f"{field}.of", factor, "numbers")
 
 
 def two_bodies() -> Accepts:

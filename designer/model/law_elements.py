@@ -2,16 +2,20 @@
 given point by point, cubic springs and friction.
 
 Each stands for one ``ForceLaw``. All numbers are in the file's own consistent units; texts with
-units become SI.
+units become SI. A kind is one class here, named in ``KINDS``, a field of ``Elements`` and a
+table of ``model_file``; checks, sweeps, tables, equations and drawings follow from it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Annotated
+from itertools import chain, pairwise
+from typing import Annotated, ClassVar, Literal
 
+from designer.base.arrays import Array
+from designer.base.errors import MISSING
 from designer.base.schema import (
     Accepts,
     FileTable,
@@ -23,13 +27,117 @@ from designer.base.schema import (
 )
 from designer.base.units import has_unit
 from designer.model.cubic_law import MOST_POINTS, cubic_error, cubic_points, points_for
-from designer.model.element_keys import NAME, combination, signed, two_bodies
+from designer.model.element_keys import (
+    NAME,
+    NUMBERS,
+    check_joined,
+    check_size,
+    combination,
+    refuse,
+    signed,
+    two_bodies,
+)
 from designer.model.force_law import Quantity
+from designer.model.model import GREATEST, SMALLEST
 
 DEFAULT_ERROR = 0.001
 """Of a cubic spring that states neither its points nor their error."""
 
 Points = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class LawNumber:
+    """A number of such an element, which a sweep may change."""
+
+    least: float
+    """The least that it may be."""
+    unit: str
+    """Its SI unit; "" where it has none of its own."""
+    meaning: str
+    """What it is, for the table of the elements."""
+
+
+@dataclass(frozen=True)
+class SmoothLaw:
+    """A curved law that straight pieces stand for."""
+
+    text: str
+    """The law with its numbers, over x."""
+    force: Callable[[Array], Array]
+    """(k,) forces at displacements, odd in them."""
+    span: float
+    """Displacement up to which the pieces are laid."""
+    count: int
+    """How many points they join."""
+    largest_error: float
+    """Of the pieces, over the largest force in the span."""
+
+
+@dataclass(frozen=True)
+class NonlinearElement(FileTable, ABC):
+    """An element whose force is a continuous piecewise-linear function of one displacement or one
+    velocity: what every kind has."""
+
+    TABLE: ClassVar[str]
+    """Of a model file."""
+    LIST: ClassVar[str]
+    """The field of ``Elements``."""
+    WORDS: ClassVar[str]
+    """What it is called in a sketch, such as "cubic spring"; the last word where names have it."""
+    PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {}
+    """Those that a sweep may change, by their keys; the first stands beside it in a drawing."""
+
+    @property
+    @abstractmethod
+    def joins(self) -> tuple[str, str] | None:
+        """The two bodies that it joins; None of a combination of masses."""
+
+    @property
+    @abstractmethod
+    def quantity(self) -> Quantity:
+        """What its force depends on."""
+
+    @property
+    @abstractmethod
+    def corners(self) -> Points:
+        """``ForceLaw.points``."""
+
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """What that is the sum of: a factor for each body, ground left out of it or not."""
+        assert self.joins is not None
+        first, second = self.joins
+        return {first: 1.0, second: -1.0}
+
+    @property
+    def between_them(self) -> str:
+        """The bodies that it joins as a part of its name."""
+        return "-".join(self.joins or ())
+
+    @property
+    def called(self) -> str:
+        """Its name among all laws; a second one between the same bodies gets a number."""
+        return f"{self.between_them}.{self.WORDS.split()[0]}"
+
+    @property
+    def drawn(self) -> Literal["spring", "damper", "friction"]:
+        """The symbol in a drawing."""
+        return "spring" if self.quantity == "displacement" else "damper"
+
+    @property
+    def curve(self) -> SmoothLaw | None:
+        """The law that its pieces stand for, where that is curved."""
+        return None
+
+    @abstractmethod
+    def check(self) -> None:
+        """Refuse numbers that make no such law.
+
+        Raises
+        ------
+        InputError : its field is that of the model file.
+        """
 
 
 @dataclass(frozen=True)
@@ -80,8 +188,10 @@ def _finite(value: object, unit: str) -> float:
 
 
 @dataclass(frozen=True)
-class Law(FileTable):
+class Law(NonlinearElement):
     """A force that is straight between given points, and straight on beyond them."""
+
+    TABLE, LIST, WORDS = "law", "laws", "law"
 
     name: Annotated[str, NAME]
     """Its name."""
@@ -96,17 +206,35 @@ class Law(FileTable):
     these factors."""
 
     @property
+    def joins(self) -> tuple[str, str] | None:
+        return self.between
+
+    @property
     def factors(self) -> Mapping[str, float]:
-        """What x is the sum of, ground left out of it or not."""
-        if self.between is not None:
-            first, second = self.between
-            return {first: 1.0, second: -1.0}
-        return dict(self.of or ())
+        return dict(self.of or ()) if self.between is None else super().factors
+
+    @property
+    def called(self) -> str:
+        return self.name
 
     @property
     def corners(self) -> Points:
-        """``ForceLaw.points``."""
         return self.points.values
+
+    def check(self) -> None:
+        field = f"law {self.name}"
+        check_joined(field, self.between, self.of)
+        expected = {"displacement": "m", "velocity": "m/s"}[self.quantity]
+        if self.points.unit not in ("", expected):
+            text = f"x in {self.points.unit}"
+            refuse(f"{field}.points", text, f"x in {expected}: the law is of a {self.quantity}")
+        for value in chain.from_iterable(self.corners):
+            check_size(f"{field}.points", value, "numbers")
+        slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(self.corners)]
+        steepest = max(slopes, key=abs)
+        if not abs(steepest) <= NUMBERS[1]:
+            expected = f"slopes up to {NUMBERS[1]:g}"
+            refuse(f"{field}.points", f"a slope of {steepest:g}", expected)
 
 
 def _even() -> Accepts:
@@ -116,8 +244,15 @@ def _even() -> Accepts:
 
 
 @dataclass(frozen=True)
-class CubicSpring(FileTable):
+class CubicSpring(NonlinearElement):
     """A spring with the force k1 x + k3 x³, by straight pieces."""
+
+    TABLE, LIST, WORDS = "cubic_spring", "cubic_springs", "cubic spring"
+    PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {
+        "k1": LawNumber(-GREATEST, "N/m", "linear part of the spring"),
+        "k3": LawNumber(-GREATEST, "", "cubic part of the spring (N/m³ in SI)"),
+        "range": LawNumber(SMALLEST, "m", "up to which its pieces are laid"),
+    }
 
     between: Annotated[tuple[str, str], two_bodies()]
     """What it joins."""
@@ -148,14 +283,51 @@ class CubicSpring(FileTable):
         return cubic_error(self.k1, self.k3, self.range, self.count or MOST_POINTS)
 
     @property
+    def joins(self) -> tuple[str, str]:
+        return self.between
+
+    @property
+    def quantity(self) -> Quantity:
+        return "displacement"
+
+    @property
     def corners(self) -> Points:
-        """``ForceLaw.points``."""
         return cubic_points(self.k1, self.k3, self.range, self.count or MOST_POINTS)
+
+    @property
+    def curve(self) -> SmoothLaw:
+        return SmoothLaw(
+            f"{self.k1:.4g} x + {self.k3:.4g} x³",
+            lambda x: self.k1 * x + self.k3 * x**3,
+            self.range,
+            self.count or MOST_POINTS,
+            self.largest_error,
+        )
+
+    def check(self) -> None:
+        field = f"cubic_spring {self.between_them}"
+        for key in ("k1", "k3", "range"):
+            check_size(f"{field}.{key}", getattr(self, key))
+        if self.points is not None and self.error is not None:
+            refuse(f"{field}.error", self.error, "none beside points, which decide it")
+        if self.count is None:
+            reached = f"they reach {self.largest_error:.2g}"
+            expected = f"an error that {MOST_POINTS} points reach; {reached}"
+            refuse(f"{field}.error", self.error, expected)
 
 
 @dataclass(frozen=True)
-class Friction(FileTable):
+class Friction(NonlinearElement):
     """Dry friction whose force rises with the sliding velocity until it slides."""
+
+    TABLE, LIST, WORDS = "friction", "frictions", "friction"
+    PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {
+        "force": LawNumber(0.0, "N", "friction"),
+        "velocity": LawNumber(SMALLEST, "m/s", "up to which it rises"),
+        "static": LawNumber(SMALLEST, "N", "friction there"),
+        "stribeck": LawNumber(SMALLEST, "m/s", "where it has fallen"),
+        "speed": LawNumber(-GREATEST, "m/s", "of the surface that it slides on"),
+    }
 
     between: Annotated[tuple[str, str], two_bodies()]
     """What slides on what."""
@@ -171,8 +343,19 @@ class Friction(FileTable):
     """Of the surface that the first body slides on, as that of a belt."""
 
     @property
+    def joins(self) -> tuple[str, str]:
+        return self.between
+
+    @property
+    def quantity(self) -> Quantity:
+        return "velocity"
+
+    @property
+    def drawn(self) -> Literal["friction"]:
+        return "friction"
+
+    @property
     def corners(self) -> Points:
-        """``ForceLaw.points``."""
         peak = self.force if self.static is None else self.static
         upper = [(self.velocity, peak)]
         if self.stribeck is not None:
@@ -181,20 +364,17 @@ class Friction(FileTable):
         points = [*((-x, -force) for x, force in reversed(upper)), *upper]
         return tuple((x + self.speed, force) for x, force in points)
 
+    def check(self) -> None:
+        field = f"friction {self.between_them}"
+        if (self.static is None) != (self.stribeck is None):
+            key = "static" if self.static is None else "stribeck"
+            refuse(f"{field}.{key}", MISSING, "both static and stribeck, or neither")
+        if self.static is not None and self.static < self.force:
+            refuse(f"{field}.static", self.static, f"at least force = {self.force:g}")
+        if self.stribeck is not None and not self.stribeck > self.velocity:
+            expected = f"more than velocity = {self.velocity:g}"
+            refuse(f"{field}.stribeck", self.stribeck, expected)
 
-NonlinearElement = Law | CubicSpring | Friction
 
-
-def quantity_of(element: NonlinearElement) -> Quantity:
-    """What the force of an element depends on."""
-    if isinstance(element, Law):
-        return element.quantity
-    return "velocity" if isinstance(element, Friction) else "displacement"
-
-
-def factors_of(element: NonlinearElement) -> Mapping[str, float]:
-    """What that is the sum of: a factor for each body."""
-    if isinstance(element, Law):
-        return element.factors
-    first, second = element.between
-    return {first: 1.0, second: -1.0}
+KINDS: tuple[type[NonlinearElement], ...] = (Law, CubicSpring, Friction)
+"""Every kind, in the order of equations and tables."""

@@ -21,14 +21,7 @@ from designer.dynamics.drive_shape import SINE, Shape
 from designer.model.clearance import Side
 from designer.model.element_keys import GROUND, NAME, combination, signed, two_bodies
 from designer.model.hertz_law import HertzPieces, hertz_pieces
-from designer.model.law_elements import (
-    CubicSpring,
-    Friction,
-    Law,
-    NonlinearElement,
-    factors_of,
-    quantity_of,
-)
+from designer.model.law_elements import KINDS, CubicSpring, Friction, Law, NonlinearElement
 from designer.model.matrices import Matrices
 from designer.model.waveforms import Waveform, series
 
@@ -403,11 +396,10 @@ class Elements:
     def nonlinear(self) -> dict[str, NonlinearElement]:
         """All elements whose force is a law, by their names; a second one between the same bodies
         has a number."""
-        found: dict[str, NonlinearElement] = {law.name: law for law in self.laws}
-        for kind, elements in (("cubic", self.cubic_springs), ("friction", self.frictions)):
-            met = Counter[str]()
-            for element in elements:
-                name = f"{'-'.join(element.between)}.{kind}"
+        found, met = dict[str, NonlinearElement](), Counter[str]()
+        for kind in KINDS:
+            for element in getattr(self, kind.LIST):
+                name = element.called
                 met[name] += 1
                 found[name if met[name] == 1 else f"{name}{met[name]}"] = element
         return found
@@ -415,7 +407,7 @@ class Elements:
     @property
     def holding(self) -> tuple[tuple[str, ...], ...]:
         """What each element joins whose force depends on a displacement, clearances left out."""
-        laws = [each for each in self.nonlinear.values() if quantity_of(each) == "displacement"]
+        laws = [each for each in self.nonlinear.values() if each.quantity == "displacement"]
         return (*(spring.between for spring in self.shown_springs), *map(joined_by, laws))
 
     @property
@@ -490,13 +482,16 @@ class Elements:
 
 def joined_by(element: NonlinearElement | Gap) -> tuple[str, ...]:
     """The bodies that the force of an element joins; a combination of masses stands on ground."""
-    names = tuple(element.factors if isinstance(element, Gap) else factors_of(element))
-    return names if element.between is not None else (*names, GROUND)
+    names = tuple(element.factors)
+    return names if _bodies(element) is not None else (*names, GROUND)
 
 
 def words_of(element: NonlinearElement | Gap) -> str:
     """What an element is between, or of what combination."""
-    if element.between is not None:
-        return " to ".join(element.between)
-    factors = element.factors if isinstance(element, Gap) else factors_of(element)
-    return " ".join(f"{factor:+g} {name}" for name, factor in factors.items())
+    if (bodies := _bodies(element)) is not None:
+        return " to ".join(bodies)
+    return " ".join(f"{factor:+g} {name}" for name, factor in element.factors.items())
+
+
+def _bodies(element: NonlinearElement | Gap) -> tuple[str, str] | None:
+    return element.between if isinstance(element, Gap) else element.joins

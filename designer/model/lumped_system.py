@@ -14,8 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise
-from typing import Any, NoReturn
+from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,9 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import one_of
 from designer.dynamics.drive_shape import SINE
 from designer.model.clearance import Clearance, combined
-from designer.model.cubic_law import MOST_POINTS
-from designer.model.element_keys import GROUND
+from designer.model.element_keys import GROUND, check_joined, check_size, refuse
 from designer.model.force_law import ForceLaw
-from designer.model.law_elements import (
-    CubicSpring,
-    Friction,
-    Law,
-    factors_of,
-    quantity_of,
-)
+from designer.model.law_elements import KINDS
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
 from designer.model.matrices import Matrices
 from designer.model.mechanics import HarmonicForce, SecondOrderSystem
@@ -61,20 +54,16 @@ def check(system: Elements) -> None:
     InputError : the first thing that is wrong; its field is that of the model file.
     """
     if not system.masses:
-        _refuse("mass", MISSING, "at least one table [[mass]]")
+        refuse("mass", MISSING, "at least one table [[mass]]")
     if len(system.masses) > MOST_MASSES:
-        _refuse("mass", len(system.masses), f"at most {MOST_MASSES} masses")
+        refuse("mass", len(system.masses), f"at most {MOST_MASSES} masses")
     _check_names(system)
     if system.matrices is not None:
         _check_matrices(system, system.matrices)
     for gap in system.gaps:
         _check_gap(gap)
-    for law in system.laws:
-        _check_law(law)
-    for cubic in system.cubic_springs:
-        _check_cubic(cubic)
-    for friction in system.frictions:
-        _check_friction(friction)
+    for law in system.nonlinear.values():
+        law.check()
     for force in system.forces:
         _check_waves(force, f"force on {force.on}")
     if system.base is not None:
@@ -88,20 +77,16 @@ def _check_matrices(system: Elements, matrices: Matrices) -> None:
     for key, elements in (("spring", system.springs), ("damper", system.dampers)):
         if elements:
             expected = "none beside [matrices], which has them; or no [matrices]"
-            _refuse(key, f"{len(elements)} tables [[{key}]]", expected)
+            refuse(key, f"{len(elements)} tables [[{key}]]", expected)
     for key in ("mass", "stiffness", "damping"):
         for value in chain.from_iterable(getattr(matrices, key)):
-            _check_size(f"matrices.{key}", value, "numbers")
+            check_size(f"matrices.{key}", value, "numbers")
     matrices.check()
     if not system.nonlinear:  # what laws hold is known where they are
         values = np.linalg.eigvalsh(matrices.stiffness_matrix)
         if not values[0] > ROUNDED * np.abs(values).max():
             expected = "a positive definite matrix: it holds every mass"
-            _refuse("matrices.stiffness", "a motion that nothing holds", expected)
-
-
-def _refuse(field: str, found: object, expected: str) -> NoReturn:
-    raise InputError(None, field, found, expected)
+            refuse("matrices.stiffness", "a motion that nothing holds", expected)
 
 
 def _check_names(system: Elements) -> None:
@@ -111,27 +96,21 @@ def _check_names(system: Elements) -> None:
     for name, count in Counter(names).items():
         field = "law" if name in laws else "mass" if name in system.names else "clearance"
         if count > 1:
-            _refuse(f"{field}.name", name, "a name that no other mass, clearance or law has")
+            refuse(f"{field}.name", name, "a name that no other mass, clearance or law has")
         if name in RESERVED:
-            _refuse(f"{field}.name", name, f"a name other than {', '.join(RESERVED)}")
+            refuse(f"{field}.name", name, f"a name other than {', '.join(RESERVED)}")
     nets = Counter(gap.name.casefold().removesuffix("_out") for gap in system.gaps)
     for gap in system.gaps:  # nets of the circuit bear them, and SPICE knows no capitals
         if nets[gap.name.casefold().removesuffix("_out")] > 1:
             expected = "a name that differs from the others in more than capitals or an _out"
-            _refuse("clearance.name", gap.name, expected)
+            refuse("clearance.name", gap.name, expected)
     for key, bodies in _joints(system):
         for name in bodies:
             if name not in (*system.names, GROUND):
-                _refuse(key, name, one_of(name, (*system.names, GROUND)))
+                refuse(key, name, one_of(name, (*system.names, GROUND)))
     for force in system.forces:
         if force.on not in system.names:
-            _refuse("force.on", force.on, one_of(force.on, system.names))
-
-
-def _check_size(field: str, value: float, what: str = "a number") -> None:
-    low, high = NUMBERS
-    if value != 0.0 and not low <= abs(value) <= high:
-        _refuse(field, value, f"{what} from {low:g} to {high:g}")
+            refuse("force.on", force.on, one_of(force.on, system.names))
 
 
 def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
@@ -140,25 +119,23 @@ def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
     yield from (("damper.between", damper.between) for damper in system.dampers)
     for gap in system.gaps:
         yield ("clearance.of" if gap.between is None else "clearance.between"), joined_by(gap)
-    for law in system.laws:
-        yield ("law.of" if law.between is None else "law.between"), joined_by(law)
-    yield from (("cubic_spring.between", each.between) for each in system.cubic_springs)
-    yield from (("friction.between", each.between) for each in system.frictions)
+    for law in system.nonlinear.values():
+        yield f"{law.TABLE}.{'of' if law.joins is None else 'between'}", joined_by(law)
     if system.matrices is not None:
         yield from (("matrices", pair) for pair in system.matrices.coupled)
 
 
 def _check_gap(gap: Gap) -> None:
     field = f"clearance {gap.name}"
-    _check_joined(gap, field)
+    check_joined(field, gap.between, gap.of)
     if gap.upper is None and gap.lower is None:
-        _refuse(f"{field}.upper", MISSING, "a gap to an upper or a lower stop, or both")
+        refuse(f"{field}.upper", MISSING, "a gap to an upper or a lower stop, or both")
     if gap.upper is not None and gap.lower is not None and gap.upper + gap.lower <= 0.0:
         text = f"{gap.upper:g}, with lower = {gap.lower:g}"
         more = "two stops that are both in contact at rest are two clearances, one for each"
-        _refuse(f"{field}.upper", text, f"upper + lower > 0; {more}")
+        refuse(f"{field}.upper", text, f"upper + lower > 0; {more}")
     if gap.preload_over is not None and not gap.preload:
-        _refuse(f"{field}.preload_over", gap.preload_over, "none without a preload, which rises")
+        refuse(f"{field}.preload_over", gap.preload_over, "none without a preload, which rises")
     _check_stiffness(gap, field)
     if gap.restitution is not None:
         _check_restitution(gap, f"{field}.restitution")
@@ -169,89 +146,38 @@ def _check_stiffness(gap: Gap, field: str) -> None:
     if gap.law == "hertz":
         for key in ("constant", "depth"):
             if getattr(gap, key) is None:
-                _refuse(f"{field}.{key}", MISSING, f'a {key} of the law "hertz"')
+                refuse(f"{field}.{key}", MISSING, f'a {key} of the law "hertz"')
         for key in ("stiffness", "upper_stiffness", "lower_stiffness"):
             if getattr(gap, key) is not None:
-                _refuse(f"{field}.{key}", getattr(gap, key), 'none: the law "hertz" has a constant')
+                refuse(f"{field}.{key}", getattr(gap, key), 'none: the law "hertz" has a constant')
         return
     for key in ("constant", "depth"):
         if getattr(gap, key) is not None:
-            _refuse(f"{field}.{key}", getattr(gap, key), 'none without law = "hertz"')
+            refuse(f"{field}.{key}", getattr(gap, key), 'none without law = "hertz"')
     for side in ("upper", "lower"):
         stiffness = getattr(gap, f"{side}_stiffness")
         if getattr(gap, side) is None and stiffness is not None:
-            _refuse(f"{field}.{side}_stiffness", stiffness, f"none: there is no {side} stop")
+            refuse(f"{field}.{side}_stiffness", stiffness, f"none: there is no {side} stop")
         if getattr(gap, side) is not None and stiffness is None and gap.stiffness is None:
-            _refuse(f"{field}.stiffness", MISSING, f"a stiffness, or {side}_stiffness")
+            refuse(f"{field}.stiffness", MISSING, f"a stiffness, or {side}_stiffness")
 
 
 def _check_restitution(gap: Gap, field: str) -> None:
     """It decides the damper of the stops, so that there is one damper and one stiffness for it."""
     if gap.damping:
-        _refuse(field, gap.restitution, "none beside damping, which it decides")
+        refuse(field, gap.restitution, "none beside damping, which it decides")
     if gap.law == "hertz":
-        _refuse(field, gap.restitution, 'damping instead: with law = "hertz" no stiffness decides')
+        refuse(field, gap.restitution, 'damping instead: with law = "hertz" no stiffness decides')
     upper, lower = gap.sides
     if upper and lower and upper.stiffness != lower.stiffness:
         expected = "stops of one stiffness, or a [[clearance]] for each: they have one damper"
-        _refuse(field, gap.restitution, expected)
-
-
-def _check_joined(element: Gap | Law, field: str) -> None:
-    """One of ``between`` and ``of``, and that with factors that are numbers."""
-    if (element.between is None) == (element.of is None):
-        found = MISSING if element.of is None else "between and of"
-        _refuse(f"{field}.between", found, "between = [A, B], or of = {A = factor, …}")
-    if element.of is not None and GROUND in element.factors:
-        _refuse(f"{field}.of", GROUND, "masses: ground is what their displacements are from")
-    for value in element.factors.values():
-        _check_size(f"{field}.of", value, "numbers")
-
-
-def _check_law(law: Law) -> None:
-    _check_joined(law, f"law {law.name}")
-    expected = {"displacement": "m", "velocity": "m/s"}[law.quantity]
-    if law.points.unit not in ("", expected):
-        text = f"x in {law.points.unit}"
-        _refuse(f"law {law.name}.points", text, f"x in {expected}: the law is of a {law.quantity}")
-    for value in chain.from_iterable(law.corners):
-        _check_size(f"law {law.name}.points", value, "numbers")
-    slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(law.corners)]
-    steepest = max(slopes, key=abs)
-    if not abs(steepest) <= NUMBERS[1]:
-        expected = f"slopes up to {NUMBERS[1]:g}"
-        _refuse(f"law {law.name}.points", f"a slope of {steepest:g}", expected)
-
-
-def _check_cubic(spring: CubicSpring) -> None:
-    field = f"cubic_spring {'-'.join(spring.between)}"
-    for key in ("k1", "k3", "range"):
-        _check_size(f"{field}.{key}", getattr(spring, key))
-    if spring.points is not None and spring.error is not None:
-        _refuse(f"{field}.error", spring.error, "none beside points, which decide it")
-    if spring.count is None:
-        expected = (
-            f"an error that {MOST_POINTS} points reach; they reach {spring.largest_error:.2g}"
-        )
-        _refuse(f"{field}.error", spring.error, expected)
-
-
-def _check_friction(friction: Friction) -> None:
-    field = f"friction {'-'.join(friction.between)}"
-    if (friction.static is None) != (friction.stribeck is None):
-        key = "static" if friction.static is None else "stribeck"
-        _refuse(f"{field}.{key}", MISSING, "both static and stribeck, or neither")
-    if friction.static is not None and friction.static < friction.force:
-        _refuse(f"{field}.static", friction.static, f"at least force = {friction.force:g}")
-    if friction.stribeck is not None and not friction.stribeck > friction.velocity:
-        expected = f"more than velocity = {friction.velocity:g}"
-        _refuse(f"{field}.stribeck", friction.stribeck, expected)
+        refuse(field, gap.restitution, expected)
 
 
 def _check_waves(drive: Force | MovingBase, field: str) -> None:
     if (drive.waveform is None) != (drive.terms is None):
         key = "waveform" if drive.waveform is None else "terms"
-        _refuse(f"{field}.{key}", MISSING, "both waveform and terms, or neither")
+        refuse(f"{field}.{key}", MISSING, "both waveform and terms, or neither")
 
 
 def _check_grounded(system: Elements) -> None:
@@ -262,11 +188,11 @@ def _check_grounded(system: Elements) -> None:
             expected = f"a [[spring]] between {name} and another"
             if any(name in gap.factors for gap in system.gaps):
                 expected += DRIFTS
-            _refuse("spring.between", f"no spring on {name}", expected)
+            refuse("spring.between", f"no spring on {name}", expected)
     grounded = _reached({GROUND}, system.holding)
     floating = [name for name in system.names if name not in grounded]
     if floating:
-        _refuse(
+        refuse(
             "spring.between",
             f"{', '.join(floating)} without a spring to ground",
             "a [[spring]] that holds this part: it floats",
@@ -279,28 +205,26 @@ def _check_driven(system: Elements) -> None:
     if system.base is not None:
         driven |= set(system.names)  # the ground's inertia force is on every mass
     if not driven:
-        _refuse("force", MISSING, "a [[force]] with an amplitude, or a [base]: nothing moves")
+        refuse("force", MISSING, "a [[force]] with an amplitude, or a [base]: nothing moves")
     if system.base is not None and system.base.stops == "fixed":
         if not system.base.is_sine:
             expected = (
                 '"base", or a sine in phase for stops that stay; a phase of the base is that of '
                 "every force, turned the other way"
             )
-            _refuse("base.stops", '"fixed", with another phase or shape', expected)
+            refuse("base.stops", '"fixed", with another phase or shape', expected)
         for gap in system.gaps:
             for key in ("damping", "restitution"):
                 if getattr(gap, key) and GROUND in joined_by(gap):
                     expected = f'no {key} where [base] stops = "fixed": its other end moves'
-                    _refuse(f"clearance {gap.name}.{key}", getattr(gap, key), expected)
+                    refuse(f"clearance {gap.name}.{key}", getattr(gap, key), expected)
     joints = [between for _, between in _joints(system) if GROUND not in between]
     moved = _reached(driven, joints)
     for gap in system.gaps:
         if moved.isdisjoint(gap.factors):
             expected = "a force, a base motion or a spring that moves it: it can never be reached"
             key = "of" if gap.between is None else "between"
-            _refuse(
-                f"clearance {gap.name}.{key}", f"{' and '.join(gap.factors)}, at rest", expected
-            )
+            refuse(f"clearance {gap.name}.{key}", f"{' and '.join(gap.factors)}, at rest", expected)
 
 
 def _reached(start: set[str], joints: Sequence[tuple[str, ...]]) -> set[str]:
@@ -342,7 +266,7 @@ def check_bounded(stiffness: Array, damping: Array, laws: Sequence[ForceLaw]) ->
             )
         else:
             expected = "a slope there with which dampers and laws do not drive a motion for ever"
-        _refuse(f"law {lowest.name}", text, expected)
+        refuse(f"law {lowest.name}", text, expected)
 
 
 def check_damped(state_matrix: Array) -> None:
@@ -360,7 +284,7 @@ def check_damped(state_matrix: Array) -> None:
     if not -slowest.real > UNDAMPED * abs(slowest):
         text = f"none that slows the motion at {abs(slowest.imag):.4g} rad per unit of time"
         expected = "a [[damper]] for it: without one no steady response is reached"
-        _refuse("damper.between", text, expected)
+        refuse("damper.between", text, expected)
 
 
 LEAST: dict[str, dict[str, float]] = {
@@ -380,14 +304,7 @@ LEAST: dict[str, dict[str, float]] = {
     },
     "forces": {"amplitude": -GREATEST, "constant": -GREATEST, "phase": -GREATEST},
     "base": {"amplitude": SMALLEST, "phase": -GREATEST},
-    "cubic_springs": {"k1": -GREATEST, "k3": -GREATEST, "range": SMALLEST},
-    "frictions": {
-        "force": 0.0,
-        "velocity": SMALLEST,
-        "static": SMALLEST,
-        "stribeck": SMALLEST,
-        "speed": -GREATEST,
-    },
+    **{kind.LIST: {key: n.least for key, n in kind.PARAMETERS.items()} for kind in KINDS},
 }
 """The numbers of each list of elements that can be changed, and the least that each may be."""
 MOST = {"restitution": 1.0}
@@ -399,8 +316,7 @@ TABLES = {
     "gaps": "clearance",
     "forces": "force",
     "base": "base",
-    "cubic_springs": "cubic_spring",
-    "frictions": "friction",
+    **{kind.LIST: kind.TABLE for kind in KINDS},
 }
 """The table of a model file that has each list of elements."""
 UNITS = {
@@ -415,21 +331,14 @@ UNITS = {
     "preload_over": "m",
     "constant": "N",
     "phase": "rad",
-    "k1": "N/m",
-    "range": "m",
-    "force": "N",
-    "velocity": "m/s",
-    "static": "N",
-    "stribeck": "m/s",
-    "speed": "m/s",
+    **{key: n.unit for kind in KINDS for key, n in kind.PARAMETERS.items() if n.unit},
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
-NUMBERS = (1e-60, 1e60)
-"""Least and greatest size of a number that is not 0: the squares of ratios of such are still
-numbers."""
-
-_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "phase", "k1", "force", "speed")
+_MAY_BE_ZERO = (
+    *("damping", "preload", "amplitude", "constant", "phase"),
+    *(key for kind in KINDS for key, n in kind.PARAMETERS.items() if n.least <= 0.0),
+)
 
 
 @dataclass(frozen=True)
@@ -455,7 +364,7 @@ class LumpedSystem(Elements):
     def _check_sizes(self) -> None:
         for name, (table, index, key) in self.places.items():
             place = table if index is None else f"{table}[{index + 1}]"
-            _check_size(f"{place}.{key}", self.parameter(name))
+            check_size(f"{place}.{key}", self.parameter(name))
 
     def second_order(self) -> SecondOrderSystem:
         """The equations of motion."""
@@ -503,8 +412,8 @@ class LumpedSystem(Elements):
         laws = [
             ForceLaw(
                 name,
-                tuple(float(each) for each in self.row_of(factors_of(element))),
-                quantity_of(element),
+                tuple(float(each) for each in self.row_of(element.factors)),
+                element.quantity,
                 element.corners,
             )
             for name, element in self.nonlinear.items()
@@ -583,8 +492,7 @@ class LumpedSystem(Elements):
             "gaps": [gap.name for gap in self.gaps],
             "forces": [force.on for force in self.forces],
             "base": ["base"] if self.base is not None else [],
-            "cubic_springs": ["-".join(each.between) for each in self.cubic_springs],
-            "frictions": ["-".join(each.between) for each in self.frictions],
+            **{k.LIST: [e.between_them for e in self._elements(k.LIST)] for k in KINDS},
         }
         return {
             f"{name}.{key}": (group, index, key)
@@ -662,7 +570,7 @@ class LumpedSystem(Elements):
         for gap in out["gaps"]:
             if gap["of"] is None:
                 del gap["of"]
-        for later in ("laws", "cubic_springs", "frictions", "matrices"):
+        for later in (*(kind.LIST for kind in KINDS), "matrices"):
             if not out[later]:
                 del out[later]
         return out

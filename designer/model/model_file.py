@@ -45,7 +45,7 @@ from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
 from designer.model.file_numbers import FileNumbers, put_at
-from designer.model.law_elements import CubicSpring, Friction, Law
+from designer.model.law_elements import KINDS, CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.matrices import Matrices, written_out
@@ -391,8 +391,8 @@ class _SystemFile(_Tables):
             named = zip(self.matrices.names, self.matrices.mass, strict=False)
             masses = tuple(Mass(name, row[i]) for i, (name, row) in enumerate(named))
         linear = masses, self.spring, self.damper, self.clearance, self.force
-        laws = self.law, self.cubic_spring, self.friction
-        return LumpedSystem(*linear, base, *laws, self.matrices)
+        laws = {kind.LIST: getattr(self, kind.TABLE) for kind in KINDS}
+        return LumpedSystem(*linear, base, **laws, matrices=self.matrices)
 
     def scales(self, data: Mapping[str, Any]) -> SiScales | None:
         """The file is in SI where a value of its elements is a text with a unit."""

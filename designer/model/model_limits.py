@@ -21,14 +21,13 @@ from designer.base.schema import (
     literal,
     nested_table,
 )
+from designer.model.law_elements import KINDS
 
 WHERE = "docs/model-file.md#limits"
 MODELS = ("model", "mechanical")
 """The two tables that a model of format 1 may be given in."""
-ELEMENTS = (
-    "mass", "spring", "damper", "clearance", "force", "base", "law", "cubic_spring", "friction",
-    "matrices",
-)  # fmt: skip
+LAWS = tuple(kind.TABLE for kind in KINDS)
+ELEMENTS = ("mass", "spring", "damper", "clearance", "force", "base", *LAWS, "matrices")
 """Tables of the elements of format 2."""
 _REWRITTEN = "designer new FILE --from OLD rewrites a file in it"
 
@@ -87,7 +86,7 @@ LIMITS = (
         f"format = 2, which has [[mass]], [[spring]], [[damper]], [[clearance]] and [[force]]; "
         f"{_REWRITTEN}",
         (1,),
-        tables=r"mass(es)?|springs?|dampers?|clearances?|stops?|forces?|law|cubic_spring|friction",
+        tables=r"mass(es)?|springs?|dampers?|clearances?|stops?|forces?|" + "|".join(LAWS),
     ),
     ModelLimit(
         "a third mass",

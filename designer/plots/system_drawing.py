@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, styled
 from designer.model.element_keys import GROUND
-from designer.model.law_elements import CubicSpring, Friction, Law
+from designer.model.law_elements import CubicSpring, NonlinearElement
 from designer.model.lumped_elements import Damper, Gap, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
@@ -28,7 +28,7 @@ from designer.plots.system_equations import (
     law_variable,
 )
 
-Joint = Spring | Damper | CubicSpring | Friction | Law
+Joint = Spring | Damper | NonlinearElement
 T = TypeVar("T", Spring, Damper)
 _WALL, _FIRST, _WIDTH, _PITCH = 0.9, 5.3, 2.6, 7.0
 """Abscissae of the wall and of the first mass, the width of a mass, and from one to the next."""
@@ -61,7 +61,7 @@ class _Page(MechanicalSheet):
         self.combinations = [
             f"{symbol}({law_variable(model, element)})"
             for symbol, element in self._laws()
-            if element.between is None
+            if element.joins is None
         ]
         self.combinations += [f"{g.name}: {words_of(g)}" for g in model.gaps if g.between is None]
         self._sort()
@@ -79,7 +79,7 @@ class _Page(MechanicalSheet):
         """What joins two bodies, clearances left out, by symbols."""
         springs: dict[str, Spring] = dict(self._numbered("k", self.model.shown_springs))
         dampers: dict[str, Damper] = dict(self._numbered("c", self.model.shown_dampers))
-        return {**springs, **dampers, **{s: e for s, e in self._laws() if e.between is not None}}
+        return {**springs, **dampers, **{s: e for s, e in self._laws() if e.joins is not None}}
 
     def _numbered(self, letter: str, joints: Sequence[T]) -> Iterator[tuple[str, T]]:
         """Springs or dampers by their symbols; those that make a matrix have none in the table, so
@@ -88,14 +88,14 @@ class _Page(MechanicalSheet):
         for i, joint in enumerate(joints, start=1):
             yield subscripted(form.format(i)), joint
 
-    def _laws(self) -> list[tuple[str, CubicSpring | Friction | Law]]:
+    def _laws(self) -> list[tuple[str, NonlinearElement]]:
         elements = self.model.nonlinear
         return [(symbol, elements[name]) for name, symbol in law_symbols(self.model).items()]
 
     def _sort(self) -> None:
         """What stands between neighbours, at the right of each place of the row, and what below."""
         for symbol, joint in self.joints.items():
-            left, right = self._ends(joint.between or ())
+            left, right = self._ends(_bodies(joint))
             (self.between[left] if right == left + 1 else self.below).append(symbol)
         for place, name in enumerate(self.row):
             forced = [f"force {name}"] if self._force(name) else []
@@ -178,13 +178,13 @@ class _Page(MechanicalSheet):
 
     def _joint(self, x0: float, x1: float, y: float, symbol: str) -> None:
         joint = self.joints[symbol]
-        if isinstance(joint, Friction):
-            self.friction(x0, x1, y)
-        elif isinstance(joint, Damper) or (isinstance(joint, Law) and joint.quantity == "velocity"):
-            self.damper(x0, x1, y)
+        if isinstance(joint, NonlinearElement):
+            drawn = joint.drawn
         else:
-            self.spring(x0, x1, y)
-        if isinstance(joint, CubicSpring | Law):
+            drawn = "spring" if isinstance(joint, Spring) else "damper"
+        draw = {"spring": self.spring, "damper": self.damper, "friction": self.friction}[drawn]
+        draw(x0, x1, y)
+        if isinstance(joint, NonlinearElement) and drawn != "friction":
             self.slash(x0, x1, y)
         self.text(0.5 * (x0 + x1), y + 0.4, self._label(symbol, joint))
 
@@ -192,16 +192,15 @@ class _Page(MechanicalSheet):
         if isinstance(joint, CubicSpring):
             linear = f"{self.values[f'{symbol}.k1']} x, " if joint.k1 else ""
             return f"{symbol}: {linear}{self.values[f'{symbol}.k3']} x³"
-        if isinstance(joint, Friction):
-            return f"{symbol}: {self.values[f'{symbol}.force']}"
-        if isinstance(joint, Law):
-            return symbol
+        if isinstance(joint, NonlinearElement):
+            first = next(iter(joint.PARAMETERS), None)
+            return symbol if first is None else f"{symbol}: {self.values[f'{symbol}.{first}']}"
         size = joint.stiffness if isinstance(joint, Spring) else joint.damping
         return f"{symbol} = {self.values.get(symbol, f'{size:.4g}'.replace('-', '−'))}"
 
     def _under(self, y: float, symbol: str) -> None:
         """A joint of what are no neighbours, below the row."""
-        left, right = self._ends(self.joints[symbol].between or ())
+        left, right = self._ends(_bodies(self.joints[symbol]))
         x0 = self._middle(left) + (0.3 * _WIDTH if left else 0.0)
         x1 = self._middle(right) - 0.3 * _WIDTH
         for x, place in ((x0, left), (x1, right)):
@@ -264,3 +263,8 @@ class _Page(MechanicalSheet):
         spans = [end for _, end in ends]
         self.line([min(*spans, x), max(*spans, x)], [high, high], INK, 1.2)
         self.line([x, x], [self.top, high], INK, 1.2)
+
+
+def _bodies(joint: Joint) -> tuple[str, ...]:
+    """What a joint stands between."""
+    return joint.joins or () if isinstance(joint, NonlinearElement) else joint.between

@@ -8,19 +8,13 @@ gives it, such as "A.upper".
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from designer.base.arrays import Array
 from designer.base.si_unit import quantity_text
 from designer.base.units import ACCELERATIONS
 from designer.model.element_keys import GROUND
-from designer.model.law_elements import (
-    CubicSpring,
-    Law,
-    NonlinearElement,
-    factors_of,
-    quantity_of,
-)
+from designer.model.law_elements import CubicSpring, Friction, Law, NonlinearElement
 from designer.model.lumped_elements import Force, Gap, MovingBase, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
@@ -85,16 +79,17 @@ def law_symbols(model: LumpedSystem) -> dict[str, str]:
 
 
 def approximation_notes(model: LumpedSystem, *, si: bool) -> list[str]:
-    """A sentence for each curved law by how much its straight pieces miss it: stops after Hertz,
-    cubic springs."""
+    """A sentence for each curved law by how much its straight pieces miss it: cubic springs, stops
+    after Hertz."""
     notes = []
-    for spring in model.cubic_springs:
-        reach = _value(spring.range, "m" if si else "")
-        notes.append(
-            f"{' to '.join(spring.between)}: {spring.k1:.4g} x + {spring.k3:.4g} x³ by "
-            f"{spring.count} points, straight between them, up to {reach}; the force differs from "
-            f"the law by at most {100.0 * spring.largest_error:.2g} % of the largest in that range."
-        )
+    for element in model.nonlinear.values():
+        if (curve := element.curve) is not None:
+            reach = _value(curve.span, "m" if si else "")
+            notes.append(
+                f"{words_of(element)}: {curve.text} by {curve.count} points, straight between "
+                f"them, up to {reach}; the force differs from the law by at most "
+                f"{100.0 * curve.largest_error:.2g} % of the largest in that range."
+            )
     for gap in model.gaps:
         if gap.hertz is not None and gap.depth is not None:
             depth = _value(gap.depth, "m" if si else "")
@@ -211,19 +206,12 @@ def _of_law(symbol: str, element: NonlinearElement) -> Iterator[tuple[str, float
             yield f"{symbol}.{subscripted(f'x{i}')}", x, unit, f"{element.quantity} at point {i}"
             yield f"{symbol}.{subscripted(f'f{i}')}", force, "N", f"force at point {i}"
         return
-    where = " to ".join(element.between)
-    if isinstance(element, CubicSpring):
-        yield f"{symbol}.k1", element.k1, "N/m", f"linear part of the spring, {where}"
-        yield f"{symbol}.k3", element.k3, "", f"cubic part of the spring, {where}, N/m³ in SI"
-        yield f"{symbol}.range", element.range, "m", f"up to which its pieces are laid, {where}"
-        return
-    yield f"{symbol}.force", element.force, "N", f"friction, {where}"
-    yield f"{symbol}.velocity", element.velocity, "m/s", f"up to which it rises, {where}"
-    if element.static is not None and element.stribeck is not None:
-        yield f"{symbol}.static", element.static, "N", f"friction there, {where}"
-        yield f"{symbol}.stribeck", element.stribeck, "m/s", f"where it has fallen, {where}"
-    if element.speed:
-        yield f"{symbol}.speed", element.speed, "m/s", f"of the surface that it slides on, {where}"
+    left_out = {field.name: field.default for field in fields(element)}
+    for key, number in element.PARAMETERS.items():
+        value = getattr(element, key)
+        if value != left_out[key]:
+            meaning = f"{number.meaning}, {words_of(element)}"
+            yield f"{symbol}.{key}", value, number.unit, meaning
 
 
 def _value(value: float, unit: str) -> str:
@@ -275,7 +263,7 @@ def _with_forces(model: LumpedSystem, name: str, text: str, naming: Naming) -> s
             text += f" {sign} {size}{gap.name}({_motion(model, gap)})"
     for name_of_law, symbol in law_symbols(model).items():
         element = model.nonlinear[name_of_law]
-        factor = factors_of(element).get(name, 0.0)
+        factor = element.factors.get(name, 0.0)
         if factor:
             size = _times(number_of("", abs(factor)))
             sign = "+" if factor > 0.0 else "−"
@@ -311,8 +299,8 @@ def _motion(model: LumpedSystem, gap: Gap) -> str:
 
 def law_variable(model: LumpedSystem, element: NonlinearElement) -> str:
     """What the force of an element depends on."""
-    prime = "" if quantity_of(element) == "displacement" else "′"
-    return _sum_of(model, factors_of(element), prime)
+    prime = "" if element.quantity == "displacement" else "′"
+    return _sum_of(model, element.factors, prime)
 
 
 def _sum_of(model: LumpedSystem, factors: Mapping[str, float], prime: str) -> str:
@@ -328,7 +316,7 @@ def _sum_of(model: LumpedSystem, factors: Mapping[str, float], prime: str) -> st
 
 def _nonlinear(symbol: str, element: NonlinearElement, naming: Naming) -> str:
     """The force of an element over what it depends on, u."""
-    if isinstance(element, Law):
+    if not isinstance(element, CubicSpring | Friction):
         points = (f"({number_of('', x)}, {number_of('', f)})" for x, f in element.corners)
         return f"{symbol}(u) straight from point to point: {', '.join(points)}"
 
