@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from designer.board.component import Component
 from designer.board.pins import Pin
 from designer.catalog.design_rule import Finding
 from designer.circuit.feedback_loops import feedback_share
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
-from designer.design_rules.rule_subject import RuleSubject
+from designer.design_rules.rule_subject import Look, RuleSubject
 
 
 def feedback(s: RuleSubject) -> Iterator[Finding]:
@@ -106,3 +106,16 @@ def _pins(s: RuleSubject) -> Iterator[tuple[Component, Pin]]:
     for component in s.components:
         for pin in component.pins:
             yield component, pin
+
+
+LOOKS: Mapping[str, Look] = {
+    "feedback": feedback,
+    "drivers": drivers,
+    "floating-input": floating_inputs,
+    "single-pin": single_pins,
+    "references": duplicates,
+    "supply-pins": supply_pins,
+    "decoupling": decoupling,
+}
+"""The rules of this file by id: each yields what was found, one value for each place that it
+looks at."""

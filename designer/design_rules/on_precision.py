@@ -9,7 +9,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
-from designer.design_rules.rule_subject import RuleSubject
+from designer.design_rules.rule_subject import Look, RuleSubject
 from designer.synthesis.static_shifts import (
     Shifts,
     far_slope as far_slope_of,
@@ -189,3 +189,16 @@ def _most(shares: Mapping[str, float]) -> str:
     """Where most of a sum comes from."""
     worst = max(shares, key=lambda name: abs(shares[name]))
     return f"{worst}, which has most of it"
+
+
+LOOKS: Mapping[str, Look] = {
+    "offset-force": offset,
+    "bias-force": bias,
+    "noise-force": noise,
+    "leakage-force": leakage,
+    "absorption-force": absorption,
+    "dead-zone-stiffness": stiffness,
+    "far-slope": far_slope,
+}
+"""The rules of this file by id: each yields what was found, one value for each place that it
+looks at."""

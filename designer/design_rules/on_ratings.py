@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from designer.catalog.design_rule import Finding, NotRun, value_text
 from designer.catalog.entries import ROOM
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Diode
 from designer.circuit.noise_gains import conductance, stages
-from designer.design_rules.rule_subject import RuleSubject
+from designer.design_rules.rule_subject import Look, RuleSubject
 from designer.synthesis.limits import bandwidth_limit, guaranteed
 from designer.synthesis.operating_point import Operating, Peak
 from designer.synthesis.side_conditions import guaranteed_swing, saturating
@@ -189,3 +189,22 @@ def _at(name: str, peak: Peak) -> str:
     if not peak.run:
         return name
     return f"{name} ({'ω = ' if peak.run[0].isdigit() else ''}{peak.run})"
+
+
+LOOKS: Mapping[str, Look] = {
+    "swing": swing,
+    "load": load,
+    "output-current": output_current,
+    "fault-current": fault_current,
+    "power": power,
+    "power-stuck": power_stuck,
+    "capacitor-voltage": capacitor_voltage,
+    "common-mode": common_mode,
+    "bulk": bulk,
+    "reference-current": reference_current,
+    "temperature": temperature,
+    "slew": slew,
+    "gain-bandwidth": gain_bandwidth,
+}
+"""The rules of this file by id: each yields what was found, one value for each place that it
+looks at."""

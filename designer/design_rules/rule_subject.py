@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -13,7 +13,7 @@ from designer.base.second_process import Ask
 from designer.base.units import parse_quantity
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
-from designer.catalog.design_rule import NotRun
+from designer.catalog.design_rule import Finding, NotRun
 from designer.catalog.entries import ROOM, OpAmp
 from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
@@ -201,3 +201,7 @@ def _complete(point: Operating, place: str) -> Operating:
     for name, why in point.left_out.items():
         raise NotRun(f"no answer of the exact circuit {place} {name}: {why}")
     return point
+
+
+Look = Callable[[RuleSubject], Iterable[Finding]]
+"""A rule on the circuit."""

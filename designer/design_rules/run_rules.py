@@ -18,40 +18,11 @@ from designer.catalog.design_rule import (
 )
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.design_rules import on_nets, on_precision, on_ratings
-from designer.design_rules.rule_subject import RuleSubject
+from designer.design_rules.rule_subject import Look, RuleSubject
 
-Look = Callable[[RuleSubject], Iterable[Finding]]
-
-LOOKS: dict[str, Look] = {
-    "feedback": on_nets.feedback,
-    "drivers": on_nets.drivers,
-    "floating-input": on_nets.floating_inputs,
-    "single-pin": on_nets.single_pins,
-    "references": on_nets.duplicates,
-    "supply-pins": on_nets.supply_pins,
-    "decoupling": on_nets.decoupling,
-    "swing": on_ratings.swing,
-    "load": on_ratings.load,
-    "output-current": on_ratings.output_current,
-    "fault-current": on_ratings.fault_current,
-    "power": on_ratings.power,
-    "power-stuck": on_ratings.power_stuck,
-    "capacitor-voltage": on_ratings.capacitor_voltage,
-    "common-mode": on_ratings.common_mode,
-    "bulk": on_ratings.bulk,
-    "reference-current": on_ratings.reference_current,
-    "temperature": on_ratings.temperature,
-    "slew": on_ratings.slew,
-    "gain-bandwidth": on_ratings.gain_bandwidth,
-    "offset-force": on_precision.offset,
-    "bias-force": on_precision.bias,
-    "noise-force": on_precision.noise,
-    "leakage-force": on_precision.leakage,
-    "absorption-force": on_precision.absorption,
-    "dead-zone-stiffness": on_precision.stiffness,
-    "far-slope": on_precision.far_slope,
-}
-"""By id: yields what was found, one value for each place that the rule looks at."""
+_FOUND = {**on_nets.LOOKS, **on_ratings.LOOKS, **on_precision.LOOKS}
+LOOKS: dict[str, Look] = {rule.id: _FOUND[rule.id] for rule in RULES if rule.scope == "circuit"}
+"""By id, in the order of the list."""
 
 
 def on_circuit(subject: RuleSubject, overrides: Mapping[str, Override]) -> tuple[RuleOutcome, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -53,6 +53,11 @@ KINDS = (
     (r"(channel|kanal|canal|voie|canale) [a-h]\b", "PicoScope CSV"),
 )
 """Formats by what their headers have, in lower case with "|" between cells: the first that fits."""
+ARRAYS: Mapping[str, tuple[str, Callable[[Path], Mapping[str, Array]]]] = {
+    ".npy": ("NumPy", stored_arrays),
+    ".npz": ("NumPy", stored_arrays),
+}
+"""By the end of a file's name: the format, and what reads its arrays by their names."""
 UNEVEN = 0.75
 """Of a step, or of the digits that the times are written with: how far a time may be off."""
 
@@ -79,8 +84,8 @@ def read_record(path: Path | str) -> Record:
         than `FEWEST_SAMPLES`; names file, line or array, found and expected.
     """
     path = Path(path)
-    if path.suffix.lower() in (".npy", ".npz"):
-        return _of_arrays(path)
+    if (arrays := ARRAYS.get(path.suffix.lower())) is not None:
+        return _of_arrays(path, *arrays)
     columns = read_columns(path)
     named = _named(columns, path)
     start, interval = _increments(columns.header)
@@ -258,11 +263,11 @@ def _kind(header: Iterable[Sequence[str]]) -> str:
 # -- arrays -----------------------------------------------------------------------------------
 
 
-def _of_arrays(path: Path) -> Record:
-    arrays = {name: _floats(values) for name, values in stored_arrays(path).items()}
+def _of_arrays(path: Path, kind: str, read: Callable[[Path], Mapping[str, Array]]) -> Record:
+    arrays = {name: _floats(values) for name, values in read(path).items()}
     start, interval = (_single(arrays, name, path) for name in ("Tstart", "Tinterval"))
     arrays.pop("Length", None)
-    return _record(path, _checked(arrays, path), start, interval, "NumPy")
+    return _record(path, _checked(arrays, path), start, interval, kind)
 
 
 def _floats(values: Array) -> Array:
