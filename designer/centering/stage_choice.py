@@ -12,10 +12,11 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import doing, part
+from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check import checked_design, synthesis_result
@@ -26,7 +27,7 @@ from designer.design_rules import run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.circuit_table import DeadZone
-from designer.model.find_responses import matches
+from designer.model.find_responses import ModelResponse, matches
 from designer.model.model_file import ModelFile
 from designer.spread.spread import draw_many
 from designer.synthesis.part_checks import stage_refusal
@@ -92,9 +93,11 @@ def synthesise(
     *,
     all_found: bool = True,
     jobs: int = 1,
+    other: Ask | None = None,
 ) -> Synthesis:
     """``check.synthesis_result.synthesise``, with the better stage where the model file states none
-    and both make its clearances.
+    and both make its clearances. other : a process that designs with one of them meanwhile; no
+    choice depends on it.
 
     Raises
     ------
@@ -106,21 +109,47 @@ def synthesise(
     if modelfile.circuit.dead_zone is not None or len(able) < 2:
         return synthesis_result.synthesise(modelfile, catalog, all_found=all_found, jobs=jobs)
     began = time.perf_counter()
+    first, second = able
+    met = synthesis_result.responses_of(with_stage(modelfile, first), catalog, all_found=all_found)
+    if other is not None:
+        elsewhere = other(_foretold, modelfile, second, catalog, met, jobs)
+    refusal = None
     forecasts: list[StageForecast] = []
-    refusals: list[InputError] = []
-    for kind in able:
-        with part(f"with the {kind} stage"):
-            try:
-                met = forecasts[0].synthesis.model_responses if forecasts else None
-                made = synthesis_result.synthesise(
-                    with_stage(modelfile, kind), catalog, all_found=all_found, jobs=jobs, shown=met
-                )
-                forecasts.append(forecast(made, jobs))
-            except Unreachable as error:
-                refusals.append(error)
-    if not forecasts:
-        raise refusals[0]
+    try:
+        forecasts.append(_of_stage(modelfile, first, catalog, met, jobs))
+    except Unreachable as error:
+        refusal = error
+    there = _foretold(modelfile, second, catalog, met, jobs) if other is None else elsewhere()
+    forecasts += [] if there is None else [there]
+    if refusal is not None and not forecasts:
+        raise refusal
     return replace(chosen(forecasts), seconds=time.perf_counter() - began)
+
+
+def _of_stage(
+    modelfile: ModelFile,
+    kind: DeadZone,
+    catalog: Catalog,
+    met: tuple[ModelResponse, ...],
+    jobs: int,
+) -> StageForecast:
+    """What is foretold with one of the stages. met : the responses of the model.
+
+    Raises
+    ------
+    Unreachable : no parts make it.
+    """
+    with part(f"with the {kind} stage"):
+        stated = with_stage(modelfile, kind)
+        return forecast(synthesis_result.synthesise(stated, catalog, jobs=jobs, shown=met), jobs)
+
+
+def _foretold(*choice: Any) -> StageForecast | None:
+    """``_of_stage``; None where no parts make it."""
+    try:
+        return _of_stage(*choice)
+    except Unreachable:
+        return None
 
 
 def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:
@@ -139,13 +168,23 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
 
     synthesis : the design with the stated stage.
     """
-    stated, able = modelfile.circuit.dead_zone, _able(modelfile)
-    if stated is None or len(able) < 2:
-        return ""
+    kept = kept_of_doubtful(modelfile, synthesis, jobs)
+    return "" if kept is None else other_stage(modelfile, synthesis, kept, jobs)
+
+
+def kept_of_doubtful(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> int | None:
+    """As ``boards_that_keep``, of a design with a stated stage beside which the other one is to be
+    looked at; None where there is no other one, or no more that it could keep."""
+    if modelfile.circuit.dead_zone is None or len(_able(modelfile)) < 2:
+        return None
     kept = boards_that_keep(synthesis, jobs)
-    if kept is None or not _differ(kept, BOARDS):
-        return ""
-    (kind,) = (each for each in able if each != stated)
+    return None if kept is None or not _differ(kept, BOARDS) else kept
+
+
+def other_stage(modelfile: ModelFile, synthesis: Synthesis, kept: int, jobs: int = 1) -> str:
+    """As ``better_stage``, where boards of the stated stage are known. kept : of them."""
+    stated = modelfile.circuit.dead_zone
+    (kind,) = (each for each in _able(modelfile) if each != stated)
     with part(f"with the {kind} stage"):
         try:
             there = with_stage(modelfile, kind), synthesis.catalog

@@ -81,14 +81,11 @@ def synthesise(
     """
     began = time.perf_counter()
     modelfile = with_stage(modelfile)
-    catalog = modelfile.choices(load_catalog() if catalog is None else catalog)
+    catalog = load_catalog() if catalog is None else catalog
+    responses = shown or responses_of(modelfile, catalog, all_found=all_found)
+    catalog = _checked(modelfile, catalog)
     with errors_in(modelfile):
         choice = modelfile.model, modelfile.circuit, catalog
-        check_choices(*choice)
-        check_names(modelfile, unit_circuit(*choice), catalog)
-        responses = find(modelfile.model, modelfile.responses) if shown is None else shown
-        if all_found:
-            need_found(dict(enumerate(responses, start=1)), modelfile.si, modelfile.source)
         held = peaks(modelfile.model, responses)
         with seeking("parts"):
             design = parts_choice.synthesise(*choice, held, responses, jobs=jobs)
@@ -96,6 +93,33 @@ def synthesise(
             note(stands(design, time.perf_counter() - began))
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
+
+
+def responses_of(
+    modelfile: ModelFile, catalog: Catalog, *, all_found: bool = False
+) -> tuple[ModelResponse, ...]:
+    """The wanted responses on the model, of a file with a stage whose choices can be built.
+
+    Raises
+    ------
+    InputError, ResponseNotFound : as ``synthesise``.
+    """
+    _checked(modelfile, catalog)
+    with errors_in(modelfile):
+        found = find(modelfile.model, modelfile.responses)
+        if all_found:
+            need_found(dict(enumerate(found, start=1)), modelfile.si, modelfile.source)
+    return found
+
+
+def _checked(modelfile: ModelFile, catalog: Catalog) -> Catalog:
+    """What the model file chooses from, once it is known that it can."""
+    catalog = modelfile.choices(catalog)
+    with errors_in(modelfile):
+        choice = modelfile.model, modelfile.circuit, catalog
+        check_choices(*choice)
+        check_names(modelfile, unit_circuit(*choice), catalog)
+    return catalog
 
 
 def with_stage(modelfile: ModelFile, kind: DeadZone | None = None) -> ModelFile:

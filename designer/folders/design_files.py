@@ -13,7 +13,6 @@ from designer.base.design_folder import DESIGN, MEASURED, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
-from designer.base.progress import doing
 from designer.base.second_process import Ask
 from designer.board.board_check import check_board
 from designer.catalog.parts_catalog import Catalog
@@ -30,7 +29,7 @@ from designer.dynamics.drive_shape import has_harmonics
 from designer.fabrication.board_cost import CostEstimate, cost_or_none
 from designer.folders import board_files
 from designer.folders.bench_tables import scales_csv, setup_csv, start_recipes, waveform_csv
-from designer.folders.design_findings import error_warnings, findings, subject_of
+from designer.folders.design_findings import error_warnings, findings, judged, subject_of
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
 from designer.linear_network.milp import SOLVER
@@ -90,18 +89,27 @@ def write_last(
     jobs: int,
     other: Ask,
     drawing: Callable[[], Mapping[str, str | bytes]],
-) -> None:
+    better_stage: Callable[[], str] | None,
+) -> Synthesis:
     """Write the rest of the stage: the drawing, how to start each response, and ``design.json``.
-    other : as of ``find_recipes``. drawing : waits for it."""
+    What is returned has all that was found.
+
+    other : as of ``find_recipes``. drawing : waits for it. better_stage : waits for what the other
+    process finds out of the other stage, if it does.
+    """
     design, responses = synthesis.design, synthesis.model_responses
-    subject, cost = subject_of(synthesis, other), cost_or_none(synthesis)
-    document = dumps(_answer(synthesis, subject, cost))
+    idle = other if better_stage is None else None
+    subject, cost = subject_of(synthesis, idle), cost_or_none(synthesis)
+    synthesis = judged(synthesis, subject)
     folder.write(board_files.NOTES, board_files.notes(synthesis, subject, cost))
     for name, content in drawing().items():
         folder.write(name, content)
-    recipes = start_recipes(synthesis, jobs, other)
+    recipes = start_recipes(synthesis, jobs, idle)
     folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
-    folder.write(DESIGN, document)
+    if better_stage is not None:
+        synthesis = replace(synthesis, better_stage=better_stage())
+    folder.write(DESIGN, dumps(_answer(synthesis, subject, cost)))
+    return synthesis
 
 
 def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
@@ -120,7 +128,6 @@ def answer(synthesis: Synthesis) -> dict[str, Any]:
 def _answer(
     synthesis: Synthesis, subject: RuleSubject | InputError, cost: CostEstimate | None
 ) -> dict[str, Any]:
-    doing("design rules of the circuit")
     found = findings(synthesis, subject)
     document = chosen(synthesis)
     return {**document, "board_cost": None if cost is None else cost.as_dict(), **found}

@@ -7,11 +7,13 @@ need one. Nothing here changes the design, and nothing refuses it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from designer.base.errors import InputError
+from designer.base.progress import doing
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
@@ -38,6 +40,16 @@ def subject_of(synthesis: Synthesis, other: Ask | None = None) -> RuleSubject | 
         return error
 
 
+def judged(synthesis: Synthesis, subject: RuleSubject | InputError) -> Synthesis:
+    """With what the rules say of the circuit, where they can look at it. subject : ``subject_of``
+    the design."""
+    if synthesis.outcomes is not None or isinstance(subject, InputError):
+        return synthesis
+    doing("design rules of the circuit")
+    outcomes = run_rules.on_circuit(subject, synthesis.modelfile.rules)
+    return replace(synthesis, outcomes=outcomes)
+
+
 def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[str, Any]:
     """``warnings`` and ``failed_rules`` by the keys of docs/contract.md. subject : ``subject_of``
     the design.
@@ -50,10 +62,8 @@ def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[st
     if isinstance(subject, InputError):
         warnings.append(f"The design rules were not looked at: {subject}")
     else:
-        limits = synthesis.modelfile.rules
-        known = synthesis.outcomes
-        outcomes = run_rules.on_circuit(subject, limits) if known is None else known
-        failed = [o for o in outcomes if o.status == FAIL]
+        outcomes = judged(synthesis, subject).outcomes
+        failed = [o for o in outcomes or () if o.status == FAIL]
     if synthesis.better_stage:
         warnings.append(synthesis.better_stage)
     if failed:

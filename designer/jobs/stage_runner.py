@@ -8,7 +8,6 @@ last; what is interrupted in between can be resumed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +101,9 @@ class StageRunner:
                 ) as compiled,
                 other_process(jobs, *WRITING) as other,
             ):
-                synthesis = stage_choice.synthesise(self.modelfile, self.catalog, jobs=jobs)
+                synthesis = stage_choice.synthesise(
+                    self.modelfile, self.catalog, jobs=jobs, other=other if jobs > 1 else None
+                )
                 self.shown(plain(design_files.chosen(synthesis)))
                 compiled()
                 synthesis = write_design(
@@ -112,7 +113,7 @@ class StageRunner:
                     self.options,
                     self.progress,
                     other,
-                    self._with_other_stage,
+                    self._other_stage,
                 )
         else:
             synthesis = design_files.load(self.folder, self.modelfile, self.catalog)
@@ -121,13 +122,17 @@ class StageRunner:
                 self.folder.begin(stages, design_files.design_provenance(synthesis))
         return synthesis
 
-    def _with_other_stage(self, synthesis: Synthesis) -> Synthesis:
-        """With what is said of the stage that the model file does not state."""
+    def _other_stage(self, synthesis: Synthesis, other: Ask) -> Callable[[], str] | None:
+        """Waits for what is said of the stage that the model file does not state; None where
+        nothing has to be looked at. It is looked at in the other process."""
         if self.modelfile.circuit.dead_zone is None:
-            return synthesis
+            return None
         self.progress.stage("the other stage of the clearance")
-        better = stage_choice.better_stage(self.modelfile, synthesis, self.options.workers)
-        return replace(synthesis, better_stage=better)
+        jobs = self.options.workers
+        kept = stage_choice.kept_of_doubtful(self.modelfile, synthesis, jobs)
+        if kept is None:
+            return None
+        return other(stage_choice.other_stage, self.modelfile, synthesis, kept, jobs)
 
 
 def write_design(
@@ -137,14 +142,14 @@ def write_design(
     options: Options,
     progress: Progress,
     other: Ask,
-    looked_at: Callable[[Synthesis], Synthesis] = lambda synthesis: synthesis,
+    other_stage: Callable[[Synthesis, Ask], Callable[[], str] | None] = lambda *_: None,
 ) -> Synthesis:
     """Write a design and its KiCad project, what takes longest at the end: parts can be looked at
-    while the rest is sought. The design as it was looked at is returned.
+    while the rest is sought. The design is returned with what was said of the other stage.
 
     stages : that begin now, the design among them. other : draws beside this process, which holds
-    the interpreter, and takes half of the recipes. looked_at : what more is to be said of the
-    design, asked once its project is written.
+    the interpreter, and takes half of what follows. other_stage : as of ``StageRunner``; asked once
+    the project is written.
     """
     progress.stage("files of the design")
     with errors_in(synthesis.modelfile):
@@ -156,8 +161,8 @@ def write_design(
     design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.
     kicad_files.write(folder, synthesis, inputs, project)
-    synthesis = looked_at(synthesis)
+    better = other_stage(synthesis, other)
     progress.stage("start recipes, design rules of the circuit")
-    design_files.write_last(folder, synthesis, options.workers, other, drawing)
+    synthesis = design_files.write_last(folder, synthesis, options.workers, other, drawing, better)
     folder.finish("design")
     return synthesis

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from designer.base.second_process import other_process
 from designer.catalog.design_rule import Finding, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.parts_catalog import load_catalog
@@ -71,7 +72,8 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
 
 
 def test_the_model_is_asked_once_for_both_stages(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the parts are those of a stage that asks for itself."""
+    """And the parts are those of a stage that asks for itself, and those that another process
+    helps to choose."""
     asked: list[object] = []
 
     def find(*arguments: Any) -> Any:
@@ -83,6 +85,11 @@ def test_the_model_is_asked_once_for_both_stages(monkeypatch: pytest.MonkeyPatch
     modelfile = parse_model_file(system_text(*ONE, even, table("response", omega=1.3)))
     made = stage_choice.synthesise(modelfile, CATALOG)
     assert len(asked) == 1
+    with other_process(2) as other:
+        elsewhere = stage_choice.synthesise(modelfile, CATALOG, other=other)
+    assert len(asked) == 2
+    assert elsewhere.design.circuit == made.design.circuit
+    assert elsewhere.stage_reason == made.stage_reason
     for kind in ("saturation", "rectifier"):
         alone = synthesis_result.synthesise(with_stage(modelfile, kind), CATALOG)
         shared = synthesis_result.synthesise(
@@ -90,7 +97,7 @@ def test_the_model_is_asked_once_for_both_stages(monkeypatch: pytest.MonkeyPatch
         )
         assert shared.design.circuit == alone.design.circuit
         assert shared.design.errors.errors == alone.design.errors.errors
-    assert len(asked) == 3
+    assert len(asked) == 4
 
 
 def test_a_stage_that_alone_makes_the_clearances_is_no_choice() -> None:

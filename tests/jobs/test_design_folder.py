@@ -294,22 +294,26 @@ def test_json_is_strict() -> None:
 def test_files_stand_before_what_takes_longer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Parts, deck, bill and KiCad project before the other stage is looked at, and its word in the
-    answer; only then start recipes are sought."""
+    """Parts, deck, bill and KiCad project before the other stage is looked at, which goes on beside
+    the start recipes and has its word in the answer."""
     met: dict[str, set[str]] = {}
 
     def files() -> set[str]:
         return {path.name for path in (tmp_path / "made").rglob("*") if path.is_file()}
 
-    def better(*_: object) -> str:
+    def doubtful(*_: object) -> int:
         met["stage"] = files()
+        return 30
+
+    def better(*_: object) -> str:  # not for another process, which cannot have it
         return "The other one is better."
 
     def sought(*_: object) -> list[None]:
         met["recipes"] = files()
         return [None]
 
-    monkeypatch.setattr(stage_choice, "better_stage", better)
+    monkeypatch.setattr(stage_choice, "kept_of_doubtful", doubtful)
+    monkeypatch.setattr(stage_choice, "other_stage", better)
     monkeypatch.setattr(design_files, "start_recipes", sought)
     text = f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 0.54\n{COARSE_RECTIFIER}"
     file = tmp_path / "model.toml"
