@@ -35,6 +35,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.stranger_systems import FAMILIES, Family, Stranger, draw
@@ -528,6 +529,9 @@ def picture(rows: Sequence[Row], seconds: float) -> Figure:
             markeredgewidth=1.8 if wrong else 1.0,
         )
     axes.set(xscale="log", yscale="log", xlabel="CPU seconds of synthesise")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(ylabel="largest coefficient error", ylim=(NO_ERROR / 2, 2 * top))
     axes.axhline(LARGE_ERROR, color="0.6", lw=0.8)
     axes.text(
@@ -536,7 +540,7 @@ def picture(rows: Sequence[Row], seconds: float) -> Figure:
     axes.text(1.0, top / 2, "no circuit ", ha="right", transform=axes.get_yaxis_transform())
     for mark in (SOON, LATE):
         axes.axvline(mark, color="0.6", lw=0.8)
-        axes.text(mark, NO_ERROR, f" {mark:g} s", va="bottom")
+        axes.text(mark, NO_ERROR, f"{mark:g} s ", ha="right", va="bottom")
     handles = [
         *(_mark(f"{n} mass{'es' * (n > 1)}", color=c) for n, c in COLOURS.items()),
         *(_mark(f"{n} clearance{'s' * (n != 1)}", marker=m) for n, m in MARKERS.items()),
