@@ -25,6 +25,7 @@ from designer.check.absolute_motion import absolute_extremes
 from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, spice_trace
 from designer.check.coexistence import Coexistence
 from designer.check.curved_laws import LawMisfit, law_misfits
+from designer.check.stick_phases import Sticking, stick_phases
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.nominal import Trace, UnitFlow, board_flow, record_of, traces_of
@@ -107,6 +108,8 @@ class Simulated:
     misfits: tuple[tuple[LawMisfit, ...], ...] = ()
     """Of the orbit and of each of ``others``, the curved laws whose force is off there;
     () where the engine was not asked (ngspice)."""
+    sticking: tuple[tuple[Sticking, ...], ...] = ()
+    """Of the orbit and of each of ``others``, what each friction does there; () in ngspice."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()
@@ -342,6 +345,7 @@ def _on_model(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
         misfits=tuple(law_misfits(model, flow, o, units) for o in orbits),
+        sticking=tuple(stick_phases(model, flow, o, units, 1.0) for o in orbits),
         flow=UnitFlow(partial(model_flow, model, r.omega), units, 1.0, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )
@@ -477,6 +481,7 @@ def _on_circuit(
         coexistence=result,
         absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
         misfits=tuple(law_misfits(model, flow, measured[i], volts) for i in rows),
+        sticking=tuple(stick_phases(model, flow, measured[i], volts, seconds) for i in rows),
         flow=UnitFlow(partial(board_flow, design, r), volts, seconds, _ground(model, r.omega)),
         **_of_system(model, r.omega),
     )

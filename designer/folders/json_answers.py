@@ -178,6 +178,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         **_from_base(simulated, orbit),
         **_in_clearances(simulated, orbit),
         **_misfits(simulated, number),
+        **_sticking(simulated, number),
         "twin": twin,
     }
     for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
@@ -224,6 +225,12 @@ def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:
     for each in simulated.misfits[number] if simulated.misfits else ():
         kinds.setdefault(each.kind, []).append(each.as_dict())
     return kinds
+
+
+def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:
+    """What each friction does over an orbit; nothing without any."""
+    held = simulated.sticking[number] if simulated.sticking else ()
+    return {"sticking": [each.as_dict() for each in held]} if held else {}
 
 
 def _by_state(values: Array) -> dict[str, Any]:

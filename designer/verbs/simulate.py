@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from designer.base.arrays import Array
     from designer.check.simulation import Simulated
+    from designer.check.stick_phases import Sticking
     from designer.check.synthesis_result import Synthesis
     from designer.model.model_file import ModelFile
     from designer.model.si_units import Reader
@@ -269,6 +270,7 @@ def _several(name: str, given: object, example: str) -> list[float | str]:
 def tables(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
     from designer.check.curved_laws import misfits_in
+    from designer.check.stick_phases import sticking_in
 
     head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
     rows = answer["responses"]
@@ -298,6 +300,10 @@ def tables(answer: Mapping[str, Any]) -> None:
         sides = [side for side in ("upper", "lower") if any(one[side] for _, one in met)]
         in_them = (_in_clearance(r, one, sides, in_si=in_si) for r, one in met)
         table("In the clearances: furthest into each stop, and fastest impact", in_them, gap=1)
+    held = [(r, each) for r in rows for each in sticking_in(r)]
+    if held:
+        frictions = (_holding(r, each, in_si=in_si) for r, each in held)
+        table("Dry friction: how often and how long it holds", frictions, gap=1)
     for r in rows:
         place = _place(r, in_si=in_si)
         if r["starts"] is not None:
@@ -333,6 +339,22 @@ def _from_base(row: Mapping[str, Any], masses: Sequence[str], *, in_si: bool) ->
         cells[f"x{i + 1} − y ({name})"] = _between(ends, in_si=in_si)
     y = row["base_amplitude"]
     return {**cells, "y (base)": f"± {value_text(y, 'm') if in_si else format(y, '.6g')}"}
+
+
+def _holding(row: Mapping[str, Any], held: Sticking, *, in_si: bool) -> dict[str, str]:
+    """What a friction does over a response."""
+    often = "always" if held.share else "never"
+    if held.phases:
+        periods = "a drive period" if held.periods == 1 else f"{held.periods} drive periods"
+        often = f"{held.phases} times in {periods}"
+    return {
+        "at": _place(row, in_si=in_si),
+        "response": row["response"],
+        "friction": held.friction,
+        "holds": often,
+        "of the time": f"{100.0 * held.share:.3g} %",
+        "longest, in drive periods": f"{held.longest:.3g}",
+    }
 
 
 def _in_clearance(

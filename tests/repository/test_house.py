@@ -70,7 +70,7 @@ LAZY = {
 REACH = {
     "catalog": 6_050,
     "new": 11_550,
-    "simulate": 27_350,
+    "simulate": 27_600,
     "bifurcation": 33_800,
     "reproduce": 56_100,
     "rules": 59_300,
