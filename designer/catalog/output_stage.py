@@ -1,5 +1,5 @@
-"""How far an op-amp's output reaches, by its load: one statement for every rung, the synthesis and
-the report.
+"""How far an op-amp's output reaches, by its load: one statement for every fidelity, the synthesis
+and the report.
 
 An output at its limit is a voltage behind a resistance, both from the data sheet's swings into
 10 kΩ and into 2 kΩ. Beyond 10 kΩ no data sheet has a figure; that Ohm's law goes on is assumed.

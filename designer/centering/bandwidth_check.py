@@ -15,7 +15,7 @@ from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement, agree
 from designer.verdicts.verdict import Verdict, judge
 
 BANDWIDTH = "bandwidth"
-"""Name of the rung."""
+"""Name of the fidelity."""
 
 
 class LaggingBoards:

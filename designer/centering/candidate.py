@@ -89,10 +89,10 @@ class Contribution:
 
 
 @dataclass(frozen=True)
-class RungOutcome:
+class FidelityOutcome:
     """How op-amps that take time agree with the exact circuit about a design."""
 
-    rung: str
+    fidelity: str
     """Who was asked: the exact circuit with ``bandwidth``, or ngspice's ``dynamic``."""
     frequency: float
     """Frequency at ω = 1 [Hz]."""
@@ -121,7 +121,7 @@ class SearchResult:
     """The levers that were tried, in order."""
     contributions: tuple[Contribution, ...]
     """What each lever that moved is worth."""
-    checks: tuple[RungOutcome, ...]
+    checks: tuple[FidelityOutcome, ...]
     """What op-amps that take time make of the design and slower ones, in the order in which they
     were asked; empty where ngspice was not to be asked."""
     windows: tuple[tuple[Stretch, ...], ...]

@@ -20,7 +20,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
 from designer.model.tuning_bands import Bands
 from designer.spread.part_rules import spread_of
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.rare_losses import rare_losses, unseen_share
 from designer.yields.study_identity import study_hash
@@ -122,7 +122,7 @@ class VerdictCache:
         if isinstance(trim, DcTrim):
             answers, _ = trimmed_answers(trim, plan, indices, jobs)
         else:
-            answers = exact_rung.block(plan, indices, jobs)
+            answers = exact_circuit.block(plan, indices, jobs)
         verdicts = [a.verdict for a in answers]
         if bands is not None:
             verdicts = benched_block(plan, indices, answers, bands, jobs)

@@ -3,7 +3,7 @@ asked for (docs/cure.md).
 
 Rounds of choosing and measuring. Each branch (``cure_branch``) has a linear picture
 (``cure_linear_model``); the cheapest choice of upgrades that it promises to be enough is found by
-mixed-integer optimisation (``cure_milp``) and put to fresh boards on the exact rung. A response
+mixed-integer optimisation (``cure_milp``) and put to fresh boards on the exact circuit. A response
 that falls short has its demand tightened by what was measured, and the next round chooses again.
 Branches are made only as far as they may be cheaper than what is known.
 """

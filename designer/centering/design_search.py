@@ -28,7 +28,7 @@ from designer.centering.bandwidth_check import BANDWIDTH, LaggingBoards
 from designer.centering.candidate import (
     Candidate,
     Contribution,
-    RungOutcome,
+    FidelityOutcome,
     SearchResult,
     Step,
     better,
@@ -43,7 +43,7 @@ from designer.centering.levers import (
     topologies,
     variants,
 )
-from designer.centering.ngspice_check import LISTENED, RUNG, Listen
+from designer.centering.ngspice_check import FIDELITY, LISTENED, Listen
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, Stretch, open_in, stretches
 from designer.check.synthesis_result import Synthesis
@@ -160,7 +160,7 @@ class _DesignSearch:
     ) -> None:
         self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
         self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
-        self.listen, self.checks = listen, list[RungOutcome]()
+        self.listen, self.checks = listen, list[FidelityOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
@@ -272,16 +272,16 @@ class _DesignSearch:
         """
         if self.listen is None:
             return best
-        lagging: list[tuple[Candidate, RungOutcome]] = []
-        confirmed: list[tuple[Candidate, RungOutcome]] = []
+        lagging: list[tuple[Candidate, FidelityOutcome]] = []
+        confirmed: list[tuple[Candidate, FidelityOutcome]] = []
         for candidate in self._slower(best):
             lagging.append(self._asked(candidate, BANDWIDTH, LaggingBoards(self.memory)))
             if lagging[-1][1].stands:
-                confirmed.append(self._asked(candidate, RUNG, self.listen))
+                confirmed.append(self._asked(candidate, FIDELITY, self.listen))
                 if confirmed[-1][1].stands:
                     break
         if not confirmed:
-            confirmed.append(self._asked(_most_surviving(lagging), RUNG, self.listen))
+            confirmed.append(self._asked(_most_surviving(lagging), FIDELITY, self.listen))
         final = _most_surviving(confirmed)
         for candidate, outcome in lagging + confirmed:
             self.checks.append(replace(outcome, adopted=candidate is final))
@@ -318,18 +318,18 @@ class _DesignSearch:
         return f"{frequency:.4g} Hz for {own:.4g} Hz of the mechanism"
 
     def _asked(
-        self, candidate: Candidate, rung: str, listen: Listen
-    ) -> tuple[Candidate, RungOutcome]:
+        self, candidate: Candidate, fidelity: str, listen: Listen
+    ) -> tuple[Candidate, FidelityOutcome]:
         frequency = self._frequency(candidate)
-        engine = "exact circuit with" if rung == BANDWIDTH else "ngspice, rung"
-        title = f"{engine} {rung}, {self._time_scale(frequency)}"
+        engine = "exact circuit with" if fidelity == BANDWIDTH else "ngspice, rung"
+        title = f"{engine} {fidelity}, {self._time_scale(frequency)}"
         step = self.progress.stage(title, len(candidate.scored))
         responses, design = candidate.model_responses, candidate.design
         bench = self._bench(candidate.choice, responses, design, LISTENED)
         agreements = listen(bench, [s.stand for s in candidate.scored], step)
         text = ", ".join(map(str, agreements))
         self.progress.note(f"  {title}: boards that show it as well, by response: {text}")
-        return candidate, RungOutcome(rung, frequency, agreements)
+        return candidate, FidelityOutcome(fidelity, frequency, agreements)
 
     def _bench(
         self, choice: DesignChoice, responses: Sequence[ModelResponse], design: Design, boards: int
@@ -470,11 +470,11 @@ class _DesignSearch:
                 self.progress.best_so_far(f"{text}, with {lever} {setting}")
 
 
-def _most_surviving(asked: Sequence[tuple[Candidate, RungOutcome]]) -> Candidate:
+def _most_surviving(asked: Sequence[tuple[Candidate, FidelityOutcome]]) -> Candidate:
     """The design whose worst response most boards keep, of those that the first has answers to."""
     answered = [r for r, a in enumerate(asked[0][1].agreements) if a.borne_out is not None]
 
-    def worst(one: tuple[Candidate, RungOutcome]) -> int:
+    def worst(one: tuple[Candidate, FidelityOutcome]) -> int:
         return min((one[1].agreements[r].survivors for r in answered), default=0)
 
     return max(asked, key=worst)[0]

@@ -1,7 +1,7 @@
 """How far a response is from being lost, in standard deviations: boards with a stretched spread.
 
 A yield near 1 tells designs apart only with thousands of boards. So every deviation from the
-nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit rung
+nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit
 whether they still show the response. Were the margin linear and its spread normal, the yield of
 boards stretched λ times would be Φ(d/λ), with d the distance of the nominal board from losing the
 response in standard deviations of the margin ("scaled-sigma sampling": Sun, Li, Liu, Luo and Gu,
@@ -157,14 +157,14 @@ class ScaledBoards:
         progress: Callable[[], None],
     ) -> list[tuple[int, ...]]:
         """For each place the boards that show the response, by stretch."""
-        rungs = [LADDER.index(s) for s in stretches]
-        rows = [1 + r * self.count + i for r in rungs for i in boards]
+        places = [LADDER.index(s) for s in stretches]
+        rows = [1 + r * self.count + i for r in places for i in boards]
         which = [row for row in rows for _ in stands]
         drives = [s.drive for _ in rows for s in stands]
         starts = np.array([s.orbit.start for _ in rows for s in stands])
         orbits = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
         fine = [_shows(orbit, stands[k % len(stands)]) for k, orbit in enumerate(orbits)]
-        ok = np.array(fine).reshape(len(rungs), len(boards), len(stands)).sum(axis=1)
+        ok = np.array(fine).reshape(len(places), len(boards), len(stands)).sum(axis=1)
         return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
 
     def query(self, stand: OperatingOrbit, boards: range, stretches: Sequence[float]) -> object:

@@ -19,12 +19,12 @@ from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.verdicts.cross_check import survives
-from designer.verdicts.ngspice_runs import Query, run_queries, way_to_rung
+from designer.verdicts.ngspice_runs import Query, run_queries, way_to_fidelity
 
-RUNG: Rung = "dynamic"
+FIDELITY: Fidelity = "dynamic"
 STRETCH, LISTENED = 2.0, 16
 """Stretch of the spread, and boards of each response."""
 FEWER, LEAST = 1, 8
@@ -112,7 +112,7 @@ class AgreementCheck:
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
         """Agreement of each response with ngspice; see `agreements`."""
-        question = (RUNG, REFINEMENTS, LONGEST)
+        question = (FIDELITY, REFINEMENTS, LONGEST)
         return agreements(self._memory, bench, stands, question, self._ask, progress)
 
     def _ask(
@@ -123,7 +123,7 @@ class AgreementCheck:
         if len(near) < LEAST:
             return [(len(there), 0, len(there))]
         (nominal,) = numerics_gate.check(
-            self._pool, [replace(bench.nominal(stand), rung=RUNG)], LEVELS
+            self._pool, [replace(bench.nominal(stand), fidelity=FIDELITY)], LEVELS
         )
         if not nominal.passed:
             return [(len(there), 0, len(there))]
@@ -137,4 +137,4 @@ class AgreementCheck:
 
 
 def _started(subject: GateSubject) -> GateSubject:
-    return replace(subject, rung=RUNG, discard=way_to_rung(subject.orbit))
+    return replace(subject, fidelity=FIDELITY, discard=way_to_fidelity(subject.orbit))

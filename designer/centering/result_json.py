@@ -13,7 +13,7 @@ from designer.centering.candidate import Candidate, Contribution, SearchResult
 from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
-from designer.centering.ngspice_check import RUNG, STRETCH
+from designer.centering.ngspice_check import FIDELITY, STRETCH
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
 from designer.verdicts.cross_check import CrossCheck
@@ -49,7 +49,7 @@ def search_json(result: SearchResult) -> dict[str, Any]:
         ],
         "contributions": [_contribution(c) for c in result.contributions],
         "bandwidth": _checks(result, BANDWIDTH, "bandwidth"),
-        "ngspice": _checks(result, RUNG, "ngspice"),
+        "ngspice": _checks(result, FIDELITY, "ngspice"),
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
             for row in result.windows
@@ -57,8 +57,8 @@ def search_json(result: SearchResult) -> dict[str, Any]:
     }
 
 
-def _checks(result: SearchResult, rung: str, survivors: str) -> dict[str, Any]:
-    """What a rung was asked about. survivors : key of the boards that it keeps."""
+def _checks(result: SearchResult, fidelity: str, survivors: str) -> dict[str, Any]:
+    """What a fidelity was asked about. survivors : key of the boards that it keeps."""
     designs = [
         {
             "frequency_hz": row.frequency,
@@ -74,9 +74,9 @@ def _checks(result: SearchResult, rung: str, survivors: str) -> dict[str, Any]:
             ],
         }
         for row in result.checks
-        if row.rung == rung
+        if row.fidelity == fidelity
     ]
-    return {"rung": rung, "stretch": STRETCH, "designs": designs}
+    return {"rung": fidelity, "stretch": STRETCH, "designs": designs}
 
 
 def confirmation_json(
@@ -85,7 +85,7 @@ def confirmation_json(
     response_of: Sequence[int],
     responses: int,
 ) -> list[dict[str, Any]]:
-    """How ngspice's rung judges boards of the study, by response.
+    """How ngspice's fidelity judges boards of the study, by response.
 
     response_of : for each question the index of its response; a response that was left out has no
     question.

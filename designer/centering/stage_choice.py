@@ -30,7 +30,7 @@ from designer.model.find_responses import matches
 from designer.model.model_file import ModelFile
 from designer.spread.spread import draw_many
 from designer.synthesis.part_checks import stage_refusal
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Verdict
 from designer.yields.study import plan_study
 

@@ -40,7 +40,7 @@ class CheckedResponse:
     model: ModelResponse
     """The response, and what the model shows."""
     circuit: Orbit
-    """Orbit of the exact circuit rung, in volts and seconds."""
+    """Orbit of the exact circuit, in volts and seconds."""
     excitation: Excitation
     """The generator's setting."""
     gate: GateResult | None

@@ -55,7 +55,7 @@ from designer.model.relative_motion import (
 )
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit, twin_runs
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool, require_ngspice
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def simulate(
     jobs: int | None = None,
     progress: Progress | None = None,
     traces: bool = False,
-    rung: Rung = "ideal",
+    fidelity: Fidelity = "ideal",
     starts: int = DRAWN_STARTS,
     seed: int = SEED,
     start: Array | None = None,
@@ -201,21 +201,21 @@ def simulate(
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
     synthesis : of this model file; where the engine needs one and None is given it is made by
     ``choose``, or as ``check.synthesis_result`` makes it. traces : keep the orbits and their mirror
-    twins as traces too. rung : the op-amps' model in ngspice. starts, seed : of the initial states
-    that are drawn to see which attractors coexist (``check.coexistence``), 0 for none; ngspice has
-    none. start : (states,) in model units, where the drive's phase is 0.
+    twins as traces too. fidelity : the op-amps' model in ngspice. starts, seed : of the initial
+    states that are drawn to see which attractors coexist (``check.coexistence``), 0 for none;
+    ngspice has none. start : (states,) in model units, where the drive's phase is 0.
 
     Raises
     ------
-    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, a
+    InputError : a fidelity for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, a
         number of starts that cannot be, or nothing to simulate.
     """
     coexistence.check(starts)
     sampling = (starts, seed)
     progress = Progress() if progress is None else progress
-    if rung != "ideal" and engine != "ngspice":
+    if fidelity != "ideal" and engine != "ngspice":
         raise InputError(
-            None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
+            None, "--rung", fidelity, "ideal, or --engine ngspice: other engines have none"
         )
     for omega in omegas:
         check_omega("--omega", omega, modelfile.model)
@@ -238,7 +238,7 @@ def simulate(
         require_ngspice(pool)
         synthesis = synthesis or _design(modelfile, choose)
         scan = _Scan(bool(omegas), start)
-        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, rung)
+        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, fidelity)
 
 
 def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | None) -> Synthesis:
@@ -249,7 +249,7 @@ def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | Non
     return choose(modelfile)
 
 
-def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
+def engine_settings(engine: Engine, fidelity: Fidelity = "ideal") -> dict[str, Any]:
     """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
     settings: dict[str, Any] = {
         "flow": "exact, by modes",
@@ -264,7 +264,7 @@ def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
     if engine == "ngspice":
         settings["strobe_tolerance"] = read_orbit.STROBE_TOLERANCE
         settings["undecided_below"] = read_orbit.ENGINE_ERROR
-        settings |= {"gate_bound": numerics_gate.BOUND, "rung": rung}
+        settings |= {"gate_bound": numerics_gate.BOUND, "rung": fidelity}
     return settings
 
 
@@ -497,7 +497,7 @@ def _in_ngspice(
     pool: SpicePool,
     progress: Progress,
     traces: bool,
-    rung: Rung,
+    fidelity: Fidelity,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began, design = time.perf_counter(), synthesis.design
@@ -509,7 +509,9 @@ def _in_ngspice(
         r, _, orbits = _circuit_orbits(synthesis, spec, scan)
         drive = design.excitation(r.b, r.omega)
         settled = [o for o in orbits if len(o.start)]
-        subjects += [numerics_gate.GateSubject(reduction, drive, o, rung=rung) for o in settled]
+        subjects += [
+            numerics_gate.GateSubject(reduction, drive, o, fidelity=fidelity) for o in settled
+        ]
         rows.append((r, drive, len(settled)))
         step()
     progress.stage("ngspice, numerics gate")

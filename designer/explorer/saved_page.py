@@ -39,7 +39,7 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, StudyPlan
 from designer.yields.study import plan_study
 from designer.yields.yield_count import Yield, all_on_one, count
@@ -110,7 +110,7 @@ def _answers(plan: StudyPlan, options: Options, progress: Progress) -> list[Answ
     """Those of every board on the exact circuit."""
     step, answers = progress.stage("boards", plan.samples), []
     for indices in plan.blocks(PIECE) if plan.questions else ():
-        answers += exact_rung.block(plan, indices, options.workers)
+        answers += exact_circuit.block(plan, indices, options.workers)
         for _ in indices:
             step()
     return answers

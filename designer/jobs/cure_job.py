@@ -35,7 +35,7 @@ from designer.folders.design_source import design_inputs, design_stage, grade_in
 from designer.folders.model_source import design_inputs_of
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
-from designer.jobs import folder_numbers, rung_choice, usual_times
+from designer.jobs import fidelity_choice, folder_numbers, usual_times
 from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
@@ -184,11 +184,11 @@ def cure_into(
     if todo:
         if out is not None:
             _check_room(base, out, options)
-        rung = rung_choice.choose(folder)
-        if rung.rung == "ngspice":
+        choice = fidelity_choice.choose(folder)
+        if choice.rung == "ngspice":
             progress.note(
-                f"{rung.reason}; a cure is decided on the exact circuit all the same: ask ngspice "
-                "about the cured design (tolerance --rung ngspice)"
+                f"{choice.reason}; a cure is decided on the exact circuit all the same: ask "
+                "ngspice about the cured design (tolerance --rung ngspice)"
             )
         _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
     answer = folder.json(CURE)

@@ -70,14 +70,14 @@ def merged(
         lacking = complete and lacks_noise(folder.json(prefix + TOLERANCE))
         options = replace(options, blame_anew=lacking)
     names = {*stored.get("layers", ()), *layers_of(options)}
-    rung = options.rung
-    if "ngspice" in names and rung != "bandwidth":
-        rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
+    fidelity = options.rung
+    if "ngspice" in names and fidelity != "bandwidth":
+        fidelity = "ngspice" if ALL_IN_NGSPICE in names else "auto"
     has_blame = complete and blamed(stored["layers"])
     with_blame = options.blame or has_blame
     return replace(
         options,
-        rung=rung,
+        rung=fidelity,
         tuned="tuned" in names,
         reached="reached" in names,
         rare="rare" in names,

@@ -256,7 +256,7 @@ def study_of(
         synthesis,
         samples=options.samples,
         until=options.until,
-        rung=options.rung,
+        fidelity=options.rung,
         tuned=options.tuned,
         reached=options.reached,
         blamed=options.blame,
@@ -290,8 +290,8 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
         raise InputError(path, f"stages.{place.stage}", MISSING, expected)
     samples = folder.json(place.prefix + TOLERANCE)["samples"]
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
-    rung = stage.inputs.get("rung", "exact")
-    options = Options(stage.inputs["seed"], samples=samples, rung=rung, blame=False)
+    fidelity = stage.inputs.get("rung", "exact")
+    options = Options(stage.inputs["seed"], samples=samples, rung=fidelity, blame=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
     return study_of(synthesis, options, help_, check(synthesis, None), stores)
 

@@ -31,7 +31,7 @@ from designer.paper.circuits import OMEGA, model_file
 from designer.paper.report_files import README, write_files
 from designer.paper.tolerance_cases import TITLES, SpreadCase, YieldRow, cases
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import blame
 from designer.yields.power_up import power_up_block
@@ -115,7 +115,7 @@ def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[s
     began, plan = time.perf_counter(), case.plan
     number = len(plan.questions)
     step = progress.stage(f"{case.name}: as built", plan.samples * number)
-    answers = exact_rung.block(plan, range(plan.samples), jobs, step)
+    answers = exact_circuit.block(plan, range(plan.samples), jobs, step)
     some = [a for a in answers if a.sample < short]
     step = progress.stage(f"{case.name}: tuned", short * number)
     tuned = tuned_block(plan, range(short), some, Bands(), jobs, step)

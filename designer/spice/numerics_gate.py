@@ -33,7 +33,7 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import (
     BRIEF,
@@ -62,7 +62,7 @@ RELTOL = 1e-5
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
 MOST_DISCARDED = 400
-"""Drive periods: no run on any rung discards more."""
+"""Drive periods: no run at any fidelity discards more."""
 WAVE_POINTS = 20_000
 """Points of a period of the exact wave, so many that straight lines join them."""
 SHORTEST = 8
@@ -93,7 +93,7 @@ class GateResult:
     """``wave_error`` of the run at ``settings``; nan where it is not periodic, as ``difference``
     is."""
     wave_bound: float = float("nan")
-    """What ``wave`` was held to; nan where the run is not periodic, and above the rung
+    """What ``wave`` was held to; nan where the run is not periodic, and above the fidelity
     ``ideal``."""
 
     @property
@@ -152,7 +152,7 @@ class GateSubject:
     """(states,) capacitor voltages at t = 0 if not the orbit's."""
     discard: int = DISCARD
     """Periods left out before the run is judged."""
-    rung: Rung = "ideal"
+    fidelity: Fidelity = "ideal"
     """The op-amps' model in ngspice."""
     judged: int = 0
     """Periods that are judged at least."""
@@ -232,7 +232,7 @@ def deck_of(
         title="one response of one board",
         stop_time=stop,
         initial=capacitors,
-        rung=subject.rung,
+        fidelity=subject.fidelity,
         kept_from=kept,
         stage=False,
         bounded=True,
@@ -312,9 +312,9 @@ def check(
 ) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
-    All subjects move through the levels together, so that the workers stay busy. On a rung above
-    ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels : how
-    many step sizes are tried.
+    All subjects move through the levels together, so that the workers stay busy. At a fidelity
+    above ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels :
+    how many step sizes are tried.
     """
     subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
@@ -340,9 +340,9 @@ def check(
 
 
 def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject]:
-    """The subjects with the periods that each has to discard on its rung, from a short run."""
+    """The subjects with the periods that each has to discard at its fidelity, from a short run."""
     out = list(subjects)
-    indices = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    indices = [i for i, s in enumerate(subjects) if s.fidelity != "ideal" and s.orbit.n]
     tasks = []
     for i in indices:
         s = subjects[i]
@@ -405,7 +405,7 @@ def _judge(
     good = [run.result for run in runs if isinstance(run.result, Read)]
     wanted = subject.orbit
     difference, wave, bound, passed = float("nan"), float("nan"), float("nan"), False
-    if wanted.status is OrbitStatus.PERIODIC and subject.rung == "ideal":
+    if wanted.status is OrbitStatus.PERIODIC and subject.fidelity == "ideal":
         bound = wave_bound(wanted)
     if len(good) == len(runs):
         passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
@@ -415,7 +415,7 @@ def _judge(
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND
-            passed = passed and (subject.rung != "ideal" or wave <= bound)
+            passed = passed and (subject.fidelity != "ideal" or wave <= bound)
     return GateResult(
         settings,
         passed,

@@ -143,7 +143,7 @@ def _instances(circuit: Circuit, board: Board) -> Iterator[str]:
         yield opamp_model.instance(
             s.name,
             (s.noninverting, s.inverting, s.output),
-            rung="ideal",
+            fidelity="ideal",
             vos=board.offset.get(s.name, 0.0),
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],

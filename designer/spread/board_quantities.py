@@ -14,8 +14,8 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit
 
 _GROUPS = ("values", "offset", "low", "high", "bias", "reference", "supply")
-"""Of ``Boards``: what the exact rung depends on and a spread may draw. The drop of a diode and the
-gain are the same on every board; the bandwidth is for ngspice's models alone."""
+"""Of ``Boards``: what the exact circuit depends on and a spread may draw. The drop of a diode and
+the gain are the same on every board; the bandwidth is for ngspice's models alone."""
 ROUNDING = 1e-12
 """Of a nominal value: what is no difference from it."""
 _NAMES = {"values": "", "reference": "", "supply": ""}

@@ -178,7 +178,7 @@ def simulate(
         jobs=jobs,
         progress=progress,
         traces=place is not None,
-        rung=rung,
+        fidelity=rung,
         starts=starts,
         seed=seed,
         start=begin,

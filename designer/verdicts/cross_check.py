@@ -47,7 +47,7 @@ class StartKind(StrEnum):
 
 
 class NgspiceVerdict(StrEnum):
-    """How ngspice's answer compares with the exact rung's."""
+    """How ngspice's answer compares with the exact circuit's."""
 
     AGREED = "agreed"
     DIFFERED = "differed"
@@ -106,7 +106,7 @@ class CrossCheck(Ask):
     that step was not the exact circuit's."""
 
     def agrees(self, answer: Answer) -> bool | None:
-        """Whether ngspice names the response that the exact rung names; None without an answer.
+        """Whether ngspice names the response that the exact circuit names; None without an answer.
         Two step sizes that name different ones both differ from a third."""
         exact = name_in_ngspice(answer.response)
         if is_answer(self.response):
@@ -243,5 +243,5 @@ def _ask_own(answer: Answer) -> list[Ask]:
 
 
 def _orbits(answer: Answer) -> bool:
-    """Whether the exact rung has an attractor, so that ngspice can be told how long to run."""
+    """Whether the exact circuit has an attractor, so that ngspice can be told how long to run."""
     return answer.verdict is not Verdict.FAILED

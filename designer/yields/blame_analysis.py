@@ -119,7 +119,7 @@ def blame(
     progress: Callable[[], None] = lambda: None,
     parts: StoredParts | None = None,
 ) -> Blame:
-    """Blame the parts for the losses among these answers (as built, exact rung).
+    """Blame the parts for the losses among these answers (as built, exact circuit).
 
     answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
     are replayed, at most. budget : steps of the work (``blame_replay``); all of it if None.

@@ -1,8 +1,8 @@
 """Boards that are asked again with one part exact: which losses does that part explain.
 
-Lost boards are replayed on the exact rung with one part at its nominal value (and without offset,
-for an op-amp section), everything else as drawn; so are groups of parts. The same is done with
-boards that were ok, which tells the losses that an exact part would *cause*.
+Lost boards are replayed on the exact circuit with one part at its nominal value (and without
+offset, for an op-amp section), everything else as drawn; so are groups of parts. The same is done
+with boards that were ok, which tells the losses that an exact part would *cause*.
 
 The unit of a blame's work is a step: an attractor that is sought, or an orbit that is followed. How
 many there are is known before the first, so that progress can say how long it takes. A board that
@@ -27,7 +27,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields.margins import DRAWN, ROUNDS, lost_boards
 from designer.yields.stored_parts import StoredParts

@@ -28,7 +28,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Answer, Question, Verdict
 from designer.yields.stored_parts import StoredParts, counted
 

@@ -23,7 +23,7 @@ from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import BoardRow, Question, StudyPlan, Verdict
 from designer.yields.start_recipe import Recipe
 

@@ -20,7 +20,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, Verdict
 from designer.yields import window_path
 from designer.yields.adjustment import AS_BUILT, Adjustment, widths

@@ -19,7 +19,7 @@ from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.power_up import switched_on
 from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind

@@ -32,7 +32,7 @@ from designer.spread.part_rules import warmed
 from designer.spread.spread import NO_BANDWIDTH, Spread
 from designer.verdicts import cross_check
 from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
-from designer.verdicts.rung_gate import gated
+from designer.verdicts.fidelity_gate import gated
 from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields import layers
 from designer.yields.blame_analysis import Blame, blame
@@ -84,7 +84,7 @@ def lagging_plan(
     questions = tuple(replace(plan.questions[k], start=orbits[k], settings=None) for k in left)
     plan = replace(plan, questions=questions)
     if pool is not None and questions:
-        plan, _ = gated(plan, pool, plan.rung)
+        plan, _ = gated(plan, pool, plan.fidelity)
     return plan, left, why
 
 
@@ -152,7 +152,7 @@ def tolerance(
     *,
     samples: int = SAMPLES,
     until: float | None = None,
-    rung: StudyEngine = "auto",
+    fidelity: StudyEngine = "auto",
     tuned: bool = False,
     reached: bool = False,
     blamed: bool = True,
@@ -172,17 +172,16 @@ def tolerance(
     """How many boards show each response, under the spread of the model file.
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
-    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``verdicts.cross_check``
-    says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice`` about every board. tuned,
-    reached, blamed : whether these are wanted; a fitted trimmer is always asked for. blame_budget :
-    steps of the blame (``blame_replay``). maps : settings over which the yield is wanted
-    (``yield_maps.OVERS``). rare : whether boards are drawn where they are lost (``rare_losses``).
-    checked : of the same design, to save the time of the gate. pool : where
+    does not grow if None. fidelity : ``exact`` asks no ngspice, ``auto`` as
+    ``verdicts.cross_check`` says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice``
+    about every board. tuned, reached, blamed : whether these are wanted; a fitted trimmer is always
+    asked for. blame_budget : steps of the blame (``blame_replay``). maps : settings over which the
+    yield is wanted (``yield_maps.OVERS``). rare : whether boards are drawn where they are lost
+    (``rare_losses``). checked : of the same design, to save the time of the gate. pool : where
     ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
     to. runner : who computes blocks; this process if None. sampled : is given the study once the
     exact circuit has every board, before ngspice is asked. standing : is given the study once its
-    yields stand and the blame or maps are still to be
-    worked out.
+    yields stand and the blame or maps are still to be worked out.
     """
     need_responses(synthesis.modelfile)
     warm = None
@@ -197,7 +196,7 @@ def tolerance(
     if listed is not None and listed.labels:
         expected = "no list of measured boards, which are as many as there are"
         raise InputError(None, "--rare", "spread.measured", expected)
-    pool = None if rung == "exact" else pool
+    pool = None if fidelity == "exact" else pool
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     indices = tuple(i for i in range(len(checked)) if i not in left_out)
@@ -209,7 +208,7 @@ def tolerance(
         samples=samples,
         seed=seed,
     )
-    if rung == "bandwidth":
+    if fidelity == "bandwidth":
         progress.stage("nominal orbits with bandwidth")
         plan, left, gone = lagging_plan(plan, pool)
         left_out |= {indices[k]: reason for k, reason in gone.items()}
@@ -228,7 +227,7 @@ def tolerance(
         Stores() if stores is None else stores,
         layers.LocalRunner(jobs) if runner is None else runner,
         progress,
-        rung,
+        fidelity,
         blame_budget,
     )
     if until is None:

@@ -23,7 +23,7 @@ from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Resistor
 from designer.spread.spread import draw_many
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, rounded
 from designer.yields.bench_procedure import BITS, READINGS
 
@@ -144,7 +144,7 @@ def trimmed_answers(
     plan : of the circuit without the trimmer. progress : called once an answer.
     """
     boards, position = trimmed_boards(trim, plan, indices)
-    return exact_rung.of_boards(plan, boards, indices, jobs, progress), position
+    return exact_circuit.of_boards(plan, boards, indices, jobs, progress), position
 
 
 def trimmed_block(

@@ -44,7 +44,7 @@ from designer.paper.report_files import README, make_report, write_files
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
 from designer.verbs.search import VERB
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan
 from designer.yields import study_identity
 from designer.yields.blame_analysis import blame
@@ -170,7 +170,7 @@ def _searched(
         study = tolerance(
             synthesis,
             samples=boards,
-            rung="exact",
+            fidelity="exact",
             tuned=tuned,
             reached=True,
             blamed=False,
@@ -210,7 +210,7 @@ def _as_built(
 ) -> dict[str, Any]:
     """Yields, blame, limits, price and parts of a circuit."""
     step = progress.stage("boards as built", plan.samples * len(plan.questions))
-    answers = exact_rung.block(plan, range(plan.samples), jobs, step)
+    answers = exact_circuit.block(plan, range(plan.samples), jobs, step)
     some = replace(plan, samples=min(plan.samples, BLAMED))
     first = answers[: some.samples * len(plan.questions)]
     blamed = blame(some, first, jobs=jobs, progress=progress.stage("blame")).responses

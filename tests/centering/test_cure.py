@@ -48,7 +48,7 @@ from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.cure_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
-from designer.jobs import rung_choice
+from designer.jobs import fidelity_choice
 from designer.jobs.cure_job import CURE, FEWEST_LOST, STUDIES, cure, cure_into
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
@@ -56,7 +56,7 @@ from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.margins import Limit, Margin
 from designer.yields.rare_losses import unseen_share
@@ -343,7 +343,7 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
         fine = rng.random(8000) < 0.9
         return [_Row("ok" if fine[i] else "lost") for i in indices]
 
-    monkeypatch.setattr(exact_rung, "block", coin)
+    monkeypatch.setattr(exact_circuit, "block", coin)
     plan = bench_plans.plan(1, samples=8000)
     kept: dict[str, Any] = {}
     book = VerdictCache(save=kept.update)
@@ -483,7 +483,7 @@ def coins(
         fine = np.random.default_rng(plan.seed).random(max(8000, indices.stop)) < share
         return [_Row("ok" if fine[i] else "lost") for i in indices]
 
-    monkeypatch.setattr(exact_rung, "block", block)
+    monkeypatch.setattr(exact_circuit, "block", block)
 
 
 def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -638,13 +638,13 @@ class _Notes(Progress):
         raise _Stopped
 
 
-@pytest.mark.parametrize(("rung", "told"), [("auto", 0), ("ngspice", 1)])
+@pytest.mark.parametrize(("fidelity", "told"), [("auto", 0), ("ngspice", 1)])
 def test_a_trade_that_sends_every_board_to_ngspice_is_told(
-    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: StudyEngine, told: int
+    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fidelity: StudyEngine, told: int
 ) -> None:
     folder = Path(shutil.copytree(design, tmp_path / "design"))
-    choice = rung_choice.RungChoice(rung, "rung by trade.json: because")
-    monkeypatch.setattr(rung_choice, "choose", lambda _: choice)
+    choice = fidelity_choice.FidelityChoice(fidelity, "rung by trade.json: because")
+    monkeypatch.setattr(fidelity_choice, "choose", lambda _: choice)
     said = _Notes()
     with pytest.raises(_Stopped):
         cure_into(folder, target=0.99, progress=said)

@@ -17,7 +17,7 @@ from designer.circuit.board_modes import at_rest
 from designer.circuit.board_values import nominal_board
 from designer.spread.board_quantities import quantities
 from designer.spread.spread import draw_many
-from designer.verdicts.exact_rung import block
+from designer.verdicts.exact_circuit import block
 from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields import margins
 from designer.yields.margins import Limit, Margin

@@ -1,4 +1,5 @@
-"""Distances: the fit against the law that it assumes, and boards against the study's own rung."""
+"""Distances: the fit against the law that it assumes, and boards against the study's own
+fidelity."""
 
 from __future__ import annotations
 
@@ -34,9 +35,9 @@ def test_a_distance_is_found_again(distance: float) -> None:
 
 
 @given(st.lists(st.integers(0, 40), min_size=4, max_size=4), st.integers(0, 3), st.integers(1, 5))
-def test_more_boards_that_show_it_are_never_nearer(shown: list[int], rung: int, more: int) -> None:
+def test_more_boards_that_show_it_are_never_nearer(shown: list[int], place: int, more: int) -> None:
     better = list(shown)
-    better[rung] = min(better[rung] + more, 40)
+    better[place] = min(better[place] + more, 40)
     asked = (40,) * 4
     near = StretchCounts(LADDER, asked, tuple(shown)).distance
     assert StretchCounts(LADDER, asked, tuple(better)).distance >= near - 1e-3
@@ -50,7 +51,7 @@ def test_without_a_loss_it_is_finite() -> None:
 
 
 def test_the_boards_are_the_spread_s_stretched() -> None:
-    """The compiled shortcut counts what the study's rung, asked one by one, says."""
+    """The compiled shortcut counts what the study's fidelity, asked one by one, says."""
     synthesis, response = made(), made().model_responses[0]
     bench = ScaledBoards(synthesis.design, spread(), 5, COUNT)
     place = OperatingPoint(response.omega, response.b, response.orbit.start)

@@ -12,11 +12,11 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.centering import levers
 from designer.centering.bandwidth_check import BANDWIDTH
-from designer.centering.candidate import ALIKE, GAIN, Candidate, RungOutcome, better
+from designer.centering.candidate import ALIKE, GAIN, Candidate, FidelityOutcome, better
 from designer.centering.design_search import BOARDS, look, search
 from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
-from designer.centering.ngspice_check import RUNG, Agreement
+from designer.centering.ngspice_check import FIDELITY, Agreement
 from designer.centering.operating_points import Scored, score
 from designer.centering.response_windows import OperatingPoint, Stretch
 from designer.model import find_responses
@@ -194,7 +194,7 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     wanted = parse_model_file(LOW_BAND)
 
-    def checks_of(limit: float) -> list[RungOutcome]:
+    def checks_of(limit: float) -> list[FidelityOutcome]:
         def listen(
             bench: ScaledBoards,
             stands: Sequence[OperatingOrbit | None],
@@ -205,8 +205,8 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
             return (Agreement(16, 8 if fast else 15),) * len(stands)
 
         found = search(wanted, catalog(), listen=listen)
-        lagging = [h for h in found.checks if h.rung == BANDWIDTH]
-        checks = [h for h in found.checks if h.rung == RUNG]
+        lagging = [h for h in found.checks if h.fidelity == BANDWIDTH]
+        checks = [h for h in found.checks if h.fidelity == FIDELITY]
         assert all(h.stands for h in lagging)
         assert [h.frequency for h in lagging] == [h.frequency for h in checks]
         (kept,) = [h for h in checks if h.adopted]
@@ -240,7 +240,7 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     wanted = file(PLACE)
     fastest = [search(wanted, catalog()).synthesis.design.errors.scales.frequency(1.0)]
     found = search(wanted, catalog(), listen=listen)
-    assert [h.adopted for h in found.checks if h.rung == RUNG] == [True, False]
+    assert [h.adopted for h in found.checks if h.fidelity == FIDELITY] == [True, False]
 
 
 @pytest.mark.parametrize("bears_out", [True, False])
@@ -264,13 +264,13 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
 
     monkeypatch.setattr("designer.centering.design_search.LaggingBoards", lagging)
     found = search(parse_model_file(LOW_BAND), catalog(), listen=listen)
-    answers = [h.adopted for h in found.checks if h.rung == BANDWIDTH]
+    answers = [h.adopted for h in found.checks if h.fidelity == BANDWIDTH]
     if bears_out:
         assert answers == [False, False, True]
     else:  # the first of the best
         assert answers == [True] + [False] * (len(answers) - 1)
         assert len(answers) > 2
-    assert heard == [h.frequency for h in found.checks if h.rung == RUNG and h.adopted]
+    assert heard == [h.frequency for h in found.checks if h.fidelity == FIDELITY and h.adopted]
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:

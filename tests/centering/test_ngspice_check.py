@@ -88,7 +88,7 @@ def test_what_ngspice_says_is_counted(
     """ngspice is played: these answers."""
 
     def run_queries(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
-        assert all(q.subject.rung == "dynamic" for q in queries)
+        assert all(q.subject.fidelity == "dynamic" for q in queries)
         assert {q.expected for q in queries} == {"1-2-2"}
         return [
             NgspiceAnswer(UNDECIDED, either=a) if OR in a else NgspiceAnswer(a) for a in answers
@@ -130,7 +130,7 @@ def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         ways = iter([LONGEST] * near + [LONGEST + 1] * (16 - near))
         monkeypatch.setattr(
-            "designer.centering.ngspice_check.way_to_rung", lambda _, ways=ways: next(ways)
+            "designer.centering.ngspice_check.way_to_fidelity", lambda _, ways=ways: next(ways)
         )
         assert AgreementCheck(None, AnswerCache())(boards, [stand]) == (found,)  # type: ignore[arg-type]
 

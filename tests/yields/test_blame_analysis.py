@@ -23,7 +23,7 @@ from designer.model.distributions import Uniform
 from designer.model.response_table import Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
-from designer.verdicts.exact_rung import block
+from designer.verdicts.exact_circuit import block
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields import blame_replay
 from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
@@ -291,7 +291,7 @@ def test_the_margin_foretells_boards_it_has_not_seen() -> None:
     assert all(x.distance > 0.0 for x in found.limits)
 
 
-def test_the_worst_corner_is_tried_on_the_exact_rung() -> None:
+def test_the_worst_corner_is_tried_on_the_exact_circuit() -> None:
     corner = offsets_blamed().responses[0].corner
     assert corner is not None
     assert corner.corners == 32

@@ -28,7 +28,7 @@ from designer.folders import model_source, study_json
 from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
-from designer.verdicts import exact_rung, ngspice_runs
+from designer.verdicts import exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
 from designer.yields import layers, tolerance_study
@@ -218,9 +218,9 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     assert "boundary" in [s.name for s in both.strata]
 
 
-@pytest.mark.parametrize("rung", ["auto", "ngspice"])
+@pytest.mark.parametrize("fidelity", ["auto", "ngspice"])
 def test_boards_that_differ_are_explained_by_their_own_orbit(
-    rung: Any, monkeypatch: pytest.MonkeyPatch
+    fidelity: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
     one."""
@@ -243,7 +243,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), rung)
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), fidelity)
     study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
@@ -301,7 +301,7 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
     made: Any = SimpleNamespace(
         modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
     )
-    tolerance(made, samples=3, rung="exact", checked=(), progress=said)
+    tolerance(made, samples=3, fidelity="exact", checked=(), progress=said)
     assert len(notes) == (spread is not None)
     assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
@@ -399,7 +399,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def exact(home: Path) -> Path:
-    """A design folder with a study on the exact rung."""
+    """A design folder with a study on the exact circuit."""
     out = home / "exact"
     assert entry.status([*_words(home, out), "-q"]) == 0
     return out
@@ -421,7 +421,7 @@ def _files(folder: Path) -> dict[str, object]:
     return out
 
 
-def test_the_exact_rung_needs_no_ngspice(
+def test_the_exact_circuit_needs_no_ngspice(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """No program on the path, and a library that is not there."""
@@ -657,14 +657,14 @@ def test_a_deleted_folder_is_said_at_the_next_block(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    block = exact_rung.block
+    block = exact_circuit.block
 
     def deleted(plan: Any, indices: range, jobs: int, progress: Any) -> Any:
         rows = block(plan, indices, jobs, progress)
         shutil.rmtree(out)
         return rows
 
-    monkeypatch.setattr(exact_rung, "block", deleted)
+    monkeypatch.setattr(exact_circuit, "block", deleted)
     without_starts(monkeypatch)
     assert entry.status([*_words(home, out), "-q"]) == 2
     assert "the folder" in capfd.readouterr().err

@@ -1,4 +1,4 @@
-"""Which rung decides: by what ``designer trade`` measured of this design, else the usual one.
+"""Which fidelity decides: by what ``designer trade`` measured of this design, else the usual one.
 
 A study decides on the exact circuit and asks ngspice about some boards of each response, `LEAST` at
 least (``auto``). Where a trade has shown that the exact circuit's yield is further from ngspice's
@@ -20,8 +20,8 @@ from designer.base.design_folder import Folder
 from designer.base.guarded_reading import reading
 from designer.base.progress import Progress
 from designer.base.si_unit import drive_text
-from designer.fidelity.rung_errors import BOARD
-from designer.fidelity.rungs import CIRCUIT
+from designer.fidelity.fidelity_answers import CIRCUIT
+from designer.fidelity.fidelity_errors import BOARD
 from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
 
@@ -35,8 +35,8 @@ LEAST = 40
 
 
 @dataclass(frozen=True)
-class RungChoice:
-    """The rung that a study takes, and why."""
+class FidelityChoice:
+    """The fidelity that a study takes, and why."""
 
     rung: StudyEngine
     """Which engine decides a study."""
@@ -44,7 +44,7 @@ class RungChoice:
     """Why, in one line for people; "" where nothing was measured."""
 
 
-def choose(folder: Folder) -> RungChoice:
+def choose(folder: Folder) -> FidelityChoice:
     """By the folder's ``trade.json``, if its stage is complete, else by what its search has kept of
     an earlier one; else ``auto``.
 
@@ -59,10 +59,10 @@ def choose(folder: Folder) -> RungChoice:
         return _read(
             folder, SEARCH, "trade", partial(_of_search, stages["design"].inputs.get("model"))
         )
-    return RungChoice("auto", "")
+    return FidelityChoice("auto", "")
 
 
-def before_search(folder: Folder, model: str) -> RungChoice | None:
+def before_search(folder: Folder, model: str) -> FidelityChoice | None:
     """What a trade says here, if it is of the model file with this hash; None without one.
 
     To be asked before a search touches the folder.
@@ -71,12 +71,12 @@ def before_search(folder: Folder, model: str) -> RungChoice | None:
     of = [stages[name].inputs.get("model") for name in ("design", "search") if name in stages]
     if "search" in stages and not stages["search"].complete:
         return None  # whose the design is cannot be told
-    choice = choose(folder) if model in of else RungChoice("auto", "")
+    choice = choose(folder) if model in of else FidelityChoice("auto", "")
     return choice if choice.reason else None
 
 
 def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEngine:
-    """The rung of the study at the end of a search, and a note of why. ``exact`` stands for "as
+    """The fidelity of the study at the end of a search, and a note of why. ``exact`` stands for "as
     usual": the search's confirmation asks ngspice about `LEAST` boards of each response."""
     if options.rung != "auto":
         return options.rung
@@ -89,8 +89,9 @@ def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEng
     return "ngspice" if choice.rung == "ngspice" else "exact"
 
 
-def with_rung(folder: Folder, options: Options, progress: Progress) -> Options:
-    """The options with a rung in place of "auto", and a note of why; a stated rung stays."""
+def with_fidelity(folder: Folder, options: Options, progress: Progress) -> Options:
+    """The options with a fidelity in place of "auto", and a note of why; a stated fidelity
+    stays."""
     if options.rung != "auto":
         return options
     choice = choose(folder)
@@ -100,41 +101,41 @@ def with_rung(folder: Folder, options: Options, progress: Progress) -> Options:
 
 
 def _read(
-    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], RungChoice]
-) -> RungChoice:
+    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], FidelityChoice]
+) -> FidelityChoice:
     document = folder.json(name)
     with reading(folder / name, f"what {name.removesuffix('.json')} wrote", key):
         return choice(document)
 
 
-def _of_search(model: object, search: Mapping[str, Any]) -> RungChoice:
+def _of_search(model: object, search: Mapping[str, Any]) -> FidelityChoice:
     """model : hash of the design's model file, which is another where somebody replaced it."""
     trade = search.get("trade")
     if trade is None or trade["model"] != model:
-        return RungChoice("auto", "")
+        return FidelityChoice("auto", "")
     if trade["rung"] not in STUDY_ENGINES:
         raise ValueError(trade["rung"])
     reason = str(trade["reason"]).removesuffix(EARLIER)
-    return RungChoice(trade["rung"], f"{reason}{EARLIER}")
+    return FidelityChoice(trade["rung"], f"{reason}{EARLIER}")
 
 
-def _of_trade(trade: Mapping[str, Any]) -> RungChoice:
+def _of_trade(trade: Mapping[str, Any]) -> FidelityChoice:
     shares = [c for c in trade["cheapest"] if c["question"] == SHARE]
     if not shares:
         reasons = dict.fromkeys(f"{_response(r)}: {r['reason']}" for r in trade["left_out"])
         why = f" ({'; '.join(reasons)})" if reasons else ""
         reason = f"rung by trade.json: it asked no boards{why}, so as usual"
-        return RungChoice("auto", reason + _warning(trade, CIRCUIT))
+        return FidelityChoice("auto", reason + _warning(trade, CIRCUIT))
     overall = shares[-1]  # of all responses, or of the only one
     if overall["rung"] == CIRCUIT:
         note = f"; {overall['note']}" if overall.get("note") else ""
         error = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
-        return RungChoice(
+        return FidelityChoice(
             "auto",
             f"rung by trade.json: the exact circuit decides, {error}; ngspice is asked about "
             f"{LEAST} boards of each response at least{_warning(trade, CIRCUIT)}",
         )
-    return RungChoice(
+    return FidelityChoice(
         "ngspice",
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
         f"than {100.0 * overall['bound']:g} %{_warning(trade, 'ideal')}",
@@ -142,7 +143,7 @@ def _of_trade(trade: Mapping[str, Any]) -> RungChoice:
 
 
 def _warning(trade: Mapping[str, Any], decides: str) -> str:
-    """Where the rung that decides is not shown to have the nominal board's n-p-q."""
+    """Where the fidelity that decides is not shown to have the nominal board's n-p-q."""
     wrong = []
     for truth in trade["truths"]:
         right = any(

@@ -1,4 +1,4 @@
-"""Whole boards on the finer rungs: they run, and show what the exact circuit shows."""
+"""Whole boards on the finer fidelities: they run, and show what the exact circuit shows."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from designer.spice.numerics_gate import (
     job,
     shortest_contact,
 )
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
-from designer.verdicts.exact_rung import images, waveform_error
+from designer.verdicts.exact_circuit import images, waveform_error
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.paper_cases import OMEGA, subject as exact_parts, synthesised
 from tests.shared.stages import PAPER, stage
 from tests.spice.test_rectifier_ngspice import SCALED
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-finer = pytest.mark.parametrize("rung", ["dynamic", "full"])
+finer = pytest.mark.parametrize("fidelity", ["dynamic", "full"])
 
 
 @cache
@@ -64,14 +64,20 @@ def paper() -> dict[float, GateSubject]:
     }
 
 
-def run(subject: GateSubject, rung: Rung, steps: int, periods: int) -> Read:
+def run(subject: GateSubject, fidelity: Fidelity, steps: int, periods: int) -> Read:
     """That many periods from the orbit of the exact circuit; the last ones are read."""
     settings = SolverSettings("trap", subject.period / steps)
-    asked = job(replace(subject, rung=rung), settings)
+    asked = job(replace(subject, fidelity=fidelity), settings)
     text = deck.write(
-        subject.circuit, subject.board, subject.excitation, settings,
-        title="a rung", stop_time=periods * subject.period, initial=subject.orbit.start, rung=rung,
-    )  # fmt: skip
+        subject.circuit,
+        subject.board,
+        subject.excitation,
+        settings,
+        title="a fidelity",
+        stop_time=periods * subject.period,
+        initial=subject.orbit.start,
+        fidelity=fidelity,
+    )
     check_netlist(text)
     waves = open_simulator("shared").run(text, asked.signals, periods * subject.period)
     reading = replace(asked.reduce.keywords["reading"], discard=periods - 6)  # type: ignore[attr-defined]
@@ -81,7 +87,7 @@ def run(subject: GateSubject, rung: Rung, steps: int, periods: int) -> Read:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("rung", "omega", "steps", "periods", "response"),
+    ("fidelity", "omega", "steps", "periods", "response"),
     [
         ("dynamic", 1.55, 200, 12, "1-1-1"),
         ("dynamic", 0.54, 1000, 10, "1-3-3"),
@@ -92,7 +98,7 @@ def run(subject: GateSubject, rung: Rung, steps: int, periods: int) -> Read:
     ],
 )
 def test_the_paper_s_board(
-    rung: Rung, omega: float, steps: int, periods: int, response: str
+    fidelity: Fidelity, omega: float, steps: int, periods: int, response: str
 ) -> None:
     """The same n-p-q, and strobes near those of the exact circuit.
 
@@ -100,18 +106,18 @@ def test_the_paper_s_board(
     on ``full``, where U3C's limit follows its load and takes the clearance along.
     """
     subject = paper()[omega]
-    read = run(subject, rung, steps, periods)
+    read = run(subject, fidelity, steps, periods)
     assert read.orbit.response == subject.orbit.response == response
     peak = np.abs(subject.orbit.extremes).max(axis=1)
     away = np.abs(read.strobes[-1] - subject.orbit.start) / peak
-    assert away.max() < {"dynamic": 0.03, "full": 0.10}[rung]
+    assert away.max() < {"dynamic": 0.03, "full": 0.10}[fidelity]
 
 
 @pytest.mark.slow
 def test_the_clearance_on_full_is_the_exact_circuit_s() -> None:
     """U3C's own output, of which the reading knows nothing, has sixteen stretches at the stated
     13 V in a period of 1-8-8, whose last rebounds leave contact by less than 2 % of it."""
-    subject = replace(paper()[0.215], rung="full", discard=14)
+    subject = replace(paper()[0.215], fidelity="full", discard=14)
     asked = job(subject, SolverSettings("trap", subject.period / 3000.0, 1e-5))
     text = asked.netlist.replace(".save ", ".save v(w2) ")
     waves = open_simulator("shared").run(text, [*asked.signals, "w2"], asked.stop)
@@ -128,7 +134,7 @@ def test_the_clearance_on_full_is_the_exact_circuit_s() -> None:
 def test_the_exact_circuit_with_bandwidth_is_full_s(omega: float, bound: float) -> None:
     """The waveform of ``full`` at a fine step; without the bandwidth it is ten times further."""
     nominal = paper()[omega]
-    subject = replace(nominal, rung="full", discard=12)
+    subject = replace(nominal, fidelity="full", discard=12)
     steps = 2 * first_steps(
         nominal, shortest_contact(nominal.orbit, nominal.system, nominal.excitation)
     )
@@ -175,7 +181,7 @@ def test_bandwidth_changes_the_count_near_grazing(omega: float, slow: str, fast:
             GateSubject(
                 Reduction(near.circuit, replace(near.board, gain_bandwidth=dict.fromkeys(
                     (s.name for s in near.circuit.sections), bandwidth))),
-                Excitation(omega * frequency, volts), orbit, discard=60, rung="dynamic",
+                Excitation(omega * frequency, volts), orbit, discard=60, fidelity="dynamic",
             ),
             SolverSettings(method, 1.0 / (omega * frequency) / steps, RELTOL),
         )
@@ -189,8 +195,9 @@ def test_bandwidth_changes_the_count_near_grazing(omega: float, slow: str, fast:
 
 
 @finer
-def test_a_rectifier_board(rung: Rung) -> None:
-    """Diodes, references and op-amps of the rung together: n-p-q, strobes within 2 % of the peak.
+def test_a_rectifier_board(fidelity: Fidelity) -> None:
+    """Diodes, references and op-amps of the fidelity together: n-p-q, strobes within 2 % of the
+    peak.
 
     No limit takes part in its dead zone, so that ``full`` is no further away than ``dynamic``.
     """
@@ -204,7 +211,7 @@ def test_a_rectifier_board(rung: Rung) -> None:
     )
     model = settle(Flow(wanted.piecewise_linear(), Drive(1.55)), np.zeros(4))
     subject = GateSubject(reduction, excitation, settle(flow, model.start * errors.scales.volts))
-    read = run(subject, rung, 200, 10)
+    read = run(subject, fidelity, 200, 10)
     assert read.orbit.response == subject.orbit.response == "1-1-1"
     peak = np.abs(subject.orbit.extremes).max(axis=1)
     assert (np.abs(read.strobes[-1] - subject.orbit.start) < 0.02 * peak).all()
@@ -213,7 +220,7 @@ def test_a_rectifier_board(rung: Rung) -> None:
 @finer
 @pytest.mark.parametrize("name", [o.name for o in load_catalog().opamps if o.rated_supply == 15.0])
 @pytest.mark.parametrize("method", ["trap", "gear"])
-def test_boards_with_offsets_run(rung: Rung, name: str, method: str) -> None:
+def test_boards_with_offsets_run(fidelity: Fidelity, name: str, method: str) -> None:
     """Every op-amp: 10 mV offsets, unequal limits, from rest and from far off the orbit.
 
     An XSPICE limiter whose limits meet while the supplies are still at zero fails here.
@@ -224,7 +231,7 @@ def test_boards_with_offsets_run(rung: Rung, name: str, method: str) -> None:
         board = draw(circuit, Spread(0.01, 0.05, 5e-3, 10e-3), 4, index)
         text = deck.write(
             circuit, board, excitation, SolverSettings(method, 1 / 400 / 200),
-            title="offsets", stop_time=2 / 400, initial=start, rung=rung,
+            title="offsets", stop_time=2 / 400, initial=start, fidelity=fidelity,
         )  # fmt: skip
         waves = open_simulator("shared").run(text, circuit.state_nets, 2 / 400)
         assert np.abs(waves.signals["v1"]).max() > 0.05
@@ -233,7 +240,7 @@ def test_boards_with_offsets_run(rung: Rung, name: str, method: str) -> None:
 @pytest.mark.slow
 def test_a_board_for_low_rails() -> None:
     """The paper's case on ± 2.5 V with the cheap op-amp: a threshold that uses its swing, parts
-    that match, and the wanted response in ngspice on the finest rung."""
+    that match, and the wanted response in ngspice at the finest fidelity."""
     text = (EXAMPLES / "paper.toml").read_text(encoding="utf-8")
     text = text.replace('"TL074C"', '"MCP6004"').replace("supply = 15.0", "supply = 2.5")
     text = "\n".join(line for line in text.splitlines() if not line.startswith("saturation"))

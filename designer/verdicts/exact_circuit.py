@@ -1,4 +1,4 @@
-"""A block of boards on the exact circuit rung: every question, from its nominal orbit."""
+"""A block of boards on the exact circuit: every question, from its nominal orbit."""
 
 from __future__ import annotations
 

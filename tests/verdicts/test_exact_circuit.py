@@ -1,4 +1,5 @@
-"""The exact rung of a study: waveform errors against an independent integration, twins, bytes."""
+"""The exact circuit of a study: waveform errors against an independent integration, twins,
+bytes."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.kernels.kernel_boards import POINTS
 from designer.spread.spread import draw, draw_many
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from tests.circuit.test_ensemble import FEW, STAGES, nominal
 from tests.verdicts.test_verdict import plan
 
@@ -53,7 +54,7 @@ def test_waveform_error_is_that_of_an_independent_integration(kind: str) -> None
     shown = integrated(board, drive, found.orbit.start, 1)
     truth = float(np.sqrt(np.mean((shown - wanted) ** 2)) / np.abs(wanted).max())
     nominal_trace = displacement(Flow(system, drive), orbit)
-    got = exact_rung.waveform_error(found.trace, exact_rung.images(nominal_trace))
+    got = exact_circuit.waveform_error(found.trace, exact_circuit.images(nominal_trace))
     assert truth > 1e-3, "the test wants a difference"
     assert got == pytest.approx(truth, rel=1e-4)
 
@@ -62,26 +63,26 @@ def test_waveform_error_forgives_whole_periods_and_the_twin() -> None:
     t = np.arange(3 * POINTS) / POINTS
     wanted = np.sin(2 * np.pi * t) + 0.3 * np.cos(2 * np.pi * t / 3) + 0.1
     peak = float(np.abs(wanted).max())
-    plain, both = exact_rung.images(wanted), exact_rung.images(wanted, mirror=True)
-    assert exact_rung.waveform_error(np.roll(wanted, 2 * POINTS), plain) == pytest.approx(
+    plain, both = exact_circuit.images(wanted), exact_circuit.images(wanted, mirror=True)
+    assert exact_circuit.waveform_error(np.roll(wanted, 2 * POINTS), plain) == pytest.approx(
         0.0, abs=1e-12
     )
-    assert exact_rung.waveform_error(wanted + 0.01, plain) == pytest.approx(0.01 / peak)
+    assert exact_circuit.waveform_error(wanted + 0.01, plain) == pytest.approx(0.01 / peak)
     # The twin: mirrored, and half a drive period on.
     twin = -np.roll(wanted, POINTS // 2)
-    assert exact_rung.waveform_error(twin, plain) > 0.1
-    assert exact_rung.waveform_error(twin, both) == pytest.approx(0.0, abs=1e-12)
-    assert exact_rung.waveform_error(np.roll(twin, POINTS), both) < 1e-12
-    assert np.isnan(exact_rung.waveform_error(wanted[:POINTS], plain))
+    assert exact_circuit.waveform_error(twin, plain) > 0.1
+    assert exact_circuit.waveform_error(twin, both) == pytest.approx(0.0, abs=1e-12)
+    assert exact_circuit.waveform_error(np.roll(twin, POINTS), both) < 1e-12
+    assert np.isnan(exact_circuit.waveform_error(wanted[:POINTS], plain))
 
 
 def test_answers_do_not_depend_on_the_block() -> None:
     p = replace(plan(), samples=60)
-    whole = exact_rung.block(p, range(60), 2)
+    whole = exact_circuit.block(p, range(60), 2)
     parts = [
         a
         for first, last in ((0, 1), (1, 37), (37, 60))
-        for a in exact_rung.block(p, range(first, last), 1)
+        for a in exact_circuit.block(p, range(first, last), 1)
     ]
     assert [repr(a) for a in whole] == [repr(a) for a in parts]
     assert any(np.isfinite(a.waveform) for a in whole)
@@ -90,8 +91,8 @@ def test_answers_do_not_depend_on_the_block() -> None:
 def test_boards_with_bandwidth_are_judged_as_each_alone() -> None:
     """From the nominal orbit without bandwidth; the verdict by the same rule."""
     asked = plan(2)
-    answers = exact_rung.block(replace(asked, bandwidth=True), range(2), 1)
-    without = exact_rung.block(asked, range(2), 1)
+    answers = exact_circuit.block(replace(asked, bandwidth=True), range(2), 1)
+    without = exact_circuit.block(asked, range(2), 1)
     for answer in answers:
         board = draw(asked.circuit, asked.spread, asked.seed, answer.sample)
         system = Reduction(asked.circuit, board, bandwidth=True).system()

@@ -1,6 +1,6 @@
-"""Every rung's answer on one response beside the two truths: n-p-q, waveform, impact speeds.
+"""Every fidelity's answer on one response beside the two truths: n-p-q, waveform, impact speeds.
 
-``board``: the nominal circuit on the rung ``full`` at its finest step. ``equations``: the exact
+``board``: the nominal circuit at the fidelity ``full`` at its finest step. ``equations``: the exact
 flow of the model. What follows from the differences is for ``fidelity.trade_study`` to say.
 """
 
@@ -15,27 +15,27 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
+from designer.fidelity.fidelity_answers import CIRCUIT, MODEL, RK4, TOP, FidelityAnswer, Truths
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer, Truths
-from designer.verdicts.exact_rung import images, waveform_error
+from designer.verdicts.exact_circuit import images, waveform_error
 
 BOARD, EQUATIONS = "board", "equations"
 
 
 @dataclass(frozen=True)
-class RungError:
-    """One rung at one setting on one response."""
+class FidelityError:
+    """One fidelity at one setting on one response."""
 
     label: ResponseLabel
     """The response that it is about."""
     rung: str
-    """Name of the rung."""
+    """Name of the fidelity."""
     level: str
     """Name of the setting, alike for all responses."""
     settings: Mapping[str, Any]
     """Settings of the solver."""
     response: str
-    """n-p-q or status that the rung shows."""
+    """n-p-q or status that the fidelity shows."""
     reason: str
     """Why there is no answer, or ""."""
     seconds: float
@@ -50,11 +50,11 @@ class RungError:
     """Largest relative difference of an impact's velocity, by truth; nan where it does not
     apply."""
     numerical: float
-    """Error against the exact flow of the rung's own equations; nan where there is none."""
+    """Error against the exact flow of the fidelity's own equations; nan where there is none."""
     convergence: float
-    """RMS difference of x1 from the rung's own finest run, over its peak, where that is all there
-    is to compare it with: of the truth's rung, and of rungs whose equations have no exact flow. It
-    is no error against anything else."""
+    """RMS difference of x1 from the fidelity's own finest run, over its peak, where that is all
+    there is to compare it with: of the truth's fidelity, and of fidelities whose equations have no
+    exact flow. It is no error against anything else."""
 
 
 @dataclass(frozen=True)
@@ -76,20 +76,20 @@ class Truth:
     impacts: Mapping[str, bool]
     """Whether it has a period and any impacts in it, by truth."""
     rung: str = TOP
-    """The rung that stands for the board."""
+    """The fidelity that stands for the board."""
 
-    def is_itself(self, rung: str, of: str) -> bool:
-        """Whether a rung is measured against itself."""
-        return rung == (self.rung if of == BOARD else MODEL)
+    def is_itself(self, fidelity: str, of: str) -> bool:
+        """Whether a fidelity is measured against itself."""
+        return fidelity == (self.rung if of == BOARD else MODEL)
 
 
 def compare(
-    label: ResponseLabel, some: Sequence[RungAnswer], truth: Truths = TOP
-) -> tuple[tuple[RungError, ...], Truth]:
-    """The answers to one response beside both truths, and the board's. truth : the rung that stands
-    for the board."""
-    exact = next(a for a in some if a.rung == MODEL)
-    top = [a for a in some if a.rung == truth]
+    label: ResponseLabel, some: Sequence[FidelityAnswer], truth: Truths = TOP
+) -> tuple[tuple[FidelityError, ...], Truth]:
+    """The answers to one response beside both truths, and the board's. truth : the fidelity that
+    stands for the board."""
+    exact = next(a for a in some if a.fidelity == MODEL)
+    top = [a for a in some if a.fidelity == truth]
     if len(top) < 2:  # without a run nothing is sure
         last, drawn = Orbit(OrbitStatus.FAILED), np.zeros(0)
         sure, error, velocity = False, math.nan, math.nan
@@ -99,9 +99,9 @@ def compare(
         error, velocity = _waveform(top[-2].shown, drawn), difference(top[-2].orbit, last)
     against = {BOARD: (last, drawn), EQUATIONS: (exact.orbit, exact.shown)}
     rows = tuple(
-        RungError(
+        FidelityError(
             label,
-            a.rung,
+            a.fidelity,
             a.level,
             a.settings,
             a.orbit.response,
@@ -154,10 +154,10 @@ def alike(first: Orbit, second: Orbit) -> bool:
     return first.counts.family == second.counts.family
 
 
-def _numerical(answer: RungAnswer, some: Sequence[RungAnswer]) -> tuple[float, float]:
+def _numerical(answer: FidelityAnswer, some: Sequence[FidelityAnswer]) -> tuple[float, float]:
     """Error against the exact flow of the same equations, and convergence where there is none."""
-    exact = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.rung)
-    finest = [a for a in some if a.rung == (exact or answer.rung)][-1]
+    exact = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.fidelity)
+    finest = [a for a in some if a.fidelity == (exact or answer.fidelity)][-1]
     apart = math.nan if finest is answer else _waveform(answer.shown, finest.shown)
     return (apart, math.nan) if exact else (math.nan, apart)
 

@@ -1,7 +1,7 @@
-"""Every rung on one response of a design: its answer at several steps, and what a period costs.
+"""Every fidelity on one response of a design: its answer at several steps, and what a period costs.
 
-The rungs, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and the
-exact flow), the nominal circuit by the exact flow, the same with a bandwidth, and ngspice with
+The fidelities, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and
+the exact flow), the nominal circuit by the exact flow, the same with a bandwidth, and ngspice with
 ideal op-amps, with bandwidth and slew (``dynamic``), with a macromodel (``full``). The largest step
 of ngspice is a fraction of the period that follows the shortest contact
 (``numerics_gate.first_steps``): "step ×1, reltol 1e-05" is what the numerics gate tries first,
@@ -41,7 +41,7 @@ from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import RUNGS as SPICE_RUNGS
+from designer.spice.opamp_model import FIDELITIES as SPICE_FIDELITIES
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, clearance_rows, name_in_ngspice, read
 from designer.spice.simulator import SimulationFailed, Waveforms
@@ -49,9 +49,9 @@ from designer.spice.simulator import SimulationFailed, Waveforms
 Run = Read | SimulationFailed
 
 RK4, MODEL, CIRCUIT, BANDWIDTH = "rk4", "model", "circuit", "bandwidth"
-RUNGS = (RK4, MODEL, CIRCUIT, BANDWIDTH, *SPICE_RUNGS, "vendor")
+FIDELITIES = (RK4, MODEL, CIRCUIT, BANDWIDTH, *SPICE_FIDELITIES, "vendor")
 TOP: Final = "full"
-"""The most faithful rung of our own models."""
+"""The most faithful fidelity of our own models."""
 VENDOR: Final = "vendor"
 """A vendor's macromodel, which the catalogue names: the truth where the user asks for it."""
 Truths = Literal["full", "vendor"]
@@ -70,11 +70,11 @@ BASELINE = 4
 
 
 @dataclass(frozen=True)
-class RungAnswer:
-    """What one rung at one setting says of a response."""
+class FidelityAnswer:
+    """What one fidelity at one setting says of a response."""
 
-    rung: str
-    """Name of the rung."""
+    fidelity: str
+    """Name of the fidelity."""
     level: str
     """Name of the setting, alike for all responses."""
     settings: dict[str, Any]
@@ -88,19 +88,19 @@ class RungAnswer:
     reason: str = ""
     """Why there is no answer."""
     gate: bool | None = None
-    """Whether ngspice's setting passed the numerics gate; None of other rungs."""
+    """Whether ngspice's setting passed the numerics gate; None of other fidelities."""
 
 
 @dataclass(frozen=True)
-class RungAnswers:
-    """A response on every rung."""
+class FidelityAnswers:
+    """A response at every fidelity."""
 
     response: ModelResponse
     """The response, and what the model shows."""
     subject: GateSubject
     """The nominal circuit at the response."""
-    answers: tuple[RungAnswer, ...]
-    """What each rung says of it."""
+    answers: tuple[FidelityAnswer, ...]
+    """What each fidelity says of it."""
     settings: SolverSettings | None
     """Settings of ngspice with ideal op-amps that pass the gate; None where none do."""
     seconds: float
@@ -134,8 +134,8 @@ def measured(
     levels: Sequence[tuple[float, float]] = LEVELS,
     rounds_: int = ROUNDS,
     truth: Truths = TOP,
-) -> RungAnswers:
-    """What every rung says of a response of the design, and what it costs.
+) -> FidelityAnswers:
+    """What every fidelity says of a response of the design, and what it costs.
 
     truth : "vendor" asks the vendor's macromodel too, which the op-amp then has to have.
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
@@ -155,10 +155,10 @@ def measured(
         replace(answer, seconds=s)
         for (answer, _), s in zip(entries, seconds[: len(entries)], strict=True)
     )
-    return RungAnswers(r, one, answers, settings, seconds[-1] if settings else float("nan"))
+    return FidelityAnswers(r, one, answers, settings, seconds[-1] if settings else float("nan"))
 
 
-def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
+def _exact(asked: _Asked) -> Iterator[tuple[FidelityAnswer, Entrant]]:
     """Runge-Kutta at its steps, and the exact flows."""
     r, model, omega = asked.response, asked.model, asked.response.omega
     flow = model_flow(model, omega)
@@ -166,7 +166,7 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
     stepper = _stepper(model)
     for step in STEPS:
         steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
-        answer = RungAnswer(
+        answer = FidelityAnswer(
             RK4,
             f"Δt = {step:g}",
             {"steps_a_period": steps},
@@ -177,7 +177,7 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
             here(RK4, lambda n, s=steps: stepper.run(omega, start, n, s), BASELINE),  # type: ignore[misc]
         )
     yield (
-        RungAnswer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
+        FidelityAnswer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
         here(MODEL, lambda n: flow.run(start, n), BASELINE),
     )
     subject = asked.subject
@@ -187,14 +187,16 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
         yield _of_circuit(BANDWIDTH, _lagging_flow(subject), _lagging_orbit(subject), asked)
 
 
-def _of_circuit(rung: str, flow: Flow, orbit: Orbit, asked: _Asked) -> tuple[RungAnswer, Entrant]:
+def _of_circuit(
+    fidelity: str, flow: Flow, orbit: Orbit, asked: _Asked
+) -> tuple[FidelityAnswer, Entrant]:
     """The exact flow of the nominal circuit, and its orbit in volts."""
     begin = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
     volts = float(asked.volts[flow.system.moving])
-    answer = RungAnswer(
-        rung, "exact", {}, _in_model_units(orbit, asked), _drawn(flow, orbit, volts)
+    answer = FidelityAnswer(
+        fidelity, "exact", {}, _in_model_units(orbit, asked), _drawn(flow, orbit, volts)
     )
-    return answer, here(rung, lambda n: flow.run(begin, n), BASELINE)
+    return answer, here(fidelity, lambda n: flow.run(begin, n), BASELINE)
 
 
 @dataclass(frozen=True)
@@ -237,7 +239,7 @@ def _runge_kutta(
 
 
 def in_ngspice(subject: GateSubject, truth: Truths) -> dict[str, GateSubject]:
-    """The subject on every rung of ngspice, by name; with the vendor's macromodel as the truth,
+    """The subject at every fidelity of ngspice, by name; with the vendor's macromodel as the truth,
     ``full`` is the one from the data sheet's figures. Those above ``ideal`` start on the orbit with
     bandwidth, from which the way is shorter."""
     figures, near = subject.circuit.figures, replace(subject, start=_lagging_start(subject))
@@ -245,9 +247,9 @@ def in_ngspice(subject: GateSubject, truth: Truths) -> dict[str, GateSubject]:
     if truth == VENDOR and figures is not None:
         plain = replace(subject.circuit, figures=replace(figures, spice=None))
         full = replace(near, reduction=Reduction(plain, subject.board))
-    on = {str(rung): replace(full, rung=rung) for rung in SPICE_RUNGS}
+    on = {str(fidelity): replace(full, fidelity=fidelity) for fidelity in SPICE_FIDELITIES}
     on["ideal"] = replace(on["ideal"], start=subject.start)
-    return on | ({VENDOR: replace(near, rung=TOP)} if truth == VENDOR else {})
+    return on | ({VENDOR: replace(near, fidelity=TOP)} if truth == VENDOR else {})
 
 
 def _spice(
@@ -256,7 +258,7 @@ def _spice(
     clock: SpiceClock,
     levels: Sequence[tuple[float, float]],
     truth: Truths,
-) -> Iterator[tuple[RungAnswer, Entrant]]:
+) -> Iterator[tuple[FidelityAnswer, Entrant]]:
     subject = asked.subject
     if not len(subject.orbit.start):
         return
@@ -295,7 +297,7 @@ def _spice(
                 moving = one.system.moving
                 shown = _traced(run, float(asked.volts[moving]), moving)
             yield (
-                RungAnswer(
+                FidelityAnswer(
                     name, names[k], described, orbit, shown, reason=orbit.reason, gate=passed
                 ),
                 entrant,
@@ -336,7 +338,7 @@ def _timed(subject: GateSubject, settings: SolverSettings, clock: SpiceClock) ->
     """A short run from the orbit, for its time."""
     least = TIMED - 4 * (subject.orbit.n or MAX_PERIOD)
     short = replace(subject, discard=max(least, 0))
-    return clock.entrant(subject.rung, gate.job(short, settings), gate.length(short))
+    return clock.entrant(subject.fidelity, gate.job(short, settings), gate.length(short))
 
 
 def _in_model_units(orbit: Orbit, asked: _Asked) -> Orbit:
@@ -370,8 +372,8 @@ def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
     """Whether the run of a setting, which has its trace, and those of its ``companions`` agree, as
     in ``spice.numerics_gate``.
 
-    Above ideal op-amps the n-p-q is the rung's own: whether it is the exact circuit's is what a
-    trade measures. subject : on its rung.
+    Above ideal op-amps the n-p-q is the fidelity's own: whether it is the exact circuit's is what a
+    trade measures. subject : at its fidelity.
     """
     read = [run for run in (own, *beside) if isinstance(run, Read)]
     if len(read) < 3 or isinstance(own, SimulationFailed):
@@ -381,7 +383,7 @@ def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
         return False
     if len({run.orbit.response for run in read}) > 1:
         return False
-    ideal = subject.rung == "ideal"
+    ideal = subject.fidelity == "ideal"
     if ideal and orbit.response != name_in_ngspice(exact.response):
         return False
     if orbit.status is not OrbitStatus.PERIODIC:
