@@ -96,7 +96,7 @@ def measure(file: ModelFile, samples: int = SAMPLES) -> tuple[list[Row], list[Di
     made = synthesise(file)
     with SpicePool(cores(), timeout=SPICE_TIMEOUT) as pool:
         study = tolerance(
-            made, samples=samples, fidelity="ngspice", blamed=False, seed=SEED, pool=pool
+            made, samples=samples, fidelity="ngspice", attributed=False, seed=SEED, pool=pool
         )
         found = [d for index in study.response_indices for d in _differences(study, index, pool)]
     return [_row(study, index, found) for index in study.response_indices], found

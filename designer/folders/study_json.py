@@ -85,7 +85,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "tuned": tuned_json(study.rows_of(index, study.tuned), study.plan.census),
         "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
         "reached": _reached(study, index),
-        "blame": _blame(study, index),
+        "blame": _attribution(study, index),
         **({"rare": _rare(study, index)} if study.rare else {}),
         "trust": {
             **{engine: trust.verdict() for engine, trust in checked.trust.items()},
@@ -166,11 +166,13 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
     }
 
 
-def _blame(study: Study, index: int) -> dict[str, Any] | None:
+def _attribution(study: Study, index: int) -> dict[str, Any] | None:
     if study.blame is None or index not in study.response_indices:
         return None
-    blame: dict[str, Any] = study.blame.as_dict()["responses"][study.response_indices.index(index)]
-    return blame
+    attribution: dict[str, Any] = study.blame.as_dict()["responses"][
+        study.response_indices.index(index)
+    ]
+    return attribution
 
 
 def _rare(study: Study, index: int) -> dict[str, Any] | None:

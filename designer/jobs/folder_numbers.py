@@ -18,7 +18,7 @@ from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST, StageName
 from designer.base.schema import literal
 from designer.jobs.options import Options
-from designer.jobs.study_layers import blame_budget, blamed
+from designer.jobs.study_layers import attributed, attribution_budget
 from designer.model.model_file import ModelFile
 
 FIDELITY = "rung"
@@ -140,7 +140,7 @@ def _with(options: Options, numbers: dict[str, Any], words: Mapping[str, Any]) -
     """The options with these numbers of the folder, where ``words`` states none."""
     layers = numbers.pop("layers", None)
     if layers is not None:
-        numbers |= {"blame": blamed(layers), "blame_budget": blame_budget(layers)}
+        numbers |= {"blame": attributed(layers), "blame_budget": attribution_budget(layers)}
         if "ngspice" not in layers and FIDELITY not in numbers:
             numbers["rung"] = "exact"
     options = replace(options, **{k: v for k, v in numbers.items() if words.get(k, k) is None})

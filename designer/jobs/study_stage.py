@@ -36,9 +36,9 @@ from designer.spice import equation_check
 from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
-from designer.yields.blame_analysis import BlameStage
-from designer.yields.blame_replay import BUDGET
 from designer.yields.layers import LocalRunner, Runner
+from designer.yields.loss_attribution import AttributionStage
+from designer.yields.loss_replay import BUDGET
 from designer.yields.study import RunResult, Study
 from designer.yields.study_identity import RULES, checks_hash
 from designer.yields.tolerance_study import Stores, check, tolerance
@@ -172,7 +172,7 @@ class StudyStage:
             place.cache(folder, self.progress.note, PIECES),
             place.prefix,
             folder.vouches,
-            noise=options.blame_anew,
+            noise=options.attribution_anew,
         )
 
         def result_of(study: Study) -> RunResult:
@@ -211,7 +211,7 @@ class StudyStage:
         self._write(result)
         assert folder.manifest is not None
         folder.manifest.provenance = result.provenance
-        if study.blame_status.stage is not BlameStage.PART:
+        if study.blame_status.stage is not AttributionStage.PART:
             (folder / (place.prefix + PIECES)).unlink(missing_ok=True)
         folder.finish(place.stage, stores.names)
         return result
@@ -259,8 +259,8 @@ def study_of(
         fidelity=options.rung,
         tuned=options.tuned,
         reached=options.reached,
-        blamed=options.blame,
-        blame_budget=BUDGET if options.blame_budget is None else options.blame_budget,
+        attributed=options.blame,
+        attribution_budget=BUDGET if options.blame_budget is None else options.blame_budget,
         maps=options.map_,
         rare=options.rare,
         seed=options.seed,

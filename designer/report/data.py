@@ -32,7 +32,7 @@ from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
 from designer.workbench.prediction import BoardPrediction, PredictedStop
-from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.loss_attribution import ResponseAttribution
 from designer.yields.study import RunResult, Study
 from designer.yields.yield_count import Yield
 
@@ -215,8 +215,8 @@ class ReportData:
         indices = self.study.response_indices
         return indices.index(response) if response in indices else None
 
-    def blame_of(self, response: int) -> ResponseBlame | None:
-        """The blame of a response."""
-        blame, question = self.study.blame, self.question_of(response)
-        rows = () if blame is None else blame.responses
+    def attribution_of(self, response: int) -> ResponseAttribution | None:
+        """The attribution of a response."""
+        attribution, question = self.study.blame, self.question_of(response)
+        rows = () if attribution is None else attribution.responses
         return next((b for b in rows if b.question == question), None)

@@ -128,7 +128,7 @@ def tolerance(
         rare=rare,
         map_=tuple(dict.fromkeys(map_)),
         cluster=cluster,
-        blame_anew=bool(blame),
+        attribution_anew=bool(blame),
         **stated_options(words),
     )
     if measured is None:

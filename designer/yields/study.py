@@ -21,7 +21,7 @@ from designer.spread.part_rules import spread_of
 from designer.verdicts.cross_check import CrossCheck
 from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
 from designer.yields import two_engine_yield
-from designer.yields.blame_analysis import Blame, BlameStatus
+from designer.yields.loss_attribution import Attribution, AttributionStatus
 from designer.yields.power_up import PowerUp
 from designer.yields.rare_losses import RareLosses
 from designer.yields.row_store import Row
@@ -102,14 +102,14 @@ class Study:
     """Rows of the boards powered up; None where these were not asked for."""
     recipes: tuple[Recipe, ...] | None = None
     """Recipes of power-up, one for each question."""
-    blame: Blame | None = None
-    """The blame by question; None where none was asked for."""
+    blame: Attribution | None = None
+    """The attribution by question; None where none was asked for."""
     maps: tuple[YieldMap, ...] = ()
     """Yield maps of questions; empty where none were asked for."""
     rare: tuple[RareLosses, ...] = ()
     """Estimates by boards that are drawn where they are lost; empty where none were asked for."""
     blame_wanted: bool = True
-    """Whether a blame was asked for."""
+    """Whether an attribution was asked for."""
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
     """Wall time of each part of the work [s], as far as it has gone."""
 
@@ -187,9 +187,9 @@ class Study:
         return next((r for r in self.rare if self.response_indices[r.question] == index), None)
 
     @property
-    def blame_status(self) -> BlameStatus:
-        """How much of the blame there is."""
-        return BlameStatus.of(self.blame, self.blame_wanted and bool(self.response_indices))
+    def blame_status(self) -> AttributionStatus:
+        """How much of the attribution there is."""
+        return AttributionStatus.of(self.blame, self.blame_wanted and bool(self.response_indices))
 
     @property
     def all_on_one_board(self) -> Yield | None:

@@ -35,9 +35,9 @@ from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
 from designer.verdicts.fidelity_gate import gated
 from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields import layers
-from designer.yields.blame_analysis import Blame, blame
-from designer.yields.blame_replay import BUDGET, extent_of
 from designer.yields.layers import LayerName, Runner, Task
+from designer.yields.loss_attribution import Attribution, attribute
+from designer.yields.loss_replay import BUDGET, extent_of
 from designer.yields.power_up import power_up_block
 from designer.yields.rare_losses import counted_losses, rare_losses
 from designer.yields.row_store import BlockStore
@@ -103,7 +103,7 @@ ngspice that keeps the whole interval wide."""
 
 
 class Stores:
-    """Where the layers of a study are kept, and its blame; this one keeps nothing."""
+    """Where the layers of a study are kept, and its attribution; this one keeps nothing."""
 
     def rows(
         self, layer: LayerName, plan: StudyPlan, more: Mapping[str, Any] | None = None
@@ -111,15 +111,15 @@ class Stores:
         """The blocks of a layer. more : what decides its rows beside the plan."""
         return None
 
-    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
-        """The whole blame, or one of this budget at least."""
+    def attribution(self, plan: StudyPlan, budget: int) -> Attribution | None:
+        """The whole attribution, or one of this budget at least."""
         return None
 
-    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+    def put_attribution(self, plan: StudyPlan, attribution: Attribution) -> None:
         pass
 
-    def blame_parts(self, plan: StudyPlan) -> StoredParts:
-        """Where the finished parts of a blame are."""
+    def attribution_parts(self, plan: StudyPlan) -> StoredParts:
+        """Where the finished parts of an attribution are."""
         return StoredParts()
 
     def maps(self, plan: StudyPlan) -> StoredParts:
@@ -155,8 +155,8 @@ def tolerance(
     fidelity: StudyEngine = "auto",
     tuned: bool = False,
     reached: bool = False,
-    blamed: bool = True,
-    blame_budget: int = BUDGET,
+    attributed: bool = True,
+    attribution_budget: int = BUDGET,
     maps: Sequence[Over] = (),
     rare: bool = False,
     seed: int = SEED,
@@ -174,14 +174,14 @@ def tolerance(
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
     does not grow if None. fidelity : ``exact`` asks no ngspice, ``auto`` as
     ``verdicts.cross_check`` says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice``
-    about every board. tuned, reached, blamed : whether these are wanted; a fitted trimmer is always
-    asked for. blame_budget : steps of the blame (``blame_replay``). maps : settings over which the
-    yield is wanted (``yield_maps.OVERS``). rare : whether boards are drawn where they are lost
-    (``rare_losses``). checked : of the same design, to save the time of the gate. pool : where
-    ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
-    to. runner : who computes blocks; this process if None. sampled : is given the study once the
-    exact circuit has every board, before ngspice is asked. standing : is given the study once its
-    yields stand and the blame or maps are still to be worked out.
+    about every board. tuned, reached, attributed : whether these are wanted; a fitted trimmer is
+    always asked for. attribution_budget : steps of the attribution (``loss_replay``). maps :
+    settings over which the yield is wanted (``yield_maps.OVERS``). rare : whether boards are drawn
+    where they are lost (``rare_losses``). checked : of the same design, to save the time of the
+    gate. pool : where ngspice runs; without one ngspice is not asked. stores : where rows are read
+    from and written to. runner : who computes blocks; this process if None. sampled : is given the
+    study once the exact circuit has every board, before ngspice is asked. standing : is given the
+    study once its yields stand and the attribution or maps are still to be worked out.
     """
     need_responses(synthesis.modelfile)
     warm = None
@@ -217,7 +217,14 @@ def tolerance(
         progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     laps = Laps()
     study = Study(
-        checked, plan, indices, left_out, (), until=until, blame_wanted=blamed, seconds=laps.seconds
+        checked,
+        plan,
+        indices,
+        left_out,
+        (),
+        until=until,
+        blame_wanted=attributed,
+        seconds=laps.seconds,
     )
     if not indices:
         return study
@@ -228,7 +235,7 @@ def tolerance(
         layers.LocalRunner(jobs) if runner is None else runner,
         progress,
         fidelity,
-        blame_budget,
+        attribution_budget,
     )
     if until is None:
         study = work.sampled(study)
@@ -248,13 +255,13 @@ def tolerance(
     if reached:
         study = work.powered_up(study)
     laps.end("further_layers")
-    if blamed:
-        study = replace(study, blame=work.stores.blame(study.plan, blame_budget))
-    if standing is not None and (maps or rare or (blamed and study.blame is None)):
+    if attributed:
+        study = replace(study, blame=work.stores.attribution(study.plan, attribution_budget))
+    if standing is not None and (maps or rare or (attributed and study.blame is None)):
         standing(study)
         laps.end("first_report")
-    if blamed and study.blame is None:
-        study = work.blamed(study)
+    if attributed and study.blame is None:
+        study = work.attributed(study)
     if rare:
         study = work.drawn_where_lost(study)
     return work.mapped(study, maps, warm) if maps else study
@@ -286,8 +293,8 @@ class StudyWork:
     """Told how far the work is."""
     engine: StudyEngine
     """Which engine decides."""
-    blame_budget: int = BUDGET
-    """Steps that the blame may take."""
+    attribution_budget: int = BUDGET
+    """Steps that the attribution may take."""
 
     def sampled(self, study: Study) -> Study:
         """With the exact circuit's answers of the plan's samples."""
@@ -381,10 +388,10 @@ class StudyWork:
         rows = self._rows("reached", "boards from power-up", plan, task, more)
         return replace(study, power_ups=rows, recipes=recipes)
 
-    def blamed(self, study: Study) -> Study:
+    def attributed(self, study: Study) -> Study:
         """With the parts that the losses come from."""
-        plan, answers, budget = study.plan, study.answers, self.blame_budget
-        result = blame(
+        plan, answers, budget = study.plan, study.answers, self.attribution_budget
+        result = attribute(
             plan,
             answers,
             budget=budget,
@@ -392,9 +399,9 @@ class StudyWork:
             progress=self.progress.stage(
                 "blame, boards asked again", extent_of(plan, answers, budget).steps
             ),
-            parts=self.stores.blame_parts(plan),
+            parts=self.stores.attribution_parts(plan),
         )
-        self.stores.put_blame(plan, result)
+        self.stores.put_attribution(plan, result)
         return replace(study, blame=result)
 
     def drawn_where_lost(self, study: Study) -> Study:

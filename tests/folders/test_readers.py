@@ -33,7 +33,7 @@ from designer.model.measured_values import read_measured
 from designer.model.model_file import read_model_file
 from tests.catalog.test_catalog import CSV
 from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
-from tests.folders.test_study_cache import BLAME, kept
+from tests.folders.test_study_cache import ATTRIBUTION, kept
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
@@ -78,7 +78,7 @@ def parquet_bytes() -> bytes:
 
 
 def npz_bytes(folder: Path) -> bytes:
-    kept(folder / "it.npz").put("blame", "key", BLAME)
+    kept(folder / "it.npz").put("blame", "key", ATTRIBUTION)
     return (folder / "it.npz").read_bytes()
 
 

@@ -105,7 +105,7 @@ def test_a_model_file_has_the_usual_numbers_unless_work_is_resumed(tmp_path: Pat
 
 @pytest.mark.usefixtures("asked")
 @pytest.mark.parametrize(
-    ("layers", "words", "blamed", "budget"),
+    ("layers", "words", "attributed", "budget"),
     [
         (["samples"], [], True, None),
         (["samples", "without blame"], [], False, None),
@@ -115,12 +115,12 @@ def test_a_model_file_has_the_usual_numbers_unless_work_is_resumed(tmp_path: Pat
         (["blame budget 900", "samples"], ["--no-blame"], False, None),
     ],
 )
-def test_the_blame_is_as_the_folder_has_it(
-    tmp_path: Path, layers: list[str], words: list[str], blamed: bool, budget: int | None
+def test_the_attribution_is_as_the_folder_has_it(
+    tmp_path: Path, layers: list[str], words: list[str], attributed: bool, budget: int | None
 ) -> None:
     out = folder(tmp_path / "out", study={**STUDY, "layers": layers})
     options = options_of("tolerance", out, *words, "-q")
-    assert (options.blame, options.blame_budget) == (blamed, budget)
+    assert (options.blame, options.blame_budget) == (attributed, budget)
 
 
 @pytest.mark.usefixtures("asked")

@@ -204,7 +204,7 @@ STAGES = {
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
     "tolerance study, 2 boards, responses: 1": "",
     "boards in ngspice, 4 runs": "",
-    "report": "",  # the yields are written before the blame
+    "report": "",  # the yields are written before the attribution
     "blame, boards asked again": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""

@@ -32,8 +32,8 @@ from designer.verdicts import exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
 from designer.yields import layers, tolerance_study
-from designer.yields.blame_analysis import blame
 from designer.yields.layers import CHUNK, LocalRunner
+from designer.yields.loss_attribution import attribute
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
@@ -42,7 +42,7 @@ from tests.folders.test_study_cache import MAP
 from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan
-from tests.yields.test_blame_analysis import _Memory
+from tests.yields.test_loss_attribution import _Memory
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -473,7 +473,7 @@ def _refused(*_: Any, **__: Any) -> Any:
     raise AssertionError("this was known")
 
 
-def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
+def test_another_layer_asks_for_no_attribution_again_and_other_boards_do(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "exact"
@@ -483,9 +483,9 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
 
     def counted(*args: Any, **options: Any) -> Any:
         asked.append(len(args[1]))
-        return blame(*args, **options)
+        return attribute(*args, **options)
 
-    monkeypatch.setattr(tolerance_study, "blame", counted)
+    monkeypatch.setattr(tolerance_study, "attribute", counted)
     monkeypatch.setattr(StudyWork, "powered_up", lambda _, study: study)
     assert entry.status([*_words(home, out), "--reached", "-q"]) == 0
     assert asked == []
@@ -504,7 +504,7 @@ def test_a_model_without_a_title_has_the_same_name_in_its_folder(exact: Path) ->
     assert (exact / "kicad" / "small.kicad_sch").is_file()
 
 
-def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
+def test_yields_stand_before_the_attribution_and_it_goes_on_after_an_interruption(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -522,7 +522,7 @@ def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(tolerance_study, "blame", interrupted)
+        patched.setattr(tolerance_study, "attribute", interrupted)
         assert entry.status(["tolerance", str(out), "--resume"]) == 130
     assert "100.0   76–100" in capfd.readouterr().err
     early = json.loads((out / "tolerance.json").read_text())
@@ -534,21 +534,21 @@ def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
     assert (out / PIECES).exists()
     assert entry.status(["tolerance", str(out)]) == 2
     assert "--resume" in capfd.readouterr().err
-    (out / PIECES).unlink()  # what was put there is none of this blame
+    (out / PIECES).unlink()  # what was put there is none of this attribution
     assert entry.status([*_words(home, out), "--resume", "--json"]) == 0
     (line,) = [json.loads(capfd.readouterr().out)]
     assert line["blame"] == {"status": "whole", "share": 1.0, "budget": None, "reason": ""}
     assert _files(out) == _files(exact)
 
 
-def test_a_study_without_blame_gets_it_later_and_loses_it_never(
+def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     out = tmp_path / "exact"
     shutil.copytree(exact, out)
     with monkeypatch.context() as patched:
-        patched.setattr(tolerance_study, "blame", _refused)
+        patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status(["tolerance", str(out), "--no-blame", "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["blame"]["status"] == "whole"
         assert _files(out) == _files(exact)
@@ -558,7 +558,7 @@ def test_a_study_without_blame_gets_it_later_and_loses_it_never(
         without = json.loads((out / "tolerance.json").read_text())
         assert without["blame"]["status"] == "left out"
         assert "Blame left out" in (out / "report.md").read_text()
-        # The folder's own samples, and its own choice of no blame.
+        # The folder's own samples, and its own choice of no attribution.
         assert entry.status(["tolerance", str(out), "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["samples"] == 13
     assert (
@@ -584,7 +584,7 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
     with monkeypatch.context() as patched:
         patched.setattr(numerics_gate, "check", _refused)
         patched.setattr(equation_check, "check", _refused)
-        patched.setattr(tolerance_study, "blame", _refused)
+        patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status([*words, "--reached"]) == 0
     added = _files(out)
     once = tmp_path / "once" / "auto"

@@ -297,7 +297,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
     data["board"] = {"dc_trim": "fitted"}
     data["response"] = [r for r in data["response"] if r["omega"] in (1.55, 0.85)]
     fitted = with_same_parts(made, parse_model_file(toml_text(data)))
-    study = tolerance(fitted, samples=6, fidelity="exact", blamed=False, jobs=1)
+    study = tolerance(fitted, samples=6, fidelity="exact", attributed=False, jobs=1)
     assert study.trimmed is not None
     assert len(study.trimmed) == 12
     answer = study_json(study, {}, {})
@@ -308,7 +308,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
         assert shown["at_end"] == 0
     whole = all_on_one(study.trimmed)
     assert answer["all_on_one_board"]["trimmed"]["ok"] == whole.ok
-    plain = tolerance(made, samples=2, fidelity="exact", blamed=False, jobs=1)
+    plain = tolerance(made, samples=2, fidelity="exact", attributed=False, jobs=1)
     assert plain.trimmed is None
     assert study_json(plain, {}, {})["responses"][0]["trimmed"] is None
 

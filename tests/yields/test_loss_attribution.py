@@ -25,9 +25,9 @@ from designer.spread.board_quantities import Quantity, between, column, quantiti
 from designer.spread.spread import Group, Spread, draw_many
 from designer.verdicts.exact_circuit import block
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
-from designer.yields import blame_replay
-from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
-from designer.yields.blame_replay import PROBE, extent_of
+from designer.yields import loss_replay
+from designer.yields.loss_attribution import NOTHING_LOST, Attribution, attribute
+from designer.yields.loss_replay import PROBE, extent_of
 from designer.yields.margins import Limit, Margin, Prediction, crossings
 from designer.yields.stored_parts import StoredParts
 from designer.yields.worst_corner import Index, saltelli, sobol, worst_corners
@@ -53,8 +53,8 @@ def answers(p: int, spread: str, samples: int = 24) -> tuple[Answer, ...]:
 
 
 @cache
-def offsets_blamed() -> Blame:
-    return blame(plan(2, "offsets"), answers(2, "offsets"), lost=6, ok=2, jobs=2)
+def offsets_attributed() -> Attribution:
+    return attribute(plan(2, "offsets"), answers(2, "offsets"), lost=6, ok=2, jobs=2)
 
 
 def margin_of(slopes: dict[str, tuple[float, ...]], nominal: float = 1.0) -> tuple[Margin, Boards]:
@@ -250,8 +250,8 @@ def test_a_crossing_is_where_the_response_ends_along_the_line() -> None:
     assert not kept(met.outside)
 
 
-def test_where_only_offsets_differ_offsets_have_all_the_blame() -> None:
-    found = offsets_blamed().responses[0]
+def test_where_only_offsets_differ_offsets_have_all_the_attribution() -> None:
+    found = offsets_attributed().responses[0]
     assert found.lost == sum(a.verdict is Verdict.LOST for a in answers(2, "offsets")) > 6
     assert {s.kind for s in found.subjects} == {"op-amp", "group"}
     everything = next(s for s in found.subjects if s.name == "all offsets")
@@ -265,7 +265,7 @@ def test_where_only_offsets_differ_offsets_have_all_the_blame() -> None:
 
 
 def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
-    found = offsets_blamed().responses[0]
+    found = offsets_attributed().responses[0]
     study = plan(2, "offsets")
     question = study.questions[0]
     lost = [a.sample for a in answers(2, "offsets") if a.verdict is Verdict.LOST][:6]
@@ -282,7 +282,7 @@ def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
 
 def test_the_margin_foretells_boards_it_has_not_seen() -> None:
     """As built at the paper's own level: half the boards are lost, by what is not linear."""
-    found = offsets_blamed().responses[0]
+    found = offsets_attributed().responses[0]
     assert found.prediction.ok + found.prediction.lost == sum(
         a.verdict in (Verdict.OK, Verdict.LOST) for a in answers(2, "offsets") if a.sample % 2
     )
@@ -292,7 +292,7 @@ def test_the_margin_foretells_boards_it_has_not_seen() -> None:
 
 
 def test_the_worst_corner_is_tried_on_the_exact_circuit() -> None:
-    corner = offsets_blamed().responses[0].corner
+    corner = offsets_attributed().responses[0].corner
     assert corner is not None
     assert corner.corners == 32
     assert len(corner.coordinates) == len(corner.worst) == 5
@@ -352,7 +352,7 @@ def test_a_rails_corner_is_named_by_its_number(name: str) -> None:
 
 
 def test_no_loss_no_replay_and_the_nearest_limit_is_named() -> None:
-    found = blame(plan(1, "tiny", 4), answers(1, "tiny", 4), jobs=1).responses[0]
+    found = attribute(plan(1, "tiny", 4), answers(1, "tiny", 4), jobs=1).responses[0]
     assert (found.lost, found.subjects) == (0, ())
     assert found.prediction == Prediction(4 // 2, 0, 0, 0)
     assert found.limited_by.startswith("nothing was lost; nearest is ")
@@ -362,7 +362,7 @@ def test_no_loss_no_replay_and_the_nearest_limit_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_blame_is_the_same_on_one_core_and_says_what_it_cost() -> None:
+def test_attribution_is_the_same_on_one_core_and_says_what_it_cost() -> None:
     calls = 0
 
     def step() -> None:
@@ -371,8 +371,8 @@ def test_blame_is_the_same_on_one_core_and_says_what_it_cost() -> None:
 
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
-    one = blame(few, some, lost=2, ok=1, jobs=1, progress=step)
-    two = blame(few, list(reversed(some)), lost=2, ok=1, jobs=2)
+    one = attribute(few, some, lost=2, ok=1, jobs=1, progress=step)
+    two = attribute(few, list(reversed(some)), lost=2, ok=1, jobs=2)
     assert replace(one, seconds=0.0) == replace(two, seconds=0.0)
     assert calls == extent_of(few, some, lost=2, ok=1).steps >= one.attractors + one.orbits
     plain = one.as_dict()
@@ -399,12 +399,12 @@ class _Memory(StoredParts):
         self.known |= values
 
 
-def test_a_blame_that_was_interrupted_goes_on_where_it_was(
+def test_an_attribution_that_was_interrupted_goes_on_where_it_was(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
-    whole = blame(few, some, lost=2, ok=1, jobs=1)
+    whole = attribute(few, some, lost=2, ok=1, jobs=1)
     total = extent_of(few, some, lost=2, ok=1).steps
     pieces, steps = _Memory(), 0
 
@@ -414,26 +414,26 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
         if steps > 0.6 * total:
             raise _Stopped
 
-    monkeypatch.setattr(blame_replay, "TOGETHER", 1)
+    monkeypatch.setattr(loss_replay, "TOGETHER", 1)
     with pytest.raises(_Stopped):
-        blame(few, some, lost=2, ok=1, jobs=1, progress=stop_late, parts=pieces)
+        attribute(few, some, lost=2, ok=1, jobs=1, progress=stop_late, parts=pieces)
     before = dict(pieces.known)
     assert {name.split()[0] for name in before} >= {"replay", "crossing"}
     replayed: list[object] = []
-    some_again = blame_replay._some
+    some_again = loss_replay._some
 
     def counted(*args: Any) -> Any:
         replayed.append(args)
         return some_again(*args)
 
-    monkeypatch.setattr(blame_replay, "_some", counted)
+    monkeypatch.setattr(loss_replay, "_some", counted)
     steps = 0
 
     def step() -> None:
         nonlocal steps
         steps += 1
 
-    again = blame(few, some, lost=2, ok=1, jobs=1, progress=step, parts=pieces)
+    again = attribute(few, some, lost=2, ok=1, jobs=1, progress=step, parts=pieces)
     assert replace(again, seconds=0.0) == replace(whole, seconds=0.0)
     assert replayed == []
     assert steps == total
@@ -454,7 +454,7 @@ def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
     least = extent_of(study, rows, 1)
     assert len(least.replays) == len(least.crossings) == 1
     assert extent_of(study, rows, whole.steps).share == 1.0
-    found = blame(study, rows, budget=1, jobs=2)
+    found = attribute(study, rows, budget=1, jobs=2)
     assert found.share == least.share
     assert {s.replayed for s in found.responses[0].subjects} <= {0, 1}
     assert found.responses[0].subjects
@@ -477,11 +477,11 @@ def test_a_larger_budget_does_the_rest() -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
     pieces = _Memory()
-    part = blame(few, some, lost=2, ok=1, budget=1, jobs=2, parts=pieces)
+    part = attribute(few, some, lost=2, ok=1, budget=1, jobs=2, parts=pieces)
     assert part.share < 1.0
     assert part.budget == 1
-    more = blame(few, some, lost=2, ok=1, budget=10**6, jobs=2, parts=pieces)
-    whole = blame(few, some, lost=2, ok=1, jobs=2)
+    more = attribute(few, some, lost=2, ok=1, budget=10**6, jobs=2, parts=pieces)
+    whole = attribute(few, some, lost=2, ok=1, jobs=2)
     assert replace(more, seconds=0.0) == replace(whole, seconds=0.0)
 
 
@@ -494,7 +494,7 @@ def test_where_every_board_is_lost_whatever_is_exact_few_are_replayed() -> None:
     study = replace(study, questions=(asked,))
     rows = block(study, range(study.samples), 2)
     assert {a.verdict for a in rows} == {Verdict.LOST}
-    found = blame(study, rows, jobs=2).responses[0]
+    found = attribute(study, rows, jobs=2).responses[0]
     assert {s.replayed for s in found.subjects} == {PROBE}
     assert found.skipped.startswith("every board is lost (to 1-1-1), and no part or group")
 

@@ -11,6 +11,6 @@ def lacks_noise(answer: Mapping[str, Any]) -> bool:
 
     answer : as in ``tolerance.json``.
     """
-    blames = [response.get("blame") or {} for response in answer.get("responses", ())]
-    indices = [index for blame in blames for index in blame.get("indices", ())]
+    attributions = [response.get("blame") or {} for response in answer.get("responses", ())]
+    indices = [index for attribution in attributions for index in attribution.get("indices", ())]
     return any(i.get("total_error") is None for i in indices if i["total"] is not None)

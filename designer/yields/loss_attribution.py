@@ -1,7 +1,7 @@
 """Which part is to blame when a board does not show a response.
 
 Three answers for each response, each with what it cost: the losses that an exact part avoids or
-causes (``blame_replay``); the Sobol indices of the margin over the coordinates of the spread, with
+causes (``loss_replay``); the Sobol indices of the margin over the coordinates of the spread, with
 how well the margin predicts verdicts; and the worst corner (``worst_corner``).
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 from designer.base.plain_json import plain
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
 from designer.yields import margins as margin_limits
-from designer.yields.blame_replay import KEPT, LOST, BlamedPart, extent_of, replay
+from designer.yields.loss_replay import KEPT, LOST, PartAttribution, extent_of, replay
 from designer.yields.margins import Margin, Prediction
 from designer.yields.stored_parts import StoredParts
 from designer.yields.worst_corner import Corner, Index, sobol, worst_corners
@@ -38,14 +38,14 @@ class NearLimit:
 
 
 @dataclass(frozen=True)
-class ResponseBlame:
+class ResponseAttribution:
     """Why boards lose one response."""
 
     question: int
     """Number of the question of the plan."""
     lost: int
     """Boards of the study that lost the response."""
-    subjects: tuple[BlamedPart, ...]
+    subjects: tuple[PartAttribution, ...]
     """Parts and groups that were made exact, most losses avoided first."""
     indices: tuple[Index, ...]
     """Sobol indices of the margin."""
@@ -67,11 +67,11 @@ class ResponseBlame:
 
 
 @dataclass(frozen=True)
-class Blame:
-    """The blame of every question. Only ``seconds`` may differ between equal runs."""
+class Attribution:
+    """The attribution of every question. Only ``seconds`` may differ between equal runs."""
 
-    responses: tuple[ResponseBlame, ...]
-    """The blame of each question."""
+    responses: tuple[ResponseAttribution, ...]
+    """The attribution of each question."""
     samples: int
     """How many boards were drawn."""
     seed: int
@@ -108,7 +108,7 @@ class Blame:
         return document
 
 
-def blame(
+def attribute(
     plan: StudyPlan,
     answers: Sequence[Answer],
     *,
@@ -118,14 +118,14 @@ def blame(
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
     parts: StoredParts | None = None,
-) -> Blame:
+) -> Attribution:
     """Blame the parts for the losses among these answers (as built, exact circuit).
 
     answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
-    are replayed, at most. budget : steps of the work (``blame_replay``); all of it if None.
+    are replayed, at most. budget : steps of the work (``loss_replay``); all of it if None.
     progress : called once for each of the extent's steps. parts : the finished ones of this very
-    blame, and where the others go. The same answers and budget give the same blame but for
-    ``seconds``.
+    attribution, and where the others go. The same answers and budget give the same attribution but
+    for ``seconds``.
     """
     began = time.perf_counter()
     spent = Counter[str]()
@@ -140,7 +140,7 @@ def blame(
     parts = StoredParts() if parts is None else parts
     extent = extent_of(plan, answers, budget, lost=lost, ok=ok)
     attractor, orbit = count_as("attractors"), count_as("orbits")
-    blamed, cut = replay(plan, extent, parts, jobs, attractor)
+    attributed, cut = replay(plan, extent, parts, jobs, attractor)
     margins = margin_limits.margins(
         plan.circuit,
         plan.questions,
@@ -156,22 +156,22 @@ def blame(
     for _ in range(extent.steps - spent.total()):  # what turned out not to be needed
         progress()
     responses = [
-        ResponseBlame(
+        ResponseAttribution(
             question=i,
             lost=sum(a.verdict is Verdict.LOST for a in row),
-            subjects=blamed[i],
+            subjects=attributed[i],
             indices=indices[i],
             limits=tuple(NearLimit(x.what, x.distance) for x in margin.limits[:SHOWN_LIMITS]),
             prediction=margin.prediction,
             sought=margin.sought,
             there=margin.there,
             corner=corners[i],
-            limited_by=_sentence(row, blamed[i], indices[i], margin, plan.questions[i]),
-            skipped=_skipped(row, blamed[i], cut[i]),
+            limited_by=_sentence(row, attributed[i], indices[i], margin, plan.questions[i]),
+            skipped=_skipped(row, attributed[i], cut[i]),
         )
         for i, (row, margin) in enumerate(zip(extent.rows, margins, strict=True))
     ]
-    return Blame(
+    return Attribution(
         tuple(responses),
         1 + max((a.sample for a in answers), default=0),
         plan.seed,
@@ -183,7 +183,7 @@ def blame(
     )
 
 
-def _skipped(row: Sequence[Answer], blamed: Sequence[BlamedPart], cut: bool) -> str:
+def _skipped(row: Sequence[Answer], attributed: Sequence[PartAttribution], cut: bool) -> str:
     """Why the boards of one question were not replayed, or not all of them."""
     lost = [a for a in row if a.verdict is Verdict.LOST]
     if not lost:
@@ -192,7 +192,7 @@ def _skipped(row: Sequence[Answer], blamed: Sequence[BlamedPart], cut: bool) -> 
         return ""
     causes = {a.reason for a in lost}
     cause = f" ({causes.pop()})" if len(causes) == 1 else ""
-    replayed = max((p.replayed for p in blamed), default=0)
+    replayed = max((p.replayed for p in attributed), default=0)
     return (
         f"every board is lost{cause}, and no part or group that was made exact saves one of the "
         f"first {replayed}, so no more were replayed"
@@ -201,7 +201,7 @@ def _skipped(row: Sequence[Answer], blamed: Sequence[BlamedPart], cut: bool) -> 
 
 def _sentence(
     row: Sequence[Answer],
-    blamed: Sequence[BlamedPart],
+    attributed: Sequence[PartAttribution],
     indices: Sequence[Index],
     margin: Margin,
     question: Question,
@@ -222,7 +222,7 @@ def _sentence(
     clauses = []
     if nearest is not None:
         clauses.append(f"{nearest.what}, mostly through {through}")
-    helped = [p for p in blamed if p.kind == "group" and p.avoided]
+    helped = [p for p in attributed if p.kind == "group" and p.avoided]
     if helped:
         best = helped[0]
         clauses.append(f"{best.name} exact: {best.avoided} of {best.replayed} losses avoided")
@@ -233,8 +233,8 @@ def _sentence(
     return "; ".join(clauses)
 
 
-class BlameStage(StrEnum):
-    """How far a blame is."""
+class AttributionStage(StrEnum):
+    """How far an attribution is."""
 
     WHOLE = "whole"
     PART = "part"
@@ -243,40 +243,40 @@ class BlameStage(StrEnum):
 
 
 @dataclass(frozen=True)
-class BlameStatus:
-    """How much of a study's blame there is, for its answer, its page and the terminal."""
+class AttributionStatus:
+    """How much of a study's attribution there is, for its answer, its page and the terminal."""
 
-    stage: BlameStage
-    """How far the blame is."""
+    stage: AttributionStage
+    """How far the attribution is."""
     share: float
     """Share of the whole work that was done."""
     budget: int | None
     """Steps that were allowed, None where all were."""
     reason: str
-    """Why there is no blame, or not all of it; "" where it is whole."""
+    """Why there is no attribution, or not all of it; "" where it is whole."""
 
     @classmethod
-    def of(cls, blame: Blame | None, wanted: bool = True) -> BlameStatus:
-        """Of what a study has. wanted : whether a blame was asked for."""
-        if blame is None and not wanted:
-            return cls(BlameStage.LEFT_OUT, 0.0, None, "it was not asked for")
-        if blame is None:
+    def of(cls, attribution: Attribution | None, wanted: bool = True) -> AttributionStatus:
+        """Of what a study has. wanted : whether an attribution was asked for."""
+        if attribution is None and not wanted:
+            return cls(AttributionStage.LEFT_OUT, 0.0, None, "it was not asked for")
+        if attribution is None:
             reason = "the yields stand without it; it is worked out after them"
-            return cls(BlameStage.NOT_YET, 0.0, None, reason)
-        if blame.share >= 1.0:
-            return cls(BlameStage.WHOLE, 1.0, blame.budget, "")
+            return cls(AttributionStage.NOT_YET, 0.0, None, reason)
+        if attribution.share >= 1.0:
+            return cls(AttributionStage.WHOLE, 1.0, attribution.budget, "")
         reason = (
-            f"{100.0 * blame.share:.0f} % of its work fits into {blame.budget} steps, so fewer "
-            "boards were replayed and followed than without a budget"
+            f"{100.0 * attribution.share:.0f} % of its work fits into {attribution.budget} steps, "
+            "so fewer boards were replayed and followed than without a budget"
         )
-        return cls(BlameStage.PART, blame.share, blame.budget, reason)
+        return cls(AttributionStage.PART, attribution.share, attribution.budget, reason)
 
     @property
     def sentence(self) -> str:
-        """For people; "" where the blame is whole."""
-        if self.stage is BlameStage.WHOLE:
+        """For people; "" where the attribution is whole."""
+        if self.stage is AttributionStage.WHOLE:
             return ""
-        if self.stage is BlameStage.PART:
+        if self.stage is AttributionStage.PART:
             return f"Blame, in part: {self.reason}."
         return f"Blame {self.stage}: {self.reason}."
 

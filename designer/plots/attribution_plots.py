@@ -1,4 +1,4 @@
-"""Figures of the blame: losses avoided by part and response, and the margins' indices."""
+"""Figures of the attribution: losses avoided by part and response, and the margins' indices."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from designer.base.figure_style import (
     say,
     styled,
 )
-from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.worst_corner import NOISE
 
 PARTS_SHOWN = 16
@@ -31,16 +31,20 @@ _FIRST, _TOTAL = "#0072b2", "#9fcbe6"
 
 
 @styled
-def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
+def avoided_chart(
+    labels: Sequence[str], attributions: Sequence[ResponseAttribution | None]
+) -> Figure:
     """Share of the losses avoided if one part, or one group, were exact: a row for each, a column
     for each response that lost boards. Groups stand above the line, then the parts that help
     most."""
-    blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.subjects]
-    if not blamed:
+    attributed = [
+        (t, b) for t, b in zip(labels, attributions, strict=True) if b is not None and b.subjects
+    ]
+    if not attributed:
         figure = new_figure(7.4, 1.2)
         say(figure.subplots(), "no board was lost")
         return figure
-    groups, parts = _rows([b for _, b in blamed])
+    groups, parts = _rows([b for _, b in attributed])
     rows = groups + parts
     if not rows:
         figure = new_figure(7.4, 1.2)
@@ -48,16 +52,16 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         return figure
     figure = new_figure(7.4, max(0.2 * len(rows) + 1.3, LEAST_HEIGHT))
     axes = figure.subplots()
-    values = np.full((len(rows), len(blamed)), np.nan)
-    for j, (_, b) in enumerate(blamed):
+    values = np.full((len(rows), len(attributed)), np.nan)
+    for j, (_, b) in enumerate(attributed):
         subject_of = {s.name: s for s in b.subjects}
         for i, name in enumerate(rows):
             if name in subject_of:
                 values[i, j] = 100.0 * subject_of[name].share
     image = axes.imshow(values, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
     axes.set_yticks(range(len(rows)), rows, color=INK)
-    ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in blamed]
-    axes.set_xticks(range(len(blamed)), ticks, color=INK, size=7)
+    ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in attributed]
+    axes.set_xticks(range(len(attributed)), ticks, color=INK, size=7)
     axes.tick_params(length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)
@@ -71,27 +75,31 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
 
 
 @styled
-def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
+def index_chart(
+    labels: Sequence[str], attributions: Sequence[ResponseAttribution | None]
+) -> Figure:
     """Sobol indices of each response's margin: its largest coordinates, first-order and total, each
     with its 95 % interval."""
-    blamed = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
-    if not blamed:
+    attributed = [
+        (t, b) for t, b in zip(labels, attributions, strict=True) if b is not None and b.indices
+    ]
+    if not attributed:
         figure = new_figure(7.4, 1.2)
         say(figure.subplots(), "no limit of a response was found")
         return figure
-    columns = min(3, len(blamed))
-    lines = -(-len(blamed) // columns)
+    columns = min(3, len(attributed))
+    lines = -(-len(attributed) // columns)
     figure = new_figure(7.4, lines * (0.19 * INDICES_SHOWN + 0.75) + 0.5)
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True)
-    for axes in grid.flat[len(blamed) :]:
+    for axes in grid.flat[len(attributed) :]:
         axes.set_axis_off()
     largest = max(
         100.0 * (x.total + (NOISE * x.total_error if x.total_error > 0.0 else 0.0))
-        for _, b in blamed
+        for _, b in attributed
         for x in b.indices[:1]
     )
     end = next((end for end in (25.0, 50.0) if largest <= end), 100.0)
-    for axes, (title, b) in zip(grid.flat, blamed, strict=False):
+    for axes, (title, b) in zip(grid.flat, attributed, strict=False):
         _indices(axes, title, b)
         axes.set_xlim(0.0, end)
     figure.supxlabel("share of the margin’s variance [%]", size=8.5)  # wider than one panel
@@ -103,7 +111,7 @@ def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -
     return figure
 
 
-def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
+def _indices(axes: Axes, title: str, b: ResponseAttribution) -> None:
     top = b.indices[:INDICES_SHOWN]
     place = range(len(top))
     axes.barh(place, [100.0 * max(x.total, 0.0) for x in top], color=_TOTAL, height=0.75)
@@ -137,17 +145,17 @@ def _noise(axes: Axes, rows: Sequence[float], values: Sequence[tuple[float, floa
         axes.hlines(places, low, high, color=INK, lw=0.9, zorder=3)
 
 
-def _rows(blames: Sequence[ResponseBlame]) -> tuple[list[str], list[str]]:
+def _rows(attributions: Sequence[ResponseAttribution]) -> tuple[list[str], list[str]]:
     """Names of the groups, and of the parts that avoid most losses over all responses."""
 
-    def worth(subjects: Sequence[BlamedPart], group: bool) -> list[str]:
+    def worth(subjects: Sequence[PartAttribution], group: bool) -> list[str]:
         best: dict[str, float] = {}
         for s in subjects:
             if (s.kind == "group") == group and np.isfinite(s.share):
                 best[s.name] = max(best.get(s.name, 0.0), s.share)
         return sorted(best, key=lambda name: (-best[name], name))
 
-    every = [s for b in blames for s in b.subjects]
+    every = [s for b in attributions for s in b.subjects]
     return worth(every, True), worth(every, False)[:PARTS_SHOWN]
 
 

@@ -4,11 +4,11 @@ Lost boards are replayed on the exact circuit with one part at its nominal value
 offset, for an op-amp section), everything else as drawn; so are groups of parts. The same is done
 with boards that were ok, which tells the losses that an exact part would *cause*.
 
-The unit of a blame's work is a step: an attractor that is sought, or an orbit that is followed. How
-many there are is known before the first, so that progress can say how long it takes. A board that
-took many drive periods in the study counts for several, since it takes as many again. What a budget
-leaves out are boards: fewer lost ones are replayed and followed, of every response in turn, never
-fewer parts.
+The unit of an attribution's work is a step: an attractor that is sought, or an orbit that is
+followed. How many there are is known before the first, so that progress can say how long it takes.
+A board that took many drive periods in the study counts for several, since it takes as many again.
+What a budget leaves out are boards: fewer lost ones are replayed and followed, of every response in
+turn, never fewer parts.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PROBE = 10
 TOGETHER = 8
 """Boards that are replayed before what they showed is stored; no answer depends on it."""
 BUDGET = 20_000
-"""Steps of a blame, about, where nobody says another number."""
+"""Steps of an attribution, about, where nobody says another number."""
 
 PERIODS = 125
 """Drive periods of a step of that budget; nearly all boards with a periodic answer take fewer."""
@@ -51,7 +51,7 @@ _VERDICTS = {str(verdict)[0]: verdict for verdict in Verdict}
 
 
 @dataclass(frozen=True)
-class BlamedPart:
+class PartAttribution:
     """A part or a group that was made exact, and what became of the boards.
 
     Boards without an answer count in neither ``avoided`` nor ``caused``.
@@ -111,13 +111,14 @@ class _Replay:
 
     @property
     def part(self) -> str:
-        """Name of its result among the stored parts of a blame."""
+        """Name of its result among the stored parts of an attribution."""
         return f"replay {self.question} {self.sample}"
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How much of a blame is done: all of it where that stays within a budget, else a share."""
+    """How much of an attribution is done: all of it where that stays within a budget, else a
+    share."""
 
     boards: Boards
     """Boards of the study, by sample."""
@@ -154,7 +155,7 @@ def extent_of(
     lost: int = LOST,
     ok: int = KEPT,
 ) -> Extent:
-    """What a blame of these answers does within a budget of so many steps; without one, all.
+    """What an attribution of these answers does within a budget of so many steps; without one, all.
 
     answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
     are replayed, at most. The nominal board and the corners are always looked at, and so is one
@@ -251,7 +252,7 @@ def replay(
     parts: StoredParts,
     jobs: int,
     progress: Callable[[], None],
-) -> tuple[list[tuple[BlamedPart, ...]], list[bool]]:
+) -> tuple[list[tuple[PartAttribution, ...]], list[bool]]:
     """The parts of each question, most losses avoided first; and whether its replays were cut
     short.
 
@@ -265,7 +266,7 @@ def replay(
     cut = [hopeless and i not in saved for i, hopeless in enumerate(extent.hopeless)]
     rest = [r for r in extent.replays if r not in verdicts and not cut[r.question]]
     verdicts |= _all(plan, extent, rest, parts, jobs, progress)
-    return [_blamed(i, extent.changes, verdicts) for i in range(len(plan.questions))], cut
+    return [_attributed(i, extent.changes, verdicts) for i in range(len(plan.questions))], cut
 
 
 def _all(
@@ -313,9 +314,9 @@ def _some(
     return list(parallel(one, extent.changes, jobs))
 
 
-def _blamed(
+def _attributed(
     question: int, changes: Sequence[_Change], every: dict[_Replay, list[Verdict]]
-) -> tuple[BlamedPart, ...]:
+) -> tuple[PartAttribution, ...]:
     results = {r: verdicts for r, verdicts in every.items() if r.question == question}
     if not results:
         return ()
@@ -327,5 +328,5 @@ def _blamed(
             for before in (Verdict.LOST, Verdict.OK)
         )
         avoided, caused = tally[Verdict.LOST, Verdict.OK], tally[Verdict.OK, Verdict.LOST]
-        out.append(BlamedPart(change.name, change.kind, avoided, replayed, caused, ok))
+        out.append(PartAttribution(change.name, change.kind, avoided, replayed, caused, ok))
     return tuple(sorted(out, key=lambda p: (-p.avoided, p.caused, p.name)))
