@@ -5,7 +5,7 @@ circuit with bandwidth is asked (``bandwidth_check``), and ngspice to confirm th
 time at the dead zone: while its diodes change over, the loop is open and the output has to cross
 two diode drops, so a contact comes late by about √(2·V/(GBW·β·dv/dt)), and a late spring force is
 negative damping. In units of the model's time this falls with the root of the frequency at ω = 1,
-hence the cure is a slower time scale. Boards are those of a prediction, with the spread stretched:
+so the remedy is a slower time scale. Boards are those of a prediction, with the spread stretched:
 few of them tell what many tell as they are.
 """
 

@@ -75,7 +75,7 @@ def open_in(spec: Response) -> bool:
 
 
 def need_periods(wanted: Sequence[Response]) -> None:
-    """Refuse what neither a search nor a cure can follow.
+    """Refuse what neither a search nor a repair can follow.
 
     Raises
     ------

@@ -51,14 +51,14 @@ SEARCH: Final[Mapping[str, float]] = {
     "ngspice, rung dynamic, numerics": 48.0,
 }
 """Of the search, the study and the confirmation of a design."""
-CURED: Final[Mapping[str, float]] = {
+REPAIRED: Final[Mapping[str, float]] = {
     "the design as it is": 10.0,
     "linear picture": 60.0,
     "round": 60.0,
     "cured design": 1.0,
     **WRITTEN,
 }
-"""Of the search for a cure."""
+"""Of the search for a repair."""
 
 
 def of_design(modelfile: ModelFile) -> dict[str, float]:

@@ -51,7 +51,7 @@ MOST_STEPS = 40_000
 run of more would take minutes, and such an orbit is next to grazing."""
 LEVELS = 5
 """How often the step is halved before the gate gives up."""
-CURES: tuple[Remedy, ...] = ("tolerance", "start")
+REMEDIES_OF_GATE: tuple[Remedy, ...] = ("tolerance", "start")
 """Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
@@ -329,7 +329,7 @@ def check(
             trio = _trio(subjects[i].period / tried[i][-1])
             tasks += [task(subjects[i], settings, keep=True) for settings in trio]
         outcomes = {}
-        for number, outcome in remedies.run(pool, tasks, CURES):
+        for number, outcome in remedies.run(pool, tasks, REMEDIES_OF_GATE):
             outcomes[number] = outcome
             text = f"{len(outcomes)} of {len(tasks)} runs"
             doing(f"step size {level + 1} of at most {levels}: {text}")
@@ -423,7 +423,7 @@ def _judge(
         read,
         tried,
         contact / settings.max_step if len(wanted.impact_times) else float("nan"),
-        tuple(r for r in CURES if r in needed),
+        tuple(r for r in REMEDIES_OF_GATE if r in needed),
         subject.discard,
         wave,
         bound,

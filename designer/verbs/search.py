@@ -1,4 +1,4 @@
-"""The verb ``search``: the design of the highest yield, or the cheapest cure of a design."""
+"""The verb ``search``: the design of the highest yield, or the cheapest repair of a design."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Sourc
 from designer.verbs.tables import design_written, drive_cells, whole_job
 
 if TYPE_CHECKING:
-    from designer.jobs.cure_job import CureResult
     from designer.jobs.job_outcome import JobOutcome
+    from designer.jobs.repair_job import CureResult
 
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
-"""Of upgrades; as ``cure_branch.KINDS``."""
+"""Of upgrades; as ``repair_branch.KINDS``."""
 
 
 def search(
@@ -63,10 +63,10 @@ def search(
     resume: Resume = False,
     progress: Progress | None = None,
 ) -> JobOutcome | CureResult:
-    """Find the design of the highest yield; with --yield or --ppm, the cheapest cure of a folder.
+    """Find the design of the highest yield; with --yield or --ppm, the cheapest repair of a folder.
 
-    A model file is searched, and written into ``out``. A design folder is cured, as ``cure`` does
-    it.
+    A model file is searched, and written into ``out``. A design folder is repaired, as ``cure``
+    does it.
 
     Raises
     ------
@@ -81,9 +81,9 @@ def search(
         raise InputError(path, "MODEL|DIR", MISSING, "a model file or a design folder")
     if isinstance(path, Path) and path.is_dir():
         _refuse({"--samples": samples, "--rung": rung}, "no such option with a design folder")
-        from designer.jobs import cure_job
+        from designer.jobs import repair_job
 
-        return cure_job.cure(
+        return repair_job.cure(
             path,
             yield_=yield_,
             ppm=ppm,
@@ -125,14 +125,14 @@ def _refuse(options: Mapping[str, object], expected: str) -> None:
 
 def show(result: JobOutcome | CureResult) -> None:
     """The tables, where the files are, and what may be done next."""
-    from designer.jobs.job_outcome import JobOutcome  # a search need not import the cure
+    from designer.jobs.job_outcome import JobOutcome  # a search need not import the repair
 
     if isinstance(result, JobOutcome):
         design_written(result, result.answer, tables, next_steps.after_study)
     else:
-        from designer.centering import cure_table
+        from designer.centering import repair_table
 
-        tell(cure_table.text(result.answer))
+        tell(repair_table.text(result.answer))
 
 
 def tables(answer: Mapping[str, Any]) -> None:

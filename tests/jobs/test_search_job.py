@@ -100,7 +100,7 @@ def test_the_final_study_takes_its_fidelity_by_a_trade_and_says_so(
     assert len(heard.notes) == 1
 
 
-def test_a_cure_has_no_fidelity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_repair_has_no_fidelity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("search", tmp_path, "--yield", 0.9, "--rung", "exact", "-q") == 2
     assert "--rung" in capsys.readouterr().err  # a cure is decided on the exact circuit
 

@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.toml_writer import toml_text
 from designer.board.board_parts import drive_resistance, driven_nodes
-from designer.centering.cure_upgrade import with_same_parts
+from designer.centering.repair_upgrade import with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
 from designer.circuit.board_parts_only import Trimmer

@@ -1,4 +1,4 @@
-"""The studies of a cure: fresh boards, as many as it takes to tell on which side of the target a
+"""The studies of a repair: fresh boards, as many as it takes to tell on which side of the target a
 yield is. Where so few may be lost that counting does not tell, they are drawn where they are lost
 (``yields.rare_losses``). All are stored, so that interrupted work goes on."""
 
@@ -37,7 +37,7 @@ MOST_PLAIN, PLAIN_BLOCK = 400_000, 10_000
 """Boards drawn as they are by which a share is bounded of which no search met a loss, and how many
 are asked together."""
 TAG = 0xC04E
-"""Sets the boards of a cure apart from those of a study with the same seed."""
+"""Sets the boards of a repair apart from those of a study with the same seed."""
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
 _RARE = "rare"
@@ -61,7 +61,7 @@ class RareShare:
 
 
 def study_seed(seed: int, number: int) -> int:
-    """The seed of study ``number`` of a cure: boards that no other one has seen."""
+    """The seed of study ``number`` of a repair: boards that no other one has seen."""
     return int(np.random.SeedSequence([seed, number, TAG]).generate_state(1)[0])
 
 

@@ -1,4 +1,4 @@
-"""What the slots of a cure's program have to do with each other: rows of it, as demands.
+"""What the slots of a repair's program have to do with each other: rows of it, as demands.
 
 A trimmer that is set is set for every response. A part is an element of one array at most, and then
 has no grade of its own.
@@ -12,8 +12,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.parts_catalog import Catalog
-from designer.centering.cure_milp import Demand, Slot
-from designer.centering.cure_slots import PartSlot
+from designer.centering.repair_milp import Demand, Slot
+from designer.centering.repair_slots import PartSlot
 
 
 def couplings(

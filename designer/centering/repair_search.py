@@ -1,11 +1,11 @@
-"""The search for the cheapest cure: upgrades that bring every wanted response to the yield that is
-asked for (docs/cure.md).
+"""The search for the cheapest repair: upgrades that bring every wanted response to the yield that
+is asked for (docs/cure.md).
 
-Rounds of choosing and measuring. Each branch (``cure_branch``) has a linear picture
-(``cure_linear_model``); the cheapest choice of upgrades that it promises to be enough is found by
-mixed-integer optimisation (``cure_milp``) and put to fresh boards on the exact circuit. A response
-that falls short has its demand tightened by what was measured, and the next round chooses again.
-Branches are made only as far as they may be cheaper than what is known.
+Rounds of choosing and measuring. Each branch (``repair_branch``) has a linear picture
+(``repair_linear_model``); the cheapest choice of upgrades that it promises to be enough is found by
+mixed-integer optimisation (``repair_milp``) and put to fresh boards on the exact circuit. A
+response that falls short has its demand tightened by what was measured, and the next round chooses
+again. Branches are made only as far as they may be cheaper than what is known.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import numpy as np
 
 from designer.base.defaults import cores
 from designer.base.progress import Progress, best_so_far, seeking
-from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch, Refused, branches
-from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import LinearModel, picture, pictured, tail_quantile
-from designer.centering.cure_measure import (
+from designer.centering.limiting_parts import joint_boards, limiting
+from designer.centering.repair_branch import TRIM, TRIMMER, Refused, RepairBranch, branches
+from designer.centering.repair_couplings import finest
+from designer.centering.repair_linear_model import LinearModel, picture, pictured, tail_quantile
+from designer.centering.repair_measure import (
     FIRST,
     MOST,
     PLAIN_BLOCK,
@@ -35,11 +36,10 @@ from designer.centering.cure_measure import (
     study_seed,
     telling,
 )
-from designer.centering.cure_milp import CureProgram, cheapest
-from designer.centering.cure_trial import Cure, Trial
-from designer.centering.cure_upgrade import Upgrades
-from designer.centering.cure_ways import ResponseWay
-from designer.centering.limiting_parts import joint_boards, limiting
+from designer.centering.repair_milp import RepairProgram, cheapest
+from designer.centering.repair_trial import Repair, Trial
+from designer.centering.repair_upgrade import Upgrades
+from designer.centering.repair_ways import ResponseWay
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.model.model_file import need_responses
@@ -67,7 +67,7 @@ LARGEST_STEP = 2.0
 is so wrong says little about by how much."""
 
 
-def find_cure(
+def find_repair(
     base: Synthesis,
     target: float,
     *,
@@ -78,14 +78,14 @@ def find_cure(
     jobs: int | None = None,
     book: VerdictCache | None = None,
     progress: Progress | None = None,
-) -> Cure:
+) -> Repair:
     """Search, in memory.
 
     target : yield that the whole 95 % interval of every response is to reach. Where so few may be
     lost that counting does not tell (``is_rare``), losses are estimated, of boards as built: none
     is trimmed. budget : most that upgrades may cost [euro]. trim : half-width of the band of the
-    generator's DC offset. without : kinds of upgrades that are not wanted (``cure_branch.KINDS``).
-    book : verdicts that are known.
+    generator's DC offset. without : kinds of upgrades that are not wanted
+    (``repair_branch.KINDS``). book : verdicts that are known.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class _Search:
         self.without, self.seed, self.jobs = without, seed, jobs
         self.book, self.progress = book, progress
         self.waiting = branches(base, without)
-        self.known: list[CureBranch] = []
+        self.known: list[RepairBranch] = []
         self.pictures: list[LinearModel] = []
         self.refused: list[Refused] = []
         self.shrink: dict[tuple[int, int, int], float] = {}
@@ -128,7 +128,7 @@ class _Search:
         self.unseen: list[int] = []
         self.best: Trial | None = None
 
-    def run(self) -> Cure:
+    def run(self) -> Repair:
         before = self._before(1, "as it is")
         if before.reached and is_rare(self.target):
             before = self._confirmed(self._before, AS_IT_IS, "as it is")
@@ -269,14 +269,14 @@ class _Search:
             best = self._better(best, len(self.pictures) - 1, target)
         return None if best is None else best[1:]
 
-    def _next_branch(self, least: float | None) -> CureBranch | None:
+    def _next_branch(self, least: float | None) -> RepairBranch | None:
         """A branch that has no picture and may be cheaper than ``least``: None where there is none.
 
         All are made as soon as one is asked for beyond the first: their prices must be known.
         """
         if not self.pictures and not self.known and not self.refused:
             first = next(self.waiting)
-            assert isinstance(first, CureBranch)
+            assert isinstance(first, RepairBranch)
             return first
         if least is not None and least <= 0.0:
             return None
@@ -348,11 +348,11 @@ class _Search:
 
     def _price(self, which: int, pick: Sequence[int]) -> float:
         model = self.pictures[which]
-        return model.branch.extra + CureProgram(model.slots, ()).price(pick)
+        return model.branch.extra + RepairProgram(model.slots, ()).price(pick)
 
     def _cost(self, which: int, pick: Sequence[int]) -> float:
         model = self.pictures[which]
-        return model.branch.extra + CureProgram(model.slots, ()).cost(pick)
+        return model.branch.extra + RepairProgram(model.slots, ()).cost(pick)
 
     def _trial(
         self,
@@ -411,9 +411,9 @@ class _Search:
             key, rate = (which, r, w), m.interval[1]
             self.shrink[key] = min(self.shrink.get(key, 1.0), _shrink_factor(way, boards, rate))
 
-    def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
+    def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Repair:
         limits = tuple(self._limit(r) for r in range(len(self.base.model_responses)))
-        return Cure(
+        return Repair(
             self.base,
             self.target,
             self.budget,
@@ -497,7 +497,7 @@ class _Search:
         return tuple(front) if before in front else (before, *front)
 
 
-def _cut(program: CureProgram, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
+def _cut(program: RepairProgram, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
     """A factor on a way's room under which this choice no longer keeps its demands."""
     r, w = key
     demands = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.centering.cure_trial import Cure, Trial
+from designer.centering.repair_trial import Repair, Trial
 from designer.model.model_file import ModelFile
 
 MEASURED, PREDICTED = "#0072b2", "#e69f00"
@@ -19,19 +19,19 @@ MOST_WORDS = 100
 
 
 @styled
-def front_chart(cure: Cure) -> Figure:
+def front_chart(repair: Repair) -> Figure:
     """Yield of the worst response over the price of the upgrades: measured with its 95 % interval,
     and as the linear picture promised; the upgrades are listed by number.
 
     Where nothing that was tried costs anything, the rounds take the place of the price.
     """
-    front, free = cure.front, all(t.price == 0.0 for t in cure.front)
+    front, free = repair.front, all(t.price == 0.0 for t in repair.front)
     if free:
-        front = (cure.before, *cure.rounds)
+        front = (repair.before, *repair.rounds)
     figure = new_figure(7.4, 3.4 + 0.17 * len(front))
     top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.3 + 0.17 * len(front)))
     along = [float(k) if free else t.price for k, t in enumerate(front)]
-    lowest = _yields(top, cure, front, along)
+    lowest = _yields(top, repair, front, along)
     room = 0.07 * (100.0 - lowest)
     top.set_ylim(lowest - room, 100.0 + room)
     if free:
@@ -41,22 +41,22 @@ def front_chart(cure: Cure) -> Figure:
     else:
         # An upgrade may be cheaper than what it replaces.
         cheapest, dearest = min(0.0, *along), max(0.0, *along)
-        if cure.budget is not None and cure.budget <= FAR * dearest:
-            top.axvline(cure.budget, color=MUTED, lw=0.8, ls=":", label="budget")
-            dearest = max(dearest, cure.budget)
+        if repair.budget is not None and repair.budget <= FAR * dearest:
+            top.axvline(repair.budget, color=MUTED, lw=0.8, ls=":", label="budget")
+            dearest = max(dearest, repair.budget)
         width = dearest - cheapest
         top.set_xlim(left=cheapest - 0.04 * width, right=dearest + 0.1 * width)
         top.set_xlabel("price of the upgrades [euro, by the catalogue's price classes]")
     over = "round by round" if free else "against price"
     top.set_ylabel("yield of the worst response [%]")
-    top.set_title(f"{cure.base.modelfile.title}: yield {over}", loc="left")
+    top.set_title(f"{repair.base.modelfile.title}: yield {over}", loc="left")
     top.grid(color=GRID, lw=0.7)
     top.legend(loc="lower right")
-    _listed(bottom, front, cure.base.modelfile)
+    _listed(bottom, front, repair.base.modelfile)
     return figure
 
 
-def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[float]) -> float:
+def _yields(axes: Axes, repair: Repair, front: Sequence[Trial], along: Sequence[float]) -> float:
     """The points of the front over ``along``; the lowest yield that is drawn [%]."""
     rates = [100.0 * t.worst.rate for t in front]
     ends = [t.worst.interval for t in front]
@@ -71,19 +71,19 @@ def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[floa
     promised = [
         (x, 100.0 * min(t.predicted))
         for x, t in zip(along, front, strict=True)
-        if t is not cure.before
+        if t is not repair.before
     ]
     if promised:
         axes.plot(*zip(*promised, strict=True), "x", ms=6, color=PREDICTED, label="linear picture")
-    label = f"asked for: {100.0 * cure.target:g} %"
-    axes.axhline(100.0 * cure.target, color=INK, lw=0.8, ls="--", label=label)
+    label = f"asked for: {100.0 * repair.target:g} %"
+    axes.axhline(100.0 * repair.target, color=INK, lw=0.8, ls="--", label=label)
     for number, (x, y) in enumerate(zip(along, rates, strict=True)):
         axes.annotate(
             str(number), (x, y), xytext=(7, -11), textcoords="offset points", color=MUTED, size=8
         )
     lowest = [100.0 * low for low, _ in ends] + [y for _, y in promised]
-    below = min(1.0, 5.0 * (100.0 - 100.0 * cure.target))
-    return min(*lowest, 100.0 * cure.target - below)
+    below = min(1.0, 5.0 * (100.0 - 100.0 * repair.target))
+    return min(*lowest, 100.0 * repair.target - below)
 
 
 def _listed(axes: Axes, front: Sequence[Trial], file: ModelFile) -> None:

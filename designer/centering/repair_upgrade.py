@@ -78,7 +78,7 @@ class Upgrades:
     def in_words(self, file: ModelFile) -> list[str]:
         """Each upgrade in a few words, the same grade of several parts together.
 
-        file : the model file that is cured.
+        file : the model file that is repaired.
         """
         phrases = []
         if self.opamp is not None:
@@ -144,7 +144,7 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     if upgrades.opamp is not None:
         circuit["opamp"] = upgrades.opamp
         circuit.pop("saturation", None)
-    # A stage that was chosen for the file is the one that is cured: it is not chosen again.
+    # A stage that was chosen for the file is the one that is repaired: it is not chosen again.
     zone = upgrades.dead_zone or modelfile.circuit.dead_zone
     if zone is not None:
         circuit["dead_zone"] = zone

@@ -1,6 +1,6 @@
-"""Whole cures of real boards by one kind of upgrade, the only one allowed. What is promised is held
-against the plain tolerance study of the cured folder, on boards of a seed that the cure has not
-seen, and the price against the two folders' bills."""
+"""Whole repairs of real boards by one kind of upgrade, the only one allowed. What is promised is
+held against the plain tolerance study of the repaired folder, on boards of a seed that the repair
+has not seen, and the price against the two folders' bills."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ import pytest
 from designer.base.design_folder import MODEL
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
-from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
-from designer.centering.cure_measure import plan_of, questions_of
+from designer.centering.repair_branch import KINDS, PLACE, TRIMMER
+from designer.centering.repair_measure import plan_of, questions_of
 from designer.folders.design_source import read_design
-from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
+from designer.jobs.repair_job import repair_into
 from designer.jobs.study_job import run_into
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file, read_model_file
@@ -26,7 +26,7 @@ from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
 
 FRESH = Options(seed=4242, samples=400, rung="exact")
-"""Of the study by which a cure is judged."""
+"""Of the study by which a repair is judged."""
 
 
 def text(omega: float, expect: str, b: float = 0.25, dead_zone: str = "saturation") -> str:
@@ -48,26 +48,26 @@ dead_zone = "{dead_zone}"
 
 @dataclass(frozen=True)
 class Whole:
-    """A design folder, the one of its cure by one kind of upgrade, and what the cure says."""
+    """A design folder, the one of its repair by one kind of upgrade, and what the repair says."""
 
     design: Path
-    cured: Path
+    repaired: Path
     answer: dict[str, Any]
 
     @property
     def told(self) -> dict[str, Any]:
-        """The one response, as the cure tells it."""
+        """The one response, as the repair tells it."""
         (response,) = self.answer["responses"]
         return cast(dict[str, Any], response)
 
 
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
-    """The cure of this model file's design by this kind alone."""
-    design, cured = where / "design", where / "cured"
+    """The repair of this model file's design by this kind alone."""
+    design, repaired = where / "design", where / "cured"
     synthesise_into(parse_model_file(model), design, Options(), Progress())
-    found = cure_into(design, target=target, without=set(KINDS) - {kind}, out=cured)
+    found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
-    return Whole(design, cured, found.answer)
+    return Whole(design, repaired, found.answer)
 
 
 def studied(folder: Path, options: Options = FRESH) -> dict[str, Any]:
@@ -96,7 +96,7 @@ def is_kept(found: Whole, before: dict[str, Any], after: dict[str, Any]) -> None
     assert after["failed"] == 0
     assert after["low"] <= found.told["after"]["rate"] <= after["high"]
     assert after["high"] >= target
-    extra = euro(found.cured) - euro(found.design)
+    extra = euro(found.repaired) - euro(found.design)
     assert found.answer["price"] == pytest.approx(extra, abs=1e-9)
 
 
@@ -116,7 +116,7 @@ def test_another_b_alone(tmp_path: Path) -> None:
     is_kept(
         found,
         studied(found.design, replace(FRESH, samples=200))["yield"],
-        studied(found.cured)["yield"],
+        studied(found.repaired)["yield"],
     )
     made = read_design(found.design)
     (question,) = questions_of(made, made.model_responses)
@@ -131,7 +131,7 @@ def test_the_fitted_trimmer_alone(tmp_path: Path) -> None:
     found = whole(tmp_path, text(0.215, "1-8-8", 0.262, "rectifier"), TRIMMER, 0.9)
     assert changed(found) == {"trimmer": True}
     assert found.answer["price"] > 0.0
-    before, after = studied(found.design), studied(found.cured)
+    before, after = studied(found.design), studied(found.repaired)
     is_kept(found, before["yield"], after["trimmed"])
     # As built, the boards of both folders are the same ones.
     assert after["yield"] == before["yield"]

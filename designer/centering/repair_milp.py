@@ -68,7 +68,7 @@ class Demand:
 
 
 @dataclass(frozen=True)
-class CureProgram:
+class RepairProgram:
     """What is to be chosen, and what the choice must keep."""
 
     slots: tuple[Slot, ...]
@@ -97,7 +97,7 @@ class CureProgram:
         yield from itertools.product(*(range(len(s.options)) for s in self.slots))
 
 
-def cheapest(program: CureProgram) -> tuple[int, ...] | None:
+def cheapest(program: RepairProgram) -> tuple[int, ...] | None:
     """The number of the option taken of each slot; None where no choice keeps the demands.
 
     Raises

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import bdtrc
 
-from designer.centering.cure_branch import PLACE, TRIM, CureBranch
-from designer.centering.cure_measure import VerdictCache, measure, plan_of, questions_of
-from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file, with_same_parts
+from designer.centering.repair_branch import PLACE, TRIM, RepairBranch
+from designer.centering.repair_measure import VerdictCache, measure, plan_of, questions_of
+from designer.centering.repair_upgrade import Upgrades, WindowPlace, upgraded_file, with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.part_rules import spread_of
@@ -112,7 +112,7 @@ def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
 class ResponseSurvey:
     """Computes the ways in which a branch may show each response."""
 
-    branch: CureBranch
+    branch: RepairBranch
     target: float
     """Yield that is wanted of every response."""
     seed: int
@@ -264,7 +264,7 @@ def first_boards(plan: StudyPlan, number: int) -> Boards:
     return plan.boards(range(number))
 
 
-def moved_question(branch: CureBranch, places: Mapping[int, WindowPlace]) -> Question | None:
+def moved_question(branch: RepairBranch, places: Mapping[int, WindowPlace]) -> Question | None:
     """What boards are asked of one response at another place; None where the circuit does not show
     it there, or a side condition breaks that held."""
     synthesis = branch.synthesis
@@ -283,7 +283,7 @@ def best_place(rate_map: YieldMap) -> float | None:
     use has it.
 
     Not ``recommended``, which stays where it is unless another setting is proved to be better: a
-    cure is measured before it is believed.
+    repair is measured before it is believed.
     """
     values, rate = np.array(rate_map.axes[0].values), rate_map.rate
     if rate[rate_map.axes[0].values.index(rate_map.used)] >= rate.max():

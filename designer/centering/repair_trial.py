@@ -1,13 +1,13 @@
-"""What a cure found: choices of upgrades, each with what was promised and what boards show."""
+"""What a repair found: choices of upgrades, each with what was promised and what boards show."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from designer.centering.cure_branch import Refused
-from designer.centering.cure_linear_model import LinearModel
-from designer.centering.cure_measure import MeasuredYield
-from designer.centering.cure_upgrade import Upgrades
+from designer.centering.repair_branch import Refused
+from designer.centering.repair_linear_model import LinearModel
+from designer.centering.repair_measure import MeasuredYield
+from designer.centering.repair_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
 
 
@@ -39,7 +39,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Cure:
+class Repair:
     """What was found."""
 
     base: Synthesis

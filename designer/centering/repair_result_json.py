@@ -1,4 +1,4 @@
-"""A cure as a JSON object and as rows of a table, by the keys of docs/cure.md."""
+"""A repair as a JSON object and as rows of a table, by the keys of docs/cure.md."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 
 from designer.base.csv_tables import csv_text
 from designer.base.plain_json import FORMAT
-from designer.centering.cure_measure import is_rare
-from designer.centering.cure_trial import Cure, Trial
+from designer.centering.repair_measure import is_rare
+from designer.centering.repair_trial import Repair, Trial
 from designer.model.model_file import ModelFile
 from designer.model.si_units import hertz_json
 
 COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
 
 
-def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+def repair_json(repair: Repair, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
     """Everything that was found. Prices are over the design as it is, in euro."""
-    best, file = cure.best, cure.base.modelfile
+    best, file = repair.best, repair.base.modelfile
     responses = [
         {
             "omega": r.omega,
@@ -30,35 +30,39 @@ def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict
             "limit": limit,
         }
         for r, before, after, limit in zip(
-            cure.base.model_responses, cure.before.measured, best.measured, cure.limits, strict=True
+            repair.base.model_responses,
+            repair.before.measured,
+            best.measured,
+            repair.limits,
+            strict=True,
         )
     ]
     return {
         "format": FORMAT,
-        "reached": cure.reached,
-        "why": cure.why,
-        "target": cure.target,
-        "budget": cure.budget,
+        "reached": repair.reached,
+        "why": repair.why,
+        "target": repair.target,
+        "budget": repair.budget,
         "price": best.price,
         "branch": best.branch,
         "upgrades": best.upgrades.as_dict(),
         "said": best.upgrades.in_words(file),
         "responses": responses,
-        "rounds": [_trial(t, file) for t in cure.rounds],
-        "front": [_trial(t, file) for t in cure.front],
-        "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in cure.refused],
+        "rounds": [_trial(t, file) for t in repair.rounds],
+        "front": [_trial(t, file) for t in repair.front],
+        "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in repair.refused],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
 
 
-def front_csv(cure: Cure) -> str:
+def front_csv(repair: Repair) -> str:
     """The front of yield against price: the yield is that of the worst response."""
     rows = []
-    for t in cure.front:
+    for t in repair.front:
         low, high = t.worst.interval
         asked, rare = t.worst.counts, t.worst.rare
-        digits = 9 if is_rare(cure.target) else 5
+        digits = 9 if is_rare(repair.target) else 5
         rows.append(
             {
                 "price_euro": f"{t.price:.4g}",
@@ -67,7 +71,7 @@ def front_csv(cure: Cure) -> str:
                 "low": f"{low:.{digits}g}",
                 "high": f"{high:.{digits}g}",
                 "samples": str(asked.samples if rare is None else rare.boards),
-                "upgrades": "; ".join(t.upgrades.in_words(cure.base.modelfile)),
+                "upgrades": "; ".join(t.upgrades.in_words(repair.base.modelfile)),
                 "failed": str(t.worst.counts.failed),
             }
         )

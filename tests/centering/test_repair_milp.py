@@ -1,4 +1,4 @@
-"""The program of the cure against enumeration."""
+"""The program of the repair against enumeration."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from designer.centering.cure_milp import CureProgram, Demand, Option, Slot, cheapest
+from designer.centering.repair_milp import Demand, Option, RepairProgram, Slot, cheapest
 
 
-def enumerated(program: CureProgram) -> float | None:
+def enumerated(program: RepairProgram) -> float | None:
     """The least cost of all choices that keep the demands, by trying each."""
     costs = [program.cost(pick) for pick in program.picks() if program.keeps(pick)]
     return min(costs, default=None)
 
 
-def random_program(seed: int) -> CureProgram:
+def random_program(seed: int) -> RepairProgram:
     """A few slots of one to three options; some demands apply under one option alone."""
     rng = np.random.default_rng(seed)
     slots = tuple(
@@ -38,7 +38,7 @@ def random_program(seed: int) -> CureProgram:
             when = (slot, int(rng.integers(len(slots[slot].options))))
         room = -1.0 if rng.random() < 0.1 else total * float(rng.uniform(0.4, 1.2))
         demands.append(Demand(f"d{number}", room, variances, when))
-    return CureProgram(slots, tuple(demands))
+    return RepairProgram(slots, tuple(demands))
 
 
 @settings(max_examples=25)
@@ -64,8 +64,8 @@ def test_trouble_decides_between_equal_prices_only() -> None:
     parts = Slot("R1", (Option("as is", 0.0), Option("0.1 %", 0.02)))
     variances = (np.array([0.0, 0.0, 0.0]), np.array([4.0, 1.0]))
     held = [Demand("stated", 2.0, variances, (0, 0)), Demand("moved", 5.0, variances, (0, 1))]
-    assert cheapest(CureProgram((free, parts), tuple(held))) == (1, 0)
+    assert cheapest(RepairProgram((free, parts), tuple(held))) == (1, 0)
     held[1] = Demand("moved", 2.0, variances, (0, 1))
-    assert cheapest(CureProgram((free, parts), tuple(held))) == (2, 0)
+    assert cheapest(RepairProgram((free, parts), tuple(held))) == (2, 0)
     held.append(Demand("trim", -1.0, variances, (0, 2)))
-    assert cheapest(CureProgram((free, parts), tuple(held))) == (0, 1)
+    assert cheapest(RepairProgram((free, parts), tuple(held))) == (0, 1)

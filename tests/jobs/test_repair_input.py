@@ -1,4 +1,5 @@
-"""What a cure is asked: kinds by name, a place for the cured design, a spread with picked parts."""
+"""What a repair is asked: kinds by name, a place for the repaired design, a spread with picked
+parts."""
 
 from __future__ import annotations
 
@@ -15,11 +16,11 @@ import pytest
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
-from designer.centering.cure_branch import KINDS, kind_named
-from designer.centering.cure_upgrade import Upgrades, upgraded_file
+from designer.centering.repair_branch import KINDS, kind_named
+from designer.centering.repair_upgrade import Upgrades, upgraded_file
 from designer.cli import entry
-from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
+from designer.jobs.repair_job import repair_into
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
@@ -94,7 +95,7 @@ def test_kinds_by_either_name_are_the_same_inputs(design: Path, tmp_path: Path) 
     for name in ("dead-zone", "dead zone"):
         folder = Path(shutil.copytree(design, tmp_path / name))
         with pytest.raises(_Worked):
-            cure_into(folder, target=0.9, without=(name,), progress=_NoWork())
+            repair_into(folder, target=0.9, without=(name,), progress=_NoWork())
         manifest = json.loads((folder / "manifest.json").read_text())
         said.append(manifest["stages"]["cure"]["inputs"]["without"])
     assert said == [["dead zone"], ["dead zone"]]
@@ -107,16 +108,16 @@ def test_a_place_with_a_design_is_refused_before_the_work(
     before = {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()}
     own = Path(shutil.copytree(design, tmp_path / "own"))
     with pytest.raises(InputError) as refused:
-        cure_into(own, target=0.9, out=other, progress=_NoWork())
+        repair_into(own, target=0.9, out=other, progress=_NoWork())
     assert refused.value.field == "--out"
     assert "cure" not in json.loads((own / "manifest.json").read_text())["stages"]
     assert {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()} == before
     # The user says that it may go, or the place is free: then work begins.
     with pytest.raises(_Worked):
-        cure_into(own, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
+        repair_into(own, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
     third = Path(shutil.copytree(design, tmp_path / "third"))
     with pytest.raises(_Worked):
-        cure_into(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
+        repair_into(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
 
 
 def test_a_file_in_the_way_is_refused_before_the_work(
@@ -128,7 +129,7 @@ def test_a_file_in_the_way_is_refused_before_the_work(
     del manifest["files"]["setup.csv"]
     (other / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(InputError, match="does not list"):
-        cure_into(
+        repair_into(
             design, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork()
         )
     assert "cure" not in json.loads((design / "manifest.json").read_text())["stages"]
@@ -197,8 +198,8 @@ def test_a_damaged_study_is_made_again_and_no_other(
         save({"format": 1, "studies": studies})
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("designer.jobs.cure_job.VerdictCache", lambda known, save: (known, save))
-    monkeypatch.setattr("designer.jobs.cure_job.find_cure", interrupted)
+    monkeypatch.setattr("designer.jobs.repair_job.VerdictCache", lambda known, save: (known, save))
+    monkeypatch.setattr("designer.jobs.repair_job.find_repair", interrupted)
     words = ["search", str(out), "--yield", "0.9"]
     assert [entry.status(words), entry.status([*words, "--resume"])] == [130, 130]
     assert seen == [{}, studies]

@@ -10,14 +10,14 @@ from typing import cast
 import numpy as np
 import pytest
 
-from designer.centering import cure_linear_model, cure_measure, cure_search
-from designer.centering.cure_branch import KINDS, CureBranch, cured
-from designer.centering.cure_measure import MeasuredYield, VerdictCache
-from designer.centering.cure_search import find_cure
-from designer.centering.cure_slots import part_slots
-from designer.centering.cure_trial import Cure
-from designer.centering.cure_upgrade import Upgrades, price
-from designer.centering.cure_ways import ResponseWay
+from designer.centering import repair_linear_model, repair_measure, repair_search
+from designer.centering.repair_branch import KINDS, RepairBranch, repaired
+from designer.centering.repair_measure import MeasuredYield, VerdictCache
+from designer.centering.repair_search import find_repair
+from designer.centering.repair_slots import part_slots
+from designer.centering.repair_trial import Repair
+from designer.centering.repair_upgrade import Upgrades, price
+from designer.centering.repair_ways import ResponseWay
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
@@ -41,8 +41,8 @@ def design(p: int, omega: float, zone: str) -> Synthesis:
     return synthesise(parse_model_file("format = 1\n" + PAPER_TABLE + wanted + circuit + tuning))
 
 
-def only(kind: str, base: Synthesis, target: float) -> Cure:
-    return find_cure(base, target, trim=BAND, without=frozenset(KINDS) - {kind}, seed=3, jobs=1)
+def only(kind: str, base: Synthesis, target: float) -> Repair:
+    return find_repair(base, target, trim=BAND, without=frozenset(KINDS) - {kind}, seed=3, jobs=1)
 
 
 def test_the_references_are_taken_where_they_move_the_limit(
@@ -66,17 +66,17 @@ def test_the_references_are_taken_where_they_move_the_limit(
 
     slots = part_slots(base, frozenset(KINDS) - {"reference"})
     (slot,) = slots
-    branch = CureBranch(Upgrades(), base, 0.0)
+    branch = RepairBranch(Upgrades(), base, 0.0)
     way = ResponseWay(0, "as it is", cast(Question, None), None, margin, 0.5)
-    ratios = cure_linear_model._ratios(branch, slots, 5)
-    seen = cure_linear_model.LinearModel(branch, slots, ((way,),), ratios, 0.0, 5)
-    monkeypatch.setattr(cure_search, "picture", lambda *_, **__: seen)
-    monkeypatch.setattr(cure_search, "measure", counted)
-    monkeypatch.setattr(cure_measure, "measure", counted)
+    ratios = repair_linear_model._ratios(branch, slots, 5)
+    seen = repair_linear_model.LinearModel(branch, slots, ((way,),), ratios, 0.0, 5)
+    monkeypatch.setattr(repair_search, "picture", lambda *_, **__: seen)
+    monkeypatch.setattr(repair_search, "measure", counted)
+    monkeypatch.setattr(repair_measure, "measure", counted)
     found = only("reference", base, target)
     enough = {}
     for k, model in enumerate(slot.models):
-        made = cured(base, Upgrades(reference=model) if k else Upgrades())
+        made = repaired(base, Upgrades(reference=model) if k else Upgrades())
         spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
         drawn = draw_many(made.design.circuit, spread, OTHER_SEED, range(8000))
         if (margin.of(drawn) > 0.0).mean() >= target:

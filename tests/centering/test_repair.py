@@ -1,5 +1,5 @@
-"""The cure: its linear picture against drawn boards, its loop against a truth that is known, and a
-whole one."""
+"""The repair: its linear picture against drawn boards, its loop against a truth that is known, and
+a whole one."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from designer.base.errors import InputError
 from designer.base.figure_style import to_svg
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
-from designer.centering import cure_measure, cure_search
-from designer.centering.cure_branch import CureBranch
-from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import LinearModel, share_above, tail_quantile
-from designer.centering.cure_measure import (
+from designer.centering import repair_measure, repair_search
+from designer.centering.repair_branch import RepairBranch
+from designer.centering.repair_couplings import finest
+from designer.centering.repair_linear_model import LinearModel, share_above, tail_quantile
+from designer.centering.repair_measure import (
     MOST_PLAIN,
     MeasuredYield,
     RareShare,
@@ -38,19 +38,19 @@ from designer.centering.cure_measure import (
     measure_together,
     telling,
 )
-from designer.centering.cure_milp import cheapest
-from designer.centering.cure_plots import front_chart
-from designer.centering.cure_result_json import cure_json
-from designer.centering.cure_search import find_cure
-from designer.centering.cure_slots import PartSlot, network_slots, part_slots, trimmer_slot
-from designer.centering.cure_table import text
-from designer.centering.cure_trial import Cure, Trial
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
-from designer.centering.cure_ways import ResponseWay, best_place
+from designer.centering.repair_milp import cheapest
+from designer.centering.repair_plots import front_chart
+from designer.centering.repair_result_json import repair_json
+from designer.centering.repair_search import find_repair
+from designer.centering.repair_slots import PartSlot, network_slots, part_slots, trimmer_slot
+from designer.centering.repair_table import text
+from designer.centering.repair_trial import Repair, Trial
+from designer.centering.repair_upgrade import Upgrades, price, upgraded_file, with_same_parts
+from designer.centering.repair_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
 from designer.jobs import fidelity_choice
-from designer.jobs.cure_job import CURE, FEWEST_LOST, STUDIES, cure, cure_into
 from designer.jobs.options import Options
+from designer.jobs.repair_job import FEWEST_LOST, REPAIR, STUDIES, cure, repair_into
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
@@ -80,8 +80,8 @@ TARGET = 0.97
 
 
 @cache
-def branch() -> CureBranch:
-    return CureBranch(Upgrades(), paper_cases.synthesised(), 0.0)
+def branch() -> RepairBranch:
+    return RepairBranch(Upgrades(), paper_cases.synthesised(), 0.0)
 
 
 @cache
@@ -102,11 +102,11 @@ def known_margin(nominal: float, otherwise: bool = False) -> Margin:
 
 def known_picture(nominal: float) -> LinearModel:
     """The picture of that limit: the better grades of a few parts are what can be bought."""
-    from designer.centering import cure_linear_model
+    from designer.centering import repair_linear_model
 
     parts = tuple(p for p in part_slots(branch().synthesis) if p.slot.name in SLOTS)
     way = ResponseWay(0, "as it is", bench_plans.question(1), None, known_margin(nominal), 0.5)
-    ratios = cure_linear_model._ratios(branch(), parts, 5)
+    ratios = repair_linear_model._ratios(branch(), parts, 5)
     return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5)
 
 
@@ -179,15 +179,15 @@ def searched(
     budget: float | None = None,
     progress: Progress | None = None,
     target: float = TARGET,
-) -> Cure:
+) -> Repair:
     """The search with this picture, where ``real`` is what studies measure."""
     taken = (lambda *_, **__: picture) if isinstance(picture, LinearModel) else picture
-    monkeypatch.setattr(cure_search, "picture", taken)
-    monkeypatch.setattr(cure_search, "measure", real)
-    monkeypatch.setattr(cure_measure, "measure", real)  # as measure_together calls it
-    monkeypatch.setattr(cure_search, "questions_of", lambda *_: [bench_plans.question(1)])
-    monkeypatch.setattr(cure_search, "branches", lambda *_: iter([branch()]))
-    return find_cure(one_response(), target, budget=budget, seed=1, jobs=1, progress=progress)
+    monkeypatch.setattr(repair_search, "picture", taken)
+    monkeypatch.setattr(repair_search, "measure", real)
+    monkeypatch.setattr(repair_measure, "measure", real)  # as measure_together calls it
+    monkeypatch.setattr(repair_search, "questions_of", lambda *_: [bench_plans.question(1)])
+    monkeypatch.setattr(repair_search, "branches", lambda *_: iter([branch()]))
+    return find_repair(one_response(), target, budget=budget, seed=1, jobs=1, progress=progress)
 
 
 RARE_TARGET = 1.0 - 3e-4
@@ -201,7 +201,7 @@ def share_lost(circuit: Circuit, spread: Spread, seed: int, nominal: float) -> f
 
 
 @pytest.mark.slow
-def test_a_rare_loss_is_cured_for_the_least_price(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rare_loss_is_repaired_for_the_least_price(monkeypatch: pytest.MonkeyPatch) -> None:
     """Against each choice, of which many boards are counted; no choice is taken on plain boards
     that are too few to tell, and the last estimate is of boards that no other had."""
     nominal, asked = 10.5, list[int]()
@@ -217,7 +217,7 @@ def test_a_rare_loss_is_cured_for_the_least_price(monkeypatch: pytest.MonkeyPatc
         lost = share_lost(plan.circuit, plan.spread, plan.seed, nominal)
         return MeasuredYield(Yield(250 - round(250 * lost), round(250 * lost), 0, 0), target)
 
-    monkeypatch.setattr(cure_measure, "rare_losses", counted)
+    monkeypatch.setattr(repair_measure, "rare_losses", counted)
     found = searched(monkeypatch, known_picture(nominal), few, target=RARE_TARGET)
     assert found.reached
     (measured,) = found.best.measured
@@ -232,12 +232,12 @@ def test_a_rare_loss_is_cured_for_the_least_price(monkeypatch: pytest.MonkeyPatc
     ]
     program = seen.program({(0, 0, 0): 1.0}, {})
     assert found.best.price == pytest.approx(min(program.price((*p, 0)) for p in enough))
-    assert "of a million lost" in text(cure_json(found, {}, 0.0))
+    assert "of a million lost" in text(repair_json(found, {}, 0.0))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("promised", "real"), [(6.5, 6.5), (8.0, 5.5)])
-def test_the_cheapest_cure_is_the_enumerated_one(
+def test_the_cheapest_repair_is_the_enumerated_one(
     monkeypatch: pytest.MonkeyPatch, promised: float, real: float
 ) -> None:
     """promised : the limit's nominal value in the picture; real : on the boards, which the first
@@ -248,7 +248,7 @@ def test_the_cheapest_cure_is_the_enumerated_one(
     assert found.best.price == pytest.approx(by_hand(real))
     worst = [t.worst.rate for t in found.front]
     assert worst == sorted(worst)
-    told = text(cure_json(found, {}, 0.0))
+    told = text(repair_json(found, {}, 0.0))
     assert "every response at 97 % or better" in told
     assert "ω = " in told
     assert to_svg(front_chart(found)).startswith("<svg")
@@ -315,7 +315,7 @@ def test_the_picture_knows_what_missed(
 def test_what_boards_show_is_said_before_the_search_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Nothing was told of the design as it is until the cure's report stood, minutes later."""
+    """Nothing was told of the design as it is until the repair's report stood, minutes later."""
     said: list[str] = []
     heard = Progress()
     monkeypatch.setattr(heard, "note", said.append)
@@ -377,7 +377,7 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
         ends = {"low": 2e-6, "high": 8e-6 if plan.seed == 5 else 8e-5}
         return SimpleNamespace(lost=5e-6, **ends, unseen=1e-3, boards=2000, pilots=500)
 
-    monkeypatch.setattr(cure_measure, "rare_losses", few)
+    monkeypatch.setattr(repair_measure, "rare_losses", few)
     coins(monkeypatch, asked, 1.0)
     kept: dict[str, Any] = {}
     fine, other, out = (
@@ -415,7 +415,7 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
     def none(*_: object, **__: object) -> Any:
         return SimpleNamespace(lost=0.0, low=0.0, high=1e-3, unseen=1e-3, boards=2000, pilots=0)
 
-    monkeypatch.setattr(cure_measure, "rare_losses", none)
+    monkeypatch.setattr(repair_measure, "rare_losses", none)
     coins(monkeypatch, asked, 1.0)
     plan = replace(bench_plans.plan(1, samples=8000), seed=2)
     (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
@@ -423,7 +423,7 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
     assert found.rare is not None
     boards = asked[-1][1].stop + 3000  # what the searches had drawn as they are
     assert found.rare.high == pytest.approx(3.0 / boards, rel=2e-3)
-    assert 3.0 / (boards - cure_measure.PLAIN_BLOCK) > 1e-4  # no more than the target takes
+    assert 3.0 / (boards - repair_measure.PLAIN_BLOCK) > 1e-4  # no more than the target takes
     coins(monkeypatch, asked, 1.0 - 1.5e-4)
     (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
     assert not found.reached
@@ -433,7 +433,7 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
 
 def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     """A region of losses may be met by one of them alone."""
-    search = object.__new__(cure_search._Search)
+    search = object.__new__(repair_search._Search)
     search.target, notes = 1.0 - 1e-5, list[str]()
     search.progress = Progress()
     monkeypatch.setattr(search.progress, "note", notes.append)
@@ -495,7 +495,7 @@ def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.Mo
     plans = [(replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (2, 1, 4, 3)]
     fine, out, close, last = measure_together(plans, 0.99, VerdictCache())
     assert out.missed
-    assert out.counts.samples == cure_measure.FIRST
+    assert out.counts.samples == repair_measure.FIRST
     assert close.missed
     assert close.counts.samples == 2 * BLOCK
     for other in (fine, last):
@@ -516,13 +516,13 @@ def test_the_boards_of_a_study_are_those_of_a_longer_one(monkeypatch: pytest.Mon
     asked: list[tuple[int, range]] = []
     coins(monkeypatch, asked)
     plan = replace(bench_plans.plan(1, samples=8000), seed=2)
-    early = measure(plan, 0.99, VerdictCache(), first=cure_measure.FIRST)
+    early = measure(plan, 0.99, VerdictCache(), first=repair_measure.FIRST)
     boards = [i for _, indices in asked for i in indices]
     assert boards == list(range(early.counts.samples))
     book = VerdictCache()
     assert measure(plan, 0.99, book, most=early.counts.samples) == early
     known = len(asked)
-    book.block(plan, range(cure_measure.FIRST), None, 1)
+    book.block(plan, range(repair_measure.FIRST), None, 1)
     assert len(asked) == known
 
 
@@ -555,7 +555,7 @@ def test_the_best_place_is_the_middle_of_the_best_row(
 
 
 def test_seeds_are_their_own() -> None:
-    seeds = [cure_measure.study_seed(seed, number) for seed in range(4) for number in range(12)]
+    seeds = [repair_measure.study_seed(seed, number) for seed in range(4) for number in range(12)]
     assert len(set(seeds)) == len(seeds)
     assert not set(seeds) & set(range(1000))
 
@@ -599,7 +599,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
     )
     for field, arguments in asked:
         with pytest.raises(InputError) as refused:
-            cure_into(design, **cast(Any, arguments))
+            repair_into(design, **cast(Any, arguments))
         assert refused.value.field == field
     fewest = 1e-6 * FEWEST_LOST
     assert telling(1.0 - fewest) < MOST_PLAIN
@@ -647,20 +647,20 @@ def test_a_trade_that_sends_every_board_to_ngspice_is_told(
     monkeypatch.setattr(fidelity_choice, "choose", lambda _: choice)
     said = _Notes()
     with pytest.raises(_Stopped):
-        cure_into(folder, target=0.99, progress=said)
+        repair_into(folder, target=0.99, progress=said)
     assert len(said.notes) == told
     assert all(choice.reason in note for note in said.notes)
 
 
 @pytest.mark.slow
-def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
+def test_a_design_is_repaired_and_its_repair_is_a_design(tmp_path: Path) -> None:
     from designer.jobs.study_job import run_into
 
     design = tmp_path / "design"
     synthesise_into(parse_model_file(SMALL), design, Options(), Progress())
     other = Path(shutil.copytree(design, tmp_path / "stopped"))
     out = tmp_path / "cured"
-    found = cure_into(design, target=0.99, without=WITHOUT, out=out)
+    found = repair_into(design, target=0.99, without=WITHOUT, out=out)
     answer = found.answer
     assert found.reached
     (response,) = answer["responses"]
@@ -669,15 +669,15 @@ def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
     assert answer["rounds"][-1]["measured"] == [response["after"]]
 
     with pytest.raises(_Stopped):
-        cure_into(other, target=0.99, without=WITHOUT, progress=_Stops())
+        repair_into(other, target=0.99, without=WITHOUT, progress=_Stops())
     with pytest.raises(InputError, match="unfinished"):
-        cure_into(other, target=0.99, without=WITHOUT)
-    cure_into(other, target=0.99, without=WITHOUT, options=Options(resume=True))
+        repair_into(other, target=0.99, without=WITHOUT)
+    repair_into(other, target=0.99, without=WITHOUT, options=Options(resume=True))
     for name in ("cure-front.csv", "cure-front.png", "cure-front.svg", STUDIES):
         assert (other / name).read_bytes() == (design / name).read_bytes()
-    one, two = (json.loads((f / CURE).read_text()) for f in (design, other))
+    one, two = (json.loads((f / REPAIR).read_text()) for f in (design, other))
     assert {**one, "cost": 0} == {**two, "cost": 0}
-    assert cure_into(design, target=0.99, without=WITHOUT).reused
+    assert repair_into(design, target=0.99, without=WITHOUT).reused
 
     options = Options(seed=99, samples=400, rung="exact")
     modelfile = parse_model_file((out / "model.toml").read_text(encoding="utf-8"), out / "m.toml")
@@ -783,7 +783,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
         plain, trimmed = seen.ways[0]
         return replace(seen, ways=((plain, replace(trimmed, margin=Margin((), ()))),))
 
-    monkeypatch.setattr(cure_search, "pictured", pictured)
+    monkeypatch.setattr(repair_search, "pictured", pictured)
     found = searched(monkeypatch, seen, of)
     assert found.reached
     assert found.rounds[0].upgrades.trimmer
@@ -802,14 +802,14 @@ def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     letters, new = book.block(plan, range(6), slot.trim, 1)
     assert new
     rows = trimmed_block(slot.trim, plan, range(6), 1)
-    assert [cure_measure.VERDICTS[letter] for letter in letters] == [r.verdict for r in rows]
+    assert [repair_measure.VERDICTS[letter] for letter in letters] == [r.verdict for r in rows]
     assert book.block(plan, range(6), slot.trim, 1) == (letters, False)
     assert book.block(plan, range(6), None, 1)[1]
 
 
 def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> LinearModel:
     """A limit of the elements of one array alone, with slopes of these signs, and of R50."""
-    from designer.centering import cure_linear_model
+    from designer.centering import repair_linear_model
 
     made = branch().synthesis
     network = network_slots(made)[0]
@@ -824,8 +824,8 @@ def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> LinearMod
     names = {*network.network, "R50"}
     parts = (*(p for p in part_slots(made) if p.slot.name in names), network)
     way = ResponseWay(0, "as it is", cast(Question, None), None, margin, 0.5)
-    ratios = cure_linear_model._ratios(branch(), parts, 5)
-    matched = cure_linear_model._matched(branch(), parts, 5)
+    ratios = repair_linear_model._ratios(branch(), parts, 5)
+    matched = repair_linear_model._matched(branch(), parts, 5)
     return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5, matched)
 
 

@@ -1,8 +1,8 @@
-"""``designer search DIR --yield Y``: the cheapest cure of a design folder, and what is written.
+"""``designer search DIR --yield Y``: the cheapest repair of a design folder, and what is written.
 
 ``cure.json`` with everything that was found, the front of yield against price in
 ``cure-front.csv``, ``.png`` and ``.svg``, and ``cure-studies.json``, the verdicts of every board
-that was asked, from which interrupted work goes on. With ``out`` the cured design is a design
+that was asked, from which interrupted work goes on. With ``out`` the repaired design is a design
 folder of its own.
 """
 
@@ -24,11 +24,11 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
-from designer.centering.cure_branch import KINDS, cured, kind_named
-from designer.centering.cure_measure import VerdictCache, is_rare
-from designer.centering.cure_result_json import cure_json, front_csv
-from designer.centering.cure_search import find_cure
-from designer.centering.cure_upgrade import Upgrades
+from designer.centering.repair_branch import KINDS, kind_named, repaired
+from designer.centering.repair_measure import VerdictCache, is_rare
+from designer.centering.repair_result_json import front_csv, repair_json
+from designer.centering.repair_search import find_repair
+from designer.centering.repair_upgrade import Upgrades
 from designer.centering.response_windows import need_periods
 from designer.check.synthesis_result import Synthesis
 from designer.folders.design_source import design_inputs, design_stage, grade_inputs, read_design
@@ -44,20 +44,20 @@ from designer.model.model_file import errors_in, need_responses
 if TYPE_CHECKING:
     import pandas as pd
 
-CURE, STUDIES = "cure.json", "cure-studies.json"
+REPAIR, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
 """How the studies are written: each by its hash, which says all that decides it."""
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
 FEWEST_LOST = 8
-"""Boards of a million, the fewest that may be asked for: ``cure_measure.MOST_PLAIN`` boards show as
-much where none of them is lost."""
+"""Boards of a million, the fewest that may be asked for: ``repair_measure.MOST_PLAIN`` boards show
+as much where none of them is lost."""
 RULES = 7
 """Raised whenever the same inputs are to give another answer."""
 
 
 @dataclass(frozen=True)
 class CureResult:
-    """What a cure answers."""
+    """What a repair answers."""
 
     answer: dict[str, Any]
     """The JSON object."""
@@ -76,7 +76,7 @@ class CureResult:
         return flat_frame(self.answer["front"])
 
     def responses(self) -> pd.DataFrame:
-        """A row for each response, before and with the cure."""
+        """A row for each response, before and with the repair."""
         return flat_frame(self.answer["responses"])
 
     def _repr_html_(self) -> str:
@@ -99,20 +99,20 @@ def cure(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> CureResult:
-    """The verb ``search --yield``: the cheapest cure of a design folder, which is written there.
+    """The verb ``search --yield``: the cheapest repair of a design folder, which is written there.
 
-    ``yield_`` : of every wanted response, as built (trimmed where the cure says so): the lower end
-    of its 95 % interval on fresh boards. ppm : the same as the boards of a million that may lose a
-    response; losses that are too rare to be counted are estimated (``rare_losses``). budget : most
-    that the upgrades may cost, in euro by the catalogue's price classes. without : kinds of
-    upgrades that are not wanted; a hyphen may stand for a space. out : folder for the cured design.
-    What is not given is that of the folder's own cure, if there is one; with ``overwrite`` its
-    budget and its kinds are not taken over.
+    ``yield_`` : of every wanted response, as built (trimmed where the repair says so): the lower
+    end of its 95 % interval on fresh boards. ppm : the same as the boards of a million that may
+    lose a response; losses that are too rare to be counted are estimated (``rare_losses``).
+    budget : most that the upgrades may cost, in euro by the catalogue's price classes. without :
+    kinds of upgrades that are not wanted; a hyphen may stand for a space. out : folder for the
+    repaired design. What is not given is that of the folder's own repair, if there is one; with
+    ``overwrite`` its budget and its kinds are not taken over.
 
     Raises
     ------
-    InputError : no yield is given and the folder has no cure, or it is given twice; the yield or
-        the budget is none; an unknown kind; the folder is no design folder, or holds a cure of
+    InputError : no yield is given and the folder has no repair, or it is given twice; the yield or
+        the budget is none; an unknown kind; the folder is no design folder, or holds a repair of
         other inputs, or ``out`` holds a design, and nothing is said about what to do.
     """
     path = Path(folder)
@@ -128,8 +128,8 @@ def cure(
     if "yield" not in settings:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
     progress = Progress() if progress is None else progress
-    with progress.whole(usual_times.CURED):
-        return cure_into(
+    with progress.whole(usual_times.REPAIRED):
+        return repair_into(
             path,
             target=settings["yield"],
             budget=settings.get("budget"),
@@ -140,7 +140,7 @@ def cure(
         )
 
 
-def cure_into(
+def repair_into(
     path: Path,
     *,
     target: float,
@@ -179,7 +179,7 @@ def cure_into(
         "seed": options.seed,
         **grade_inputs(base.modelfile, base.catalog),
     }
-    stages: Stages = {"cure": (inputs, [CURE, STUDIES, *FRONT])}
+    stages: Stages = {"cure": (inputs, [REPAIR, STUDIES, *FRONT])}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         if out is not None:
@@ -191,7 +191,7 @@ def cure_into(
                 "ngspice about the cured design (tolerance --rung ngspice)"
             )
         _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
-    answer = folder.json(CURE)
+    answer = folder.json(REPAIR)
     renew_report(folder, progress.note)
     if out is not None:
         _write_design(base, answer, out, options, progress)
@@ -208,7 +208,7 @@ def _find_and_write(
     options: Options,
     progress: Progress,
 ) -> None:
-    """Find the cheapest cure of the design ``base`` and write it into its folder."""
+    """Find the cheapest repair of the design ``base`` and write it into its folder."""
     began = time.perf_counter()
     studies_before = {}
     if folder.manifest and STUDIES in folder.manifest.files:
@@ -224,7 +224,7 @@ def _find_and_write(
             folder.write(STUDIES, _LINES.text(studies["studies"]))
 
         with errors_in(base.modelfile):
-            best = find_cure(
+            best = find_repair(
                 base,
                 target,
                 budget=budget,
@@ -237,11 +237,11 @@ def _find_and_write(
             )
         progress.stage("report of the cure")
         from designer.base.figure_style import to_png, to_svg
-        from designer.centering.cure_plots import front_chart  # matplotlib is not needed before
+        from designer.centering.repair_plots import front_chart  # matplotlib is not needed before
 
         chart = front_chart(best)
         guard()
-        folder.write(CURE, dumps(cure_json(best, origin, time.perf_counter() - began)))
+        folder.write(REPAIR, dumps(repair_json(best, origin, time.perf_counter() - began)))
         table_name, png_name, svg_name = FRONT
         folder.write(table_name, front_csv(best))
         folder.write(png_name, to_png(chart))
@@ -260,7 +260,7 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
     if folder.manifest is not None and "design" in folder.manifest.stages and not options.overwrite:
         expected = "a folder without a design, or --overwrite to replace it by the cured one"
         raise InputError(None, "--out", str(out), expected)
-    # The cured design's files have the names of this one's.
+    # The repaired design's files have the names of this one's.
     inputs = design_inputs(base.modelfile, base.catalog)
     folder.decide(design_stage(base.modelfile, inputs), overwrite=True, resume=False)
 
@@ -268,12 +268,12 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
 def _write_design(
     base: Synthesis, answer: dict[str, Any], out: Path, options: Options, progress: Progress
 ) -> None:
-    """The cured design as a design folder; nothing where there is no cure."""
+    """The repaired design as a design folder; nothing where there is no repair."""
     if not answer["reached"]:
         progress.note("no cure: no design is written")
         return
     progress.stage("cured design")
-    synthesis = cured(base, Upgrades.of_dict(answer["upgrades"]))
+    synthesis = repaired(base, Upgrades.of_dict(answer["upgrades"]))
     folder = Folder(out)
     stages = design_stage(
         synthesis.modelfile, design_inputs(synthesis.modelfile, synthesis.catalog)

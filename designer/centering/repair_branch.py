@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from designer.base.errors import InputError
 from designer.catalog.entries import OpAmp
 from designer.catalog.parts_catalog import Catalog
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
+from designer.centering.repair_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.model.circuit_table import DeadZone
@@ -32,7 +32,7 @@ def kind_named(name: str) -> str | None:
 
 
 @dataclass(frozen=True)
-class CureBranch:
+class RepairBranch:
     """A design with other upgrades, of which the linear program chooses."""
 
     upgrades: Upgrades
@@ -40,11 +40,11 @@ class CureBranch:
     synthesis: Synthesis
     """The design with its model."""
     extra: float
-    """Price over the design that is cured [euro]."""
+    """Price over the design that is repaired [euro]."""
 
     @property
     def name(self) -> str:
-        """In words; "as it is" for the design that is cured."""
+        """In words; "as it is" for the design that is repaired."""
         u = self.upgrades
         phrases = [f"op-amp {u.opamp}"] if u.opamp else []
         phrases += [f"dead zone: {u.dead_zone}"] if u.dead_zone else []
@@ -76,7 +76,7 @@ def better_opamps(now: OpAmp, supply: float, catalog: Catalog) -> tuple[OpAmp, .
 
 def branches(
     base: Synthesis, without: frozenset[str] = frozenset()
-) -> Iterator[CureBranch | Refused]:
+) -> Iterator[RepairBranch | Refused]:
     """The design as it is, then every other branch; made one after the other, as they are asked
     for."""
     least = price(base)
@@ -99,7 +99,7 @@ def branches(
 
 def branch_of(
     base: Synthesis, upgrades: Upgrades, least: float | None = None
-) -> CureBranch | Refused:
+) -> RepairBranch | Refused:
     """The branch with this op-amp and this dead zone, whatever else is upgraded.
 
     least : price of the base, where it is known.
@@ -107,7 +107,7 @@ def branch_of(
     upgrades = Upgrades(opamp=upgrades.opamp, dead_zone=upgrades.dead_zone)
     least = price(base) if least is None else least
     if upgrades == Upgrades():
-        return CureBranch(upgrades, base, 0.0)
+        return RepairBranch(upgrades, base, 0.0)
     modelfile = upgraded_file(base.modelfile, upgrades)
     try:
         synthesis = None
@@ -119,10 +119,10 @@ def branch_of(
             synthesis = synthesis_result.synthesise(modelfile, base.catalog)
     except InputError as error:
         return Refused(upgrades, str(error))
-    return CureBranch(upgrades, synthesis, price(synthesis) - least)
+    return RepairBranch(upgrades, synthesis, price(synthesis) - least)
 
 
-def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
+def repaired(base: Synthesis, upgrades: Upgrades) -> Synthesis:
     """The design with all these upgrades.
 
     Raises
@@ -135,7 +135,7 @@ def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
     return applied(branch, upgrades)
 
 
-def applied(branch: CureBranch, upgrades: Upgrades) -> Synthesis:
+def applied(branch: RepairBranch, upgrades: Upgrades) -> Synthesis:
     """The branch's design with the other upgrades."""
     more = replace(upgrades, opamp=None, dead_zone=None)
     if more == Upgrades():

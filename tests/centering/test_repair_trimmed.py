@@ -8,10 +8,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from designer.centering import cure_linear_model as cure_trimmed
-from designer.centering.cure_linear_model import trimmed_margins, trimmer_ways, without_wiper
-from designer.centering.cure_measure import VerdictCache
-from designer.centering.cure_ways import ResponseSurvey, ResponseWay
+from designer.centering import repair_linear_model as repair_trimmed
+from designer.centering.repair_linear_model import trimmed_margins, trimmer_ways, without_wiper
+from designer.centering.repair_measure import VerdictCache
+from designer.centering.repair_ways import ResponseSurvey, ResponseWay
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
 from designer.circuit.board_values import nominal_board
@@ -70,7 +70,7 @@ def test_what_trimmed_boards_show_is_what_a_study_of_them_finds(
 ) -> None:
     """And the trimmer is no way where even the best parts, here as rough as the others, lose too
     many boards for the target."""
-    monkeypatch.setattr(cure_trimmed, "SAMPLES", 40)
+    monkeypatch.setattr(repair_trimmed, "SAMPLES", 40)
     of = plan(6, spread=ROUGH)
     answers, _ = trimmed_answers(trim(), of, range(40), 2)
     rate = sum(a.verdict is Verdict.OK for a in answers) / 40

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from designer.centering import cure_ways
-from designer.centering.cure_branch import PLACE
-from designer.centering.cure_measure import MeasuredYield, VerdictCache
-from designer.centering.cure_ways import (
+from designer.centering import repair_ways
+from designer.centering.repair_branch import PLACE
+from designer.centering.repair_measure import MeasuredYield, VerdictCache
+from designer.centering.repair_ways import (
     FEW,
     RARE,
     ResponseSurvey,
@@ -62,8 +62,8 @@ def looker(
         first = boards.which[0]
         return [*[None] * lost[first], *[Verdict.OK] * (FEW - lost[first])]
 
-    monkeypatch.setattr(cure_ways, "forecast", forecast)
-    monkeypatch.setattr(cure_ways, "settled", lambda boards, *_: [verdict] * len(boards.which))
+    monkeypatch.setattr(repair_ways, "forecast", forecast)
+    monkeypatch.setattr(repair_ways, "settled", lambda boards, *_: [verdict] * len(boards.which))
     nothing = cast(Any, None)
     return ResponseSurvey(nothing, TARGET, 1, VerdictCache(), 0.0, frozenset(), (), 1, lambda: None)
 
@@ -154,9 +154,9 @@ def test_what_was_measured_to_miss_gets_further_ways(
 ) -> None:
     """Though few boards showed it often enough."""
     nothing = cast(Any, None)
-    monkeypatch.setattr(cure_ways, "plan_of", lambda *_: nothing)
+    monkeypatch.setattr(repair_ways, "plan_of", lambda *_: nothing)
     monkeypatch.setattr(
-        cure_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
+        repair_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
     )
     branch = cast(Any, SimpleNamespace(synthesis=nothing))
     looker = ResponseSurvey(

@@ -27,13 +27,19 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from designer.base.arrays import Array
-from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch
-from designer.centering.cure_couplings import couplings, finest
-from designer.centering.cure_measure import VerdictCache, is_rare, questions_of
-from designer.centering.cure_milp import CureProgram, Demand, Option, Slot
-from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
-from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
-from designer.centering.cure_ways import FEW, SAMPLES, ResponseSurvey, ResponseWay, foretold
+from designer.centering.repair_branch import TRIM, TRIMMER, RepairBranch
+from designer.centering.repair_couplings import couplings, finest
+from designer.centering.repair_measure import VerdictCache, is_rare, questions_of
+from designer.centering.repair_milp import Demand, Option, RepairProgram, Slot
+from designer.centering.repair_slots import (
+    TRIMMED,
+    PartSlot,
+    network_slots,
+    part_slots,
+    trimmer_slot,
+)
+from designer.centering.repair_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
+from designer.centering.repair_ways import FEW, SAMPLES, ResponseSurvey, ResponseWay, foretold
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import between, column
@@ -137,7 +143,7 @@ STREAM = "cure:"
 class LinearModel:
     """A branch as the linear program sees it."""
 
-    branch: CureBranch
+    branch: RepairBranch
     """The branch that is modelled."""
     parts: tuple[PartSlot, ...]
     ways: tuple[tuple[ResponseWay, ...], ...]
@@ -262,7 +268,7 @@ class LinearModel:
         z: Mapping[tuple[int, int, int], float],
         shrink: Mapping[tuple[int, int], float],
         spoiled: frozenset[tuple[int, int]] = frozenset(),
-    ) -> CureProgram:
+    ) -> RepairProgram:
         """The program for these quantiles.
 
         shrink : by (response, way), a factor on the room of its demands: what was learnt where the
@@ -286,7 +292,7 @@ class LinearModel:
                     name = f"response {r + 1}: {limit.what}"
                     demands.append(Demand(name, room - fixed, tuple(rows), when))
         kinds = [[w.kind for w in row] for row in self.ways]
-        return CureProgram(slots, (*demands, *couplings(slots, self.parts, kinds)))
+        return RepairProgram(slots, (*demands, *couplings(slots, self.parts, kinds)))
 
     def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
         """What the options of each part add to a limit's variance, and what no upgrade changes, in
@@ -345,7 +351,7 @@ def share_above(form: Array) -> float:
 
 
 def picture(
-    branch: CureBranch,
+    branch: RepairBranch,
     target: float,
     seed: int,
     book: VerdictCache,
@@ -487,7 +493,7 @@ def _with_losses(
 
 
 def _ratios(
-    branch: CureBranch, parts: Sequence[PartSlot], seed: int
+    branch: RepairBranch, parts: Sequence[PartSlot], seed: int
 ) -> tuple[Mapping[str, float], ...]:
     """Under option j of every slot (its last, where it has fewer), the standard deviation of each
     quantity over that as it is."""
@@ -504,7 +510,7 @@ def _ratios(
 
 
 def _matched(
-    branch: CureBranch, parts: Sequence[PartSlot], seed: int
+    branch: RepairBranch, parts: Sequence[PartSlot], seed: int
 ) -> Mapping[tuple[int, int], Array]:
     """By slot and option of an array, the covariance of its elements on drawn boards, in units of
     each part's own standard deviation as it is."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from designer.base.errors import InputError, Unreachable
 from designer.catalog.entries import Kind
 from designer.catalog.parts_catalog import Catalog
-from designer.centering.cure_branch import GRADE, NETWORK, REFERENCE, TRIMMER
-from designer.centering.cure_milp import Option, Slot
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
+from designer.centering.repair_branch import GRADE, NETWORK, REFERENCE, TRIMMER
+from designer.centering.repair_milp import Option, Slot
+from designer.centering.repair_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Capacitor, Resistor
 from designer.spread.part_grades import bought

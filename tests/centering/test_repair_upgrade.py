@@ -22,9 +22,9 @@ from designer.board.bom import bill, bill_csv
 from designer.board.component import components
 from designer.catalog.fields import PRICE_CLASSES
 from designer.catalog.parts_catalog import load_catalog
-from designer.centering.cure_branch import CureBranch, better_opamps, branch_of, branches
-from designer.centering.cure_slots import part_slots
-from designer.centering.cure_upgrade import (
+from designer.centering.repair_branch import RepairBranch, better_opamps, branch_of, branches
+from designer.centering.repair_slots import part_slots
+from designer.centering.repair_upgrade import (
     PartNetwork,
     Upgrades,
     WindowPlace,
@@ -197,7 +197,7 @@ def test_another_opamp_on_the_same_parts_has_its_own_limits(base: Synthesis) -> 
 @pytest.mark.slow
 def test_where_a_condition_breaks_the_parts_are_chosen_anew(base: Synthesis) -> None:
     branch = branch_of(base, Upgrades(opamp="TL074H", grades={"R50": 0.001}))
-    assert isinstance(branch, CureBranch)
+    assert isinstance(branch, RepairBranch)
     assert branch.upgrades == Upgrades(opamp="TL074H")
     design = branch.synthesis.design
     assert all(check.holds for check in design.checks)
@@ -224,8 +224,8 @@ def test_a_folder_of_ones_own_replaces_single_prices(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["saturation", "rectifier"])
 def test_a_stage_that_was_chosen_for_the_file_stays(kind: DeadZone) -> None:
-    """A file that states no stage is cured with the one that its design has."""
+    """A file that states no stage is repaired with the one that its design has."""
     unstated = parse_model_file(SMALL.replace(COARSE_RECTIFIER, COARSE_CIRCUIT))
     assert unstated.circuit.dead_zone is None
-    cured = upgraded_file(with_stage(unstated, kind), Upgrades(opamp="OPA4192"))
-    assert (cured.circuit.opamp, cured.circuit.dead_zone) == ("OPA4192", kind)
+    repaired = upgraded_file(with_stage(unstated, kind), Upgrades(opamp="OPA4192"))
+    assert (repaired.circuit.opamp, repaired.circuit.dead_zone) == ("OPA4192", kind)

@@ -1,4 +1,4 @@
-"""What the command line says about a cure."""
+"""What the command line says about a repair."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from designer.base.si_unit import drive_text
 def text(answer: Mapping[str, Any]) -> str:
     """The answer, yields before and after, rounds and the front, as lines of text.
 
-    answer : the JSON object of ``cure_json``.
+    answer : the JSON object of ``repair_json``.
     """
     percent = f"{100.0 * answer['target']:.8g} %"
     digits = 4 if answer["target"] < 0.999 else 8
