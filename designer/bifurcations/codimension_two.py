@@ -178,8 +178,8 @@ def locate(
         if root is not None
     ]
     if not np.array_equal(a.impacts, b.impacts):
-        touched = _bisected(system, a, b)
-        out += [] if touched is None else [replace(touched, position=index + touched.position)]
+        grazed = _bisected(system, a, b)
+        out += [] if grazed is None else [replace(grazed, position=index + grazed.position)]
     return sorted(out, key=lambda c: c.position)
 
 
@@ -238,20 +238,20 @@ def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Codimensi
             high, beyond = middle, point
         if halving in TRIES:
             reach = 2.0 * (high - low) * system.distance(a.z, b.z)
-            if touched := _touching(system, found, reach):
-                return CodimensionTwo(name, touched[0], low, *touched[1:])
+            if grazed := _grazing_within(system, found, reach):
+                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
     if high - low >= 1e-6:
         # No point lies between them at a corner; it is smooth from the side that is clear.
         reach = 2.0 * (high - low) * system.distance(a.z, b.z)
         for p in (found, beyond):
-            if touched := _touching(system, p, reach):
-                return CodimensionTwo(name, touched[0], low, *touched[1:])
+            if grazed := _grazing_within(system, p, reach):
+                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
         return None
     grazing, phase = next(iter(_turning(system, found)), (None, 0.0))
     return CodimensionTwo(name, found, low, grazing, np.array([phase]))
 
 
-def _touching(
+def _grazing_within(
     system: ExtendedSystem, p: CurvePoint, reach: float
 ) -> tuple[CurvePoint, Grazing, Array] | None:
     """The point no farther than ``reach`` from p at which a turning point touches its stop, with
@@ -276,10 +276,10 @@ def _from_clear_of(
     if isinstance(p.condition, Grazing):
         return None
     n = system.states
-    _, touch = system.instead(p, grazing, np.array([phase]))
-    if touch is None:
+    _, turning = system.instead(p, grazing, np.array([phase]))
+    if turning is None:
         return None
-    near, extra = replace(p, z=np.delete(touch.z, n)), touch.z[n : n + 1]
+    near, extra = replace(p, z=np.delete(turning.z, n)), turning.z[n : n + 1]
     met = []
     for clear in BESIDE:
         found = system.meet(near, replace(grazing, clear=clear), extra)
@@ -297,11 +297,11 @@ def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> Codimensi
     has a corner, for beyond it the multipliers change with the square root of the penetration."""
     if isinstance(p.condition, Grazing):
         return None
-    touched = _touching(system, p, CORNER)
-    if touched is None:
+    grazed = _grazing_within(system, p, CORNER)
+    if grazed is None:
         return None
     name = meeting(p.condition.kind, PointKind.GRAZING)
-    return CodimensionTwo(name, touched[0], float(index + 1), *touched[1:])
+    return CodimensionTwo(name, grazed[0], float(index + 1), *grazed[1:])
 
 
 def _turning(system: ExtendedSystem, p: CurvePoint) -> list[tuple[Grazing, float]]:

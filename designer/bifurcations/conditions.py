@@ -7,7 +7,7 @@
 - A pair of multipliers on the unit circle: the logarithm of its product. Product and sum of the
   pair are smooth also where it becomes real.
 - Grazing: the height of one turning point over its stop and its rate are zero
-  (``bifurcations.touch``); the phase of the turning point is a further unknown.
+  (``bifurcations.grazing_contact``); the phase of the turning point is a further unknown.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Protocol
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.bifurcations.grazing_contact import GrazingContact, height, height_along
 from designer.bifurcations.points import PointKind
-from designer.bifurcations.touch import StopTouch, height, height_along
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus
 from designer.dynamics.turning_points import turning_points_of
@@ -214,7 +214,7 @@ class MultiplierPair:
 class Grazing:
     """A turning point touches a stop."""
 
-    touch: StopTouch
+    contact: GrazingContact
     """Which of them touches which stop."""
     n: int
     """Period of the orbit, in drive periods."""
@@ -229,22 +229,22 @@ class Grazing:
 
     def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
         """(2,) height, and its rate by the phase, over the peak."""
-        found = height(flow, x, self.n, self.touch, float(extra[0]))
+        found = height(flow, x, self.n, self.contact, float(extra[0]))
         if found is None:
             return None
-        clear = self.clear if self.touch.tip else -self.clear
+        clear = self.clear if self.contact.tip else -self.clear
         return np.array([found[0] / self.size + clear, found[1] / self.size])
 
     def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
         """(2, states + 1) of height and rate, by the linearised flow."""
-        found = height_along(flow, x, self.n, self.touch, float(extra[0]), np.diag(image.scale))
+        found = height_along(flow, x, self.n, self.contact, float(extra[0]), np.diag(image.scale))
         if found is None:
             return None
         return np.column_stack([found[:2, 1:], found[1:, 0]]) / self.size
 
     def curvature(self, flow: Flow, x: Array, phase: float) -> float:
         """Second derivative of the height by the phase, over the peak; negative at a tip."""
-        found = height(flow, x, self.n, self.touch, phase)
+        found = height(flow, x, self.n, self.contact, phase)
         return float("nan") if found is None else float(found[2]) / self.size
 
     def renewed(self, jacobian: Array) -> Grazing:
@@ -324,20 +324,22 @@ def grazings(
     for t in near:
         if symmetric and t.phase >= 0.5 * n:
             continue
-        touch = StopTouch(t.clearance, t.side, t.tip)
+        contact = GrazingContact(t.clearance, t.side, t.tip)
         if but is None or not _is_same(
-            touch, t.phase, *but, mirrored=flow.system.mirror is not None
+            contact, t.phase, *but, mirrored=flow.system.mirror is not None
         ):
-            out.append((Grazing(touch, n, float(spans[t.clearance])), t.phase))
+            out.append((Grazing(contact, n, float(spans[t.clearance])), t.phase))
     return out
 
 
-def _is_same(touch: StopTouch, phase: float, other: Grazing, at: float, *, mirrored: bool) -> bool:
+def _is_same(
+    contact: GrazingContact, phase: float, other: Grazing, at: float, *, mirrored: bool
+) -> bool:
     """Whether two turning points are one, or mirror images of each other on a symmetric orbit."""
-    if (touch.clearance, touch.tip) != (other.touch.clearance, other.touch.tip):
+    if (contact.clearance, contact.tip) != (other.contact.clearance, other.contact.tip):
         return False
     n = other.n
-    shift = 0.0 if touch.side == other.touch.side else 0.5 * n
+    shift = 0.0 if contact.side == other.contact.side else 0.5 * n
     if shift and not mirrored:
         return False
     off = (phase - at - shift) % n

@@ -25,9 +25,9 @@ from designer.bifurcations.codimension_two import CodimensionTwo
 from designer.bifurcations.conditions import Condition, Grazing, Multiplier, MultiplierPair
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.flow_family import FlowPlane
+from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, followed, system_at
 from designer.bifurcations.points import PointKind
-from designer.bifurcations.touch import StopTouch
 from designer.dynamics.counts import Counts
 
 CRITICAL = 1e-4
@@ -55,7 +55,7 @@ class OtherCurve:
     """(states,) at the strobe."""
     stable: bool
     """Whether no multiplier lies outside the unit circle, so that a stable orbit may lie near."""
-    touch: StopTouch | None = None
+    touch: GrazingContact | None = None
     """The turning point that touches a stop, of one of the two curves; None where none does."""
     phase: float = 0.0
     """Of that turning point, in drive periods after the strobe."""
@@ -103,7 +103,7 @@ def read_other_curve(
     }
     if (t := row["touch"]) is not None:
         touch = {key: t[key] for key in ("clearance", "side", "tip")}
-        fields["touch"] = checked_record(StopTouch, touch)
+        fields["touch"] = checked_record(GrazingContact, touch)
         fields |= {"phase": t["phase"], "size": t["size"]}
     return checked_record(OtherCurve, fields)
 
@@ -119,13 +119,13 @@ def other_curve(system: ExtendedSystem, c: CodimensionTwo) -> OtherCurve | None:
         c.other.kind, system.n, system.symmetric, p.values, tuple(p.z[:n].tolist()), stable
     )
     if isinstance(c.other, Grazing):
-        return _touching(plain, c.other, float(c.extra[0]))
+        return _with_grazing(plain, c.other, float(c.extra[0]))
     own = p.condition
-    return _touching(plain, own, float(p.z[n])) if isinstance(own, Grazing) else plain
+    return _with_grazing(plain, own, float(p.z[n])) if isinstance(own, Grazing) else plain
 
 
-def _touching(plain: OtherCurve, grazing: Grazing, phase: float) -> OtherCurve:
-    return replace(plain, touch=grazing.touch, phase=phase, size=grazing.size)
+def _with_grazing(plain: OtherCurve, grazing: Grazing, phase: float) -> OtherCurve:
+    return replace(plain, touch=grazing.contact, phase=phase, size=grazing.size)
 
 
 def switched(

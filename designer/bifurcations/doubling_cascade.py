@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from designer.bifurcations.windows import BranchWindow, WindowEnd
 
-TOUCH = 1e-9
+ADJACENT = 1e-9
 """Of the parameter: two windows nearer than this follow upon one another."""
 
 
@@ -46,7 +46,7 @@ def cascade(windows: Sequence[BranchWindow], first: BranchWindow, *, down: bool 
     steps = [first]
     while True:
         at = (steps[-1].low if down else steps[-1].high).value
-        near = TOUCH * abs(at)
+        near = ADJACENT * abs(at)
         after = [
             w
             for w in windows

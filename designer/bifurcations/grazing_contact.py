@@ -28,7 +28,7 @@ ORDERS = np.arange(float(TERMS))
 
 
 @dataclass(frozen=True)
-class StopTouch:
+class GrazingContact:
     """Which turning point touches which stop."""
 
     clearance: int
@@ -39,22 +39,22 @@ class StopTouch:
     """Whether it is the tip of a near miss or a shallow contact; else the dip between two."""
 
 
-def height(flow: Flow, x: Array, n: int, touch: StopTouch, phase: float) -> Array | None:
+def height(flow: Flow, x: Array, n: int, contact: GrazingContact, phase: float) -> Array | None:
     """(3,) height over the stop, positive in contact, with its first and second derivative by the
     phase, at a phase in drive periods after the strobe x of an orbit of period n.
 
     None where the flow does not come to an end.
     """
-    found = height_along(flow, x, n, touch, phase, np.zeros((len(x), 0)))
+    found = height_along(flow, x, n, contact, phase, np.zeros((len(x), 0)))
     return None if found is None else found[:, 0]
 
 
 def height_along(
-    flow: Flow, x: Array, n: int, touch: StopTouch, phase: float, tangent: Array
+    flow: Flow, x: Array, n: int, contact: GrazingContact, phase: float, tangent: Array
 ) -> Array | None:
     """(3, 1 + k) the same, and its rates of change along k tangent vectors (states, k) at x."""
     period = flow.drive.period
-    nodes = _nodes(flow, touch)
+    nodes = _nodes(flow, contact)
     place = (phase % n) * nodes
     k = int(place)
     state, along = x, tangent
@@ -66,8 +66,8 @@ def height_along(
         state, along = run.strobes[-1], along if run.tangent is None else run.tangent
     angle = 2.0 * np.pi * k / nodes
     drive, orders = flow.drive, flow.orders
-    mode = _mode(flow, state, angle, touch)
-    row = augmented_row(flow.system.contact_rows(touch.clearance)[touch.side], drive, orders)
+    mode = _mode(flow, state, angle, contact)
+    row = augmented_row(flow.system.contact_rows(contact.clearance)[contact.side], drive, orders)
     whole = augmented_state(state, angle, orders)
     z = np.zeros((len(whole), 1 + along.shape[1]))
     z[:, 0] = whole
@@ -77,24 +77,24 @@ def height_along(
     )
 
 
-def _nodes(flow: Flow, touch: StopTouch) -> int:
+def _nodes(flow: Flow, contact: GrazingContact) -> int:
     """Nodes in a drive period: a step of the general kernel apart, in contact too."""
     rest = flow.system.mode(flow.system.start)
-    contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == touch.clearance]
+    contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == contact.clearance]
     step = min(step_length(mode.A, flow.fastest) for mode in (rest, *contacts))
     return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
 
 
-def _mode(flow: Flow, x: Array, angle: float, touch: StopTouch) -> Mode:
+def _mode(flow: Flow, x: Array, angle: float, contact: GrazingContact) -> Mode:
     """The mode about the turning point: the one at x but for the contact at the stop itself."""
     system = flow.system
     mode = system.mode(flow.mode_at(x, angle))
-    wanted = 0 if touch.tip else touch.side
-    if mode.sides[touch.clearance] == wanted:
+    wanted = 0 if contact.tip else contact.side
+    if mode.sides[contact.clearance] == wanted:
         return mode
     for guard in mode.guards:
         other = system.mode(guard.target)
-        if guard.clearance == touch.clearance and other.sides[touch.clearance] == wanted:
+        if guard.clearance == contact.clearance and other.sides[contact.clearance] == wanted:
             return other
     return mode
 

@@ -27,7 +27,7 @@ from designer.model.swept_model import of_model
 
 
 @dataclass(frozen=True)
-class Touch:
+class FirstGrazing:
     """The first touch of a stop by the linear response."""
 
     clearance: str
@@ -38,7 +38,7 @@ class Touch:
     """Factor on gaps and constant forces at which it happens: below it the stop is hit."""
 
 
-def first_touches(model: MechanicalModel, omega: float) -> tuple[Touch, ...]:
+def first_grazings(model: MechanicalModel, omega: float) -> tuple[FirstGrazing, ...]:
     """Of every stop, the first one to be hit (greatest b) first; () where one is in contact at
     rest, since the response is then not that of the open system."""
     system = model.second_order()
@@ -51,8 +51,8 @@ def first_touches(model: MechanicalModel, omega: float) -> tuple[Touch, ...]:
             room = stop.gap - side * middle
             if room <= 0.0:
                 return ()
-            out.append(Touch(clearance.name, side, model.b * swing / room))
-    return tuple(sorted(out, key=lambda touch: -touch.b))
+            out.append(FirstGrazing(clearance.name, side, model.b * swing / room))
+    return tuple(sorted(out, key=lambda grazing: -grazing.b))
 
 
 def linear_state(model: MechanicalModel, omega: float) -> Array:
@@ -70,7 +70,7 @@ def linear_orbit(model: MechanicalModel, omega: float) -> Orbit:
     return settle(model_flow(model, omega), linear_state(model, omega))
 
 
-def located_touch(model: MechanicalModel, omega: float, parameter: str, value: float) -> float:
+def located_grazing(model: MechanicalModel, omega: float, parameter: str, value: float) -> float:
     """The first touch as the tool locates it: a grazing point on the branch of the open system's
     orbits over a parameter.
 
@@ -86,7 +86,7 @@ def located_touch(model: MechanicalModel, omega: float, parameter: str, value: f
 def grazing_point(
     model: MechanicalModel, omega: float, parameter: str, value: float
 ) -> Bifurcation:
-    """The grazing point of ``located_touch``."""
+    """The grazing point of ``located_grazing``."""
     low, high = sorted((0.95 * value, 1.02 * value))
     if parameter == "b":
         low, high = 0.98 * value, 1.05 * value
