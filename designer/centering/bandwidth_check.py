@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement, agreements
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.verdicts.verdict import Verdict, judge
 
 BANDWIDTH = "bandwidth"

@@ -37,8 +37,8 @@ class Candidate:
     """For each response, its operating point with what boards showed there."""
 
     @property
-    def distances(self) -> tuple[float, ...]:
-        return tuple(s.distance for s in self.scored)
+    def reliability_indices(self) -> tuple[float, ...]:
+        return tuple(s.reliability_index for s in self.scored)
 
     @property
     def wanted(self) -> tuple[Response, ...]:
@@ -49,8 +49,8 @@ class Candidate:
     def rank(self) -> tuple[float, float]:
         """The smallest distance; the logarithm of the product of the predicted yields, in which a
         response that the nominal board does not show counts as one ``MISSING`` away."""
-        logs = [float(log_ndtr(max(d, MISSING))) for d in self.distances]
-        return min(self.distances), sum(logs)
+        logs = [float(log_ndtr(max(d, MISSING))) for d in self.reliability_indices]
+        return min(self.reliability_indices), sum(logs)
 
 
 @dataclass(frozen=True)

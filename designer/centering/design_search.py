@@ -1,7 +1,7 @@
 """The design that real parts cannot spoil: parts and places with the highest predicted yield.
 
 Over all wanted responses, in this order: the smallest of their distances from being lost
-(``centering.distance``), hence the smallest predicted yield; where two designs agree in it,
+(``centering.scaled_sigma``), hence the smallest predicted yield; where two designs agree in it,
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
 responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
@@ -33,7 +33,6 @@ from designer.centering.candidate import (
     Step,
     better,
 )
-from designer.centering.distance import ScaledBoards
 from designer.centering.levers import (
     LEVERS,
     PLACES,
@@ -46,6 +45,7 @@ from designer.centering.levers import (
 from designer.centering.ngspice_check import FIDELITY, LISTENED, Listen
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, Stretch, open_in, stretches
+from designer.centering.scaled_sigma import ScaledBoards
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses

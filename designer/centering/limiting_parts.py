@@ -108,8 +108,8 @@ def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
         for name, share in sorted(moved.items(), key=lambda item: -item[1])
         if share >= 0.05
     )
-    line = f"{mechanism}: {limit.what}, {limit.distance:.1f} σ away, moved by {causes}"
-    return Limiting(mechanism, limit.what, limit.distance, moved, line)
+    line = f"{mechanism}: {limit.what}, {limit.reliability_index:.1f} σ away, moved by {causes}"
+    return Limiting(mechanism, limit.what, limit.reliability_index, moved, line)
 
 
 def shares(

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import OperatingOrbit, ScaledBoards
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Fidelity

@@ -3,7 +3,7 @@
 Every stretch of the response (``centering.response_windows``) is scanned with a few boards at one
 stretched spread; the best places are asked again with more boards and stretches, and around the
 best of them a pattern of ever smaller steps over ω and b goes on as long as something is gained.
-Distances are those of ``centering.distance``, so borders count by how much boards move them,
+Distances are those of ``centering.scaled_sigma``, so borders count by how much boards move them,
 whichever mechanism makes them, other attractors among them.
 """
 
@@ -14,8 +14,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from designer.centering.distance import LADDER, OperatingOrbit, ScaledBoards, StretchCounts
 from designer.centering.response_windows import CLEARANCE_STEP, OperatingPoint, Stretch
+from designer.centering.scaled_sigma import LADDER, OperatingOrbit, ScaledBoards, StretchCounts
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
@@ -42,8 +42,8 @@ class Scored:
     """What boards showed there."""
 
     @property
-    def distance(self) -> float:
-        return self.counts.distance if self.stand is not None else -math.inf
+    def reliability_index(self) -> float:
+        return self.counts.reliability_index if self.stand is not None else -math.inf
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def score(
 def best(scored: Sequence[Scored], count: int) -> list[Scored]:
     """Those of the largest distances that the nominal board shows; the earlier of equals first."""
     there = [s for s in scored if s.stand is not None]
-    return sorted(there, key=lambda s: -s.distance)[:count]
+    return sorted(there, key=lambda s: -s.reliability_index)[:count]
 
 
 def _step(stretches: Sequence[Stretch], place: OperatingPoint) -> float:
@@ -146,8 +146,8 @@ def _pattern(
         around = [replace(centre.place, omega=omega, b=b) for omega, b in new]
         for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
             scored_at[scored.place.omega, scored.place.b] = scored
-        top = max(scored_at.values(), key=lambda s: s.distance)
-        if top.distance > centre.distance:
+        top = max(scored_at.values(), key=lambda s: s.reliability_index)
+        if top.reliability_index > centre.reliability_index:
             centre = top
         else:
             step, wide, halved = 0.5 * step, 0.5 * wide, halved + 1

@@ -124,7 +124,7 @@ def without_wiper(margin: Margin, plan: StudyPlan, trim: DcTrim) -> Margin:
         sigma = float(Margin(quantities, (moved,)).each(plain).std())
         if sigma > 0.0:
             limits.append(replace(moved, sigma=sigma))
-    limits.sort(key=lambda limit: limit.distance)
+    limits.sort(key=lambda limit: limit.reliability_index)
     return replace(margin, quantities=quantities, limits=tuple(limits))
 
 
@@ -244,7 +244,7 @@ class LinearModel:
                 out.append(way.rate)
                 continue
             nearer = 1.0 - factors.get((way.response, w), 1.0) ** 0.5
-            away = np.array([nearer * limit.distance for limit in way.margin.limits])
+            away = np.array([nearer * limit.reliability_index for limit in way.margin.limits])
             form = (way.margin.each(boards) - away).min(axis=1) if len(away) else np.ones(1)
             out.append(share_above(form))
         return tuple(out)
@@ -259,7 +259,7 @@ class LinearModel:
                     continue
                 each = way.margin.each(boards)
                 for k, limit in enumerate(way.margin.limits):
-                    form = each[:, k] - limit.distance
+                    form = each[:, k] - limit.reliability_index
                     z_scores[r, w, k] = _quantile(form, target)
         return z_scores
 
@@ -286,7 +286,7 @@ class LinearModel:
                     continue
                 for k, limit in enumerate(way.margin.limits):
                     shares, fixed = self._shares(way.margin, k)
-                    room = (limit.distance / z[r, w, k]) ** 2 * shrink.get((r, w), 1.0)
+                    room = (limit.reliability_index / z[r, w, k]) ** 2 * shrink.get((r, w), 1.0)
                     rows = list(none)
                     rows[: len(shares)] = shares
                     name = f"response {r + 1}: {limit.what}"

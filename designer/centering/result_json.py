@@ -11,9 +11,9 @@ from scipy.special import ndtr
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import Candidate, Contribution, SearchResult
 from designer.centering.design_search import BOARDS
-from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import FIDELITY, STRETCH
+from designer.centering.scaled_sigma import LADDER, STREAM
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
 from designer.verdicts.cross_check import CrossCheck
@@ -139,7 +139,7 @@ def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
                 **mechanism_json(r.omega, si),
                 "b": r.b,
                 "expected": r.expected,
-                "distance": s.distance if math.isfinite(s.distance) else None,
+                "distance": s.reliability_index if math.isfinite(s.reliability_index) else None,
                 "predicted_yield": s.counts.predicted if s.stand is not None else 0.0,
                 "ok": list(s.counts.ok),
             }

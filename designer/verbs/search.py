@@ -173,8 +173,8 @@ def tables(answer: Mapping[str, Any]) -> None:
         )
 
 
-def _sigmas(distance: float | None) -> str:
-    return "-" if distance is None else f"{distance:.2f} σ"
+def _sigmas(reliability_index: float | None) -> str:
+    return "-" if reliability_index is None else f"{reliability_index:.2f} σ"
 
 
 VERB = Verb(

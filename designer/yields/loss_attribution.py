@@ -161,7 +161,9 @@ def attribute(
             lost=sum(a.verdict is Verdict.LOST for a in row),
             subjects=attributed[i],
             indices=indices[i],
-            limits=tuple(NearLimit(x.what, x.distance) for x in margin.limits[:SHOWN_LIMITS]),
+            limits=tuple(
+                NearLimit(x.what, x.reliability_index) for x in margin.limits[:SHOWN_LIMITS]
+            ),
             prediction=margin.prediction,
             sought=margin.sought,
             there=margin.there,
@@ -216,8 +218,8 @@ def _sentence(
         if nearest is None:
             return "nothing within the spread"
         return (
-            f"nothing was lost; nearest is {nearest.what}, {nearest.distance:.2g} standard "
-            f"deviations away, mostly through {through}"
+            f"nothing was lost; nearest is {nearest.what}, {nearest.reliability_index:.2g} "
+            f"standard deviations away, mostly through {through}"
         )
     clauses = []
     if nearest is not None:

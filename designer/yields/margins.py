@@ -67,7 +67,7 @@ class Limit:
     """The lost board it was found on; -1 for the nominal board."""
 
     @property
-    def distance(self) -> float:
+    def reliability_index(self) -> float:
         """Standard deviations between the nominal board and the loss."""
         return self.nominal / self.sigma
 
@@ -133,7 +133,7 @@ class Margin:
 
     def each(self, boards: Boards) -> Array:
         """(N, limits) every limit on these boards, in its own standard deviations."""
-        total = np.tile([limit.distance for limit in self.limits], (len(boards), 1))
+        total = np.tile([limit.reliability_index for limit in self.limits], (len(boards), 1))
         slopes = np.array([limit.slopes / limit.sigma for limit in self.limits])
         # Summed one by one: the last digits of a matrix product depend on the number of boards.
         for k, q in enumerate(self.quantities):
@@ -378,7 +378,7 @@ def _nominal_limits(
         _limit(f, f.value, row, differing, boards) for f, row in zip(wanted, slopes, strict=True)
     ]
     limits = [limit for limit in all_ if limit is not None]
-    return tuple(sorted(limits, key=lambda limit: limit.distance)[:NEAREST])
+    return tuple(sorted(limits, key=lambda limit: limit.reliability_index)[:NEAREST])
 
 
 def _crossing_limit(
@@ -439,9 +439,11 @@ def _foretelling(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> M
     )
     if margin.limits:
         picked = _picked(margin.each(boards) > 0.0, ok[ok % 2 == 0], lost[lost % 2 == 0])
-        nearest = int(np.argmin([limit.distance for limit in margin.limits]))
+        nearest = int(np.argmin([limit.reliability_index for limit in margin.limits]))
         limits = [margin.limits[k] for k in picked or [nearest]]
-        margin = replace(margin, limits=tuple(sorted(limits, key=lambda limit: limit.distance)))
+        margin = replace(
+            margin, limits=tuple(sorted(limits, key=lambda limit: limit.reliability_index))
+        )
     fine, ok, lost = margin.of(boards) > 0.0, ok[ok % 2 == 1], lost[lost % 2 == 1]
     prediction = Prediction(len(ok), len(lost), int(fine[lost].sum()), int((~fine[ok]).sum()))
     return replace(margin, prediction=prediction)

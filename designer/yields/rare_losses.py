@@ -534,14 +534,14 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
             yield _Region(tilts[lost[0]], limit.what)
 
 
-def _strength(way: Array, distance: float) -> float:
+def _strength(way: Array, reliability_index: float) -> float:
     """The tilt along a way at whose mean a limit at this distance is reached; the steepest where
     none is steep enough."""
     low, high = 0.0, STEEPEST / float(np.abs(way).max())
     for _ in range(60):
         middle = 0.5 * (low + high)
         moved = float(way @ (mean_of(middle * way) - 0.5))
-        low, high = (middle, high) if moved < distance else (low, middle)
+        low, high = (middle, high) if moved < reliability_index else (low, middle)
     return 0.5 * (low + high)
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.bandwidth_check import LaggingBoards
-from designer.centering.distance import STREAM
 from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement
+from designer.centering.scaled_sigma import STREAM
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow

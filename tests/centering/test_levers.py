@@ -14,11 +14,11 @@ from designer.centering import levers
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import ALIKE, GAIN, Candidate, FidelityOutcome, better
 from designer.centering.design_search import BOARDS, look, search
-from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
 from designer.centering.ngspice_check import FIDELITY, Agreement
 from designer.centering.operating_points import Scored, score
 from designer.centering.response_windows import OperatingPoint, Stretch
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.model import find_responses
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.response_table import Response

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import STREAM, OperatingOrbit, ScaledBoards
 from designer.centering.ngspice_check import (
     FEWER,
     LEAST,
@@ -22,6 +21,7 @@ from designer.centering.ngspice_check import (
     AgreementCheck,
 )
 from designer.centering.response_windows import OperatingPoint
+from designer.centering.scaled_sigma import STREAM, OperatingOrbit, ScaledBoards
 from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool

@@ -129,7 +129,7 @@ def test_the_quantile_is_that_of_the_drawn_form() -> None:
     seen = known_picture(8.0)
     boards = seen.boards((0,) * (len(seen.parts) + 1))
     z = seen.quantiles(TARGET, boards)[0, 0, 0]
-    form = known_margin(8.0).each(boards)[:, 0] - known_margin(8.0).limits[0].distance
+    form = known_margin(8.0).each(boards)[:, 0] - known_margin(8.0).limits[0].reliability_index
     assert (form > -z * form.std()).mean() == pytest.approx(TARGET, abs=2e-3)
     assert 1.6 < z < 1.9  # a normal form's is 1.88; one uniform part's 1.63
 
@@ -837,7 +837,7 @@ def test_a_demand_holds_the_variance_of_drawn_arrays(signs: tuple[float, ...]) -
     assert margin is not None
     z = seen.quantiles(TARGET, seen.boards([0] * (len(seen.parts) + 1)))
     demand = seen.program(z, {}).demands[0]
-    fixed = (margin.limits[0].distance / z[0, 0, 0]) ** 2 - demand.room
+    fixed = (margin.limits[0].reliability_index / z[0, 0, 0]) ** 2 - demand.room
     singles = [int(p.slot.name == "R50") for p in seen.parts]
     for pick in ([0] * len(singles), singles):
         for array in (0, 1):

@@ -9,8 +9,8 @@ from hypothesis import given, strategies as st
 from scipy.stats import norm
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import LADDER, STREAM, ScaledBoards, StretchCounts
 from designer.centering.response_windows import OperatingPoint
+from designer.centering.scaled_sigma import LADDER, STREAM, ScaledBoards, StretchCounts
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
 from designer.spread.board_quantities import between
@@ -23,15 +23,15 @@ PATIENCE = sum(STAGES[:3])
 """Drive periods after which the compiled way gives up."""
 
 
-def counts(distance: float, boards: int = 10**7) -> StretchCounts:
+def counts(index: float, boards: int = 10**7) -> StretchCounts:
     """What so many boards show where the law holds."""
-    shown = [round(boards * float(norm.cdf(distance / s))) for s in LADDER]
+    shown = [round(boards * float(norm.cdf(index / s))) for s in LADDER]
     return StretchCounts(LADDER, (boards,) * len(LADDER), tuple(shown))
 
 
 @given(st.floats(-3.0, 4.5))
-def test_a_distance_is_found_again(distance: float) -> None:
-    assert counts(distance).distance == pytest.approx(distance, abs=2e-3)
+def test_an_index_is_found_again(index: float) -> None:
+    assert counts(index).reliability_index == pytest.approx(index, abs=2e-3)
 
 
 @given(st.lists(st.integers(0, 40), min_size=4, max_size=4), st.integers(0, 3), st.integers(1, 5))
@@ -39,14 +39,14 @@ def test_more_boards_that_show_it_are_never_nearer(shown: list[int], place: int,
     better = list(shown)
     better[place] = min(better[place] + more, 40)
     asked = (40,) * 4
-    near = StretchCounts(LADDER, asked, tuple(shown)).distance
-    assert StretchCounts(LADDER, asked, tuple(better)).distance >= near - 1e-3
+    near = StretchCounts(LADDER, asked, tuple(shown)).reliability_index
+    assert StretchCounts(LADDER, asked, tuple(better)).reliability_index >= near - 1e-3
 
 
 def test_without_a_loss_it_is_finite() -> None:
     found = StretchCounts(LADDER, (64,) * 4, (64,) * 4)
     # All but half a board at the largest stretch: the law's own answer for that yield.
-    assert 4.0 < found.distance < 12.0
+    assert 4.0 < found.reliability_index < 12.0
     assert found.predicted > 0.9999
 
 

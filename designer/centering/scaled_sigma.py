@@ -55,7 +55,7 @@ class StretchCounts:
     """For each stretch, boards that show the response."""
 
     @property
-    def distance(self) -> float:
+    def reliability_index(self) -> float:
         """d, as above. Half a loss is added at the largest stretch, so that it is finite."""
         scale = 1.0 / np.array(self.stretches)
         ok = np.array(self.ok, dtype=float)
@@ -72,7 +72,7 @@ class StretchCounts:
     @property
     def predicted(self) -> float:
         """Yield at the spread as it is."""
-        return float(ndtr(self.distance))
+        return float(ndtr(self.reliability_index))
 
 
 @dataclass(frozen=True)
