@@ -72,7 +72,7 @@ class KeyedStore(Generic[Entry]):
 
     root: Path
     """The folder."""
-    form: EntryCodec[Entry]
+    codec: EntryCodec[Entry]
     """How an entry is written."""
     note: Note = quiet
     """Told of entries that are not taken."""
@@ -115,7 +115,7 @@ class KeyedStore(Generic[Entry]):
             self._damaged(name, UNSEALED if state is None else DAMAGED)
             return None
         try:
-            head, value = self.form.decode(content)
+            head, value = self.codec.decode(content)
             made = make(value) if _answers(head, key) else None
         except (*UNREADABLE, InputError) as error:
             # The work of another request has other columns, or more of them: that is no damage.
@@ -144,7 +144,7 @@ class KeyedStore(Generic[Entry]):
         ------
         InputError : it cannot be written.
         """
-        content = sealed(self.form.encode({**key, **(more or {})}, value))
+        content = sealed(self.codec.encode({**key, **(more or {})}, value))
         if self.put is not None:
             self.put(name, content)
         else:

@@ -33,7 +33,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class ParquetForm:
+class ParquetCodec:
     """Rows as mappings from column names to values (``keyed_store.EntryCodec``)."""
 
     schema: pa.Schema

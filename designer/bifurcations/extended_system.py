@@ -65,7 +65,7 @@ class CurvePoint:
         return np.linalg.eigvals(self.jacobian).astype(complex)
 
     @property
-    def stable_beside(self) -> bool:
+    def stable_aside(self) -> bool:
         """Whether the orbit is stable on one side of the curve: all multipliers but those that the
         condition binds lie inside the unit circle."""
         others = self.condition.others(self.multipliers)
@@ -189,7 +189,7 @@ class ExtendedSystem:
         if value is None:
             return None
         rows = self._derivatives(z, value, condition)
-        fresh = True
+        derived = True
         for iteration in range(1, NEWTON + 1):
             if rows is None:
                 return None
@@ -209,17 +209,17 @@ class ExtendedSystem:
                 return None
             left = float(np.abs(after.gap).max())
             if left > SLOW * error:
-                if fresh and left > 0.5 * error and error < STALLED:
+                if derived and left > 0.5 * error and error < STALLED:
                     return _point(z, value, rows, condition, iteration, along, error)
                 if left < FARTHEST:
                     z, value = new, after
-                elif fresh:
+                elif derived:
                     return None
-                rows, fresh = self._derivatives(z, value, condition), True
+                rows, derived = self._derivatives(z, value, condition), True
                 continue
             change = after.gap - value.gap - rows @ step
             rows = rows + np.outer(change, step) / float(step @ step)
-            z, value, fresh = new, after, False
+            z, value, derived = new, after, False
         return None
 
     def between(self, a: CurvePoint, b: CurvePoint, share: float) -> CurvePoint | None:

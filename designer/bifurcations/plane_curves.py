@@ -93,7 +93,7 @@ class PlaneCurve:
     @property
     def stable(self) -> tuple[bool, ...]:
         """For each point, whether the orbit is stable on one side of the curve."""
-        return tuple(p.stable_beside for p in self.points)
+        return tuple(p.stable_aside for p in self.points)
 
 
 def continued(

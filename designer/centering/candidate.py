@@ -102,7 +102,7 @@ class FidelityOutcome:
     """Whether this design was chosen."""
 
     @property
-    def stands(self) -> bool:
+    def holds(self) -> bool:
         """Whether no response is shown to be lost."""
         return not any(a.borne_out is False for a in self.agreements)
 

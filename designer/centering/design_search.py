@@ -42,7 +42,7 @@ from designer.centering.levers import (
     topologies,
     variants,
 )
-from designer.centering.ngspice_check import FIDELITY, LISTENED, Listen
+from designer.centering.ngspice_check import BOARDS_ASKED, FIDELITY, AskAgreement
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, Stretch, open_in, stretches
 from designer.centering.scaled_sigma import ScaledBoards
@@ -68,14 +68,15 @@ def search(
     jobs: int = 1,
     memory: AnswerCache | None = None,
     windows: Sequence[tuple[Stretch, ...]] | None = None,
-    listen: Listen | None = None,
+    ask_agreement: AskAgreement | None = None,
     progress: Progress | None = None,
 ) -> SearchResult:
     """Seek the design and the places of the highest predicted yield.
 
     seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
-    search of the same. windows : of ``look``, if they are known. listen : asks ngspice whether it
-    bears a design out (``ngspice_check.AgreementCheck``); the exact circuit alone decides if None.
+    search of the same. windows : of ``look``, if they are known. ask_agreement : asks ngspice
+    whether it bears a design out (``ngspice_check.AgreementCheck``); the exact circuit alone
+    decides if None.
 
     Raises
     ------
@@ -89,18 +90,18 @@ def search(
         all_windows = (
             look(modelfile, catalog, jobs, progress) if windows is None else tuple(windows)
         )
-        hunt = _DesignSearch(
+        design_search = _DesignSearch(
             modelfile,
             catalog,
             all_windows,
             seed,
             jobs,
             AnswerCache() if memory is None else memory,
-            listen,
+            ask_agreement,
             progress,
         )
         with seeking("design"):
-            return hunt.run()
+            return design_search.run()
 
 
 def look(
@@ -155,12 +156,12 @@ class _DesignSearch:
         seed: int,
         jobs: int,
         memory: AnswerCache,
-        listen: Listen | None,
+        ask_agreement: AskAgreement | None,
         progress: Progress,
     ) -> None:
         self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
         self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
-        self.listen, self.checks = listen, list[FidelityOutcome]()
+        self.ask_agreement, self.checks = ask_agreement, list[FidelityOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
@@ -270,18 +271,18 @@ class _DesignSearch:
         ngspice is asked about what the exact circuit with bandwidth bears out, until one design
         stands; where it bears none out, about the one of which it keeps the most boards.
         """
-        if self.listen is None:
+        if self.ask_agreement is None:
             return best
         lagging: list[tuple[Candidate, FidelityOutcome]] = []
         confirmed: list[tuple[Candidate, FidelityOutcome]] = []
         for candidate in self._slower(best):
             lagging.append(self._asked(candidate, BANDWIDTH, LaggingBoards(self.memory)))
-            if lagging[-1][1].stands:
-                confirmed.append(self._asked(candidate, FIDELITY, self.listen))
-                if confirmed[-1][1].stands:
+            if lagging[-1][1].holds:
+                confirmed.append(self._asked(candidate, FIDELITY, self.ask_agreement))
+                if confirmed[-1][1].holds:
                     break
         if not confirmed:
-            confirmed.append(self._asked(_most_surviving(lagging), FIDELITY, self.listen))
+            confirmed.append(self._asked(_most_surviving(lagging), FIDELITY, self.ask_agreement))
         final = _most_surviving(confirmed)
         for candidate, outcome in lagging + confirmed:
             self.checks.append(replace(outcome, adopted=candidate is final))
@@ -318,15 +319,15 @@ class _DesignSearch:
         return f"{frequency:.4g} Hz for {own:.4g} Hz of the mechanism"
 
     def _asked(
-        self, candidate: Candidate, fidelity: str, listen: Listen
+        self, candidate: Candidate, fidelity: str, ask_agreement: AskAgreement
     ) -> tuple[Candidate, FidelityOutcome]:
         frequency = self._frequency(candidate)
         engine = "exact circuit with" if fidelity == BANDWIDTH else "ngspice, rung"
         title = f"{engine} {fidelity}, {self._time_scale(frequency)}"
         step = self.progress.stage(title, len(candidate.scored))
         responses, design = candidate.model_responses, candidate.design
-        bench = self._bench(candidate.choice, responses, design, LISTENED)
-        agreements = listen(bench, [s.stand for s in candidate.scored], step)
+        bench = self._bench(candidate.choice, responses, design, BOARDS_ASKED)
+        agreements = ask_agreement(bench, [s.operating_orbit for s in candidate.scored], step)
         text = ", ".join(map(str, agreements))
         self.progress.note(f"  {title}: boards that show it as well, by response: {text}")
         return candidate, FidelityOutcome(fidelity, frequency, agreements)
@@ -395,7 +396,7 @@ class _DesignSearch:
                 )
             )
         slowed = bool(self.checks) and not self.checks[0].adopted
-        slower_for = "ngspice" if slowed and self.checks[0].stands else BANDWIDTH
+        slower_for = "ngspice" if slowed and self.checks[0].holds else BANDWIDTH
         for lever in LEVERS:
             before, after = start.choice.get(lever), final.choice.get(lever)
             if before != after:

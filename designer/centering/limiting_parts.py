@@ -37,7 +37,7 @@ NAMES = {
 }
 HALF = 0.5
 """Of the variance, or of the lost boards: from here on a cause is the one that is named."""
-TOGETHER = 4000
+JOINT_BOARDS = 4000
 """Boards from which a covariance is taken: a share is then known to about 2 %."""
 STREAM = "limiting:"
 _DEAD_ZONE = re.compile(r"R(2\d\d|50)[AB]?")
@@ -85,7 +85,7 @@ def joint_boards(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
     shared = spread.groups or spread.temperature is not None or spread.supply > 0.0
     if not shared and spread.measured is None:
         return None
-    return draw_many(circuit, spread, seed, range(TOGETHER), STREAM)
+    return draw_many(circuit, spread, seed, range(JOINT_BOARDS), STREAM)
 
 
 def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:

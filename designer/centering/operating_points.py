@@ -36,14 +36,14 @@ class Scored:
 
     place: OperatingPoint
     """Where the response is asked for."""
-    stand: OperatingOrbit | None
+    operating_orbit: OperatingOrbit | None
     """The nominal board's orbit there; None where it does not show the response."""
     counts: StretchCounts
     """What boards showed there."""
 
     @property
     def reliability_index(self) -> float:
-        return self.counts.reliability_index if self.stand is not None else -math.inf
+        return self.counts.reliability_index if self.operating_orbit is not None else -math.inf
 
 
 @dataclass(frozen=True)
@@ -98,19 +98,19 @@ def score(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Scored]:
     """What the first boards show at these places, in order."""
-    stands = bench.stands([(spec, place) for place in wanted])
-    there = [s for s in stands if s is not None]
+    operating_orbits = bench.operating_orbits([(spec, place) for place in wanted])
+    there = [s for s in operating_orbits if s is not None]
     counts = iter(bench.ask(there, range(boards), ladder, progress) if there else [])
     nothing = StretchCounts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
     return [
-        Scored(place, stand, nothing if stand is None else next(counts))
-        for place, stand in zip(wanted, stands, strict=True)
+        Scored(place, operating_orbit, nothing if operating_orbit is None else next(counts))
+        for place, operating_orbit in zip(wanted, operating_orbits, strict=True)
     ]
 
 
 def best(scored: Sequence[Scored], count: int) -> list[Scored]:
     """Those of the largest distances that the nominal board shows; the earlier of equals first."""
-    there = [s for s in scored if s.stand is not None]
+    there = [s for s in scored if s.operating_orbit is not None]
     return sorted(there, key=lambda s: -s.reliability_index)[:count]
 
 

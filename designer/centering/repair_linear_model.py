@@ -58,19 +58,19 @@ FITTED = 1000
 
 
 def trimmer_ways(
-    looker: ResponseSurvey, trim: DcTrim, firsts: Sequence[ResponseWay]
+    survey: ResponseSurvey, trim: DcTrim, firsts: Sequence[ResponseWay]
 ) -> list[ResponseWay] | None:
     """The trimmer as a way to each response; None where it is hopeless for one of them.
 
     trim : of the branch's circuit. firsts : the responses as they are, in the order in which they
     are to be looked at.
     """
-    boards, _ = trimmed_boards(trim, looker.plan, range(SAMPLES))
-    finest = [trimmed_boards(trim.on(p.circuit), p, range(2 * FEW))[0] for p in looker.best]
+    boards, _ = trimmed_boards(trim, survey.plan, range(SAMPLES))
+    finest = [trimmed_boards(trim.on(p.circuit), p, range(2 * FEW))[0] for p in survey.best]
     ways = []
     for first in firsts:
-        way = looker.with_rate(ResponseWay(first.response, TRIMMER, first.question), boards)
-        ways.append(looker.bounded(way, finest))
+        way = survey.with_rate(ResponseWay(first.response, TRIMMER, first.question), boards)
+        ways.append(survey.bounded(way, finest))
         if ways[-1].hopeless:
             return None
     return ways
@@ -354,7 +354,7 @@ def picture(
     branch: RepairBranch,
     target: float,
     seed: int,
-    book: VerdictCache,
+    verdict_cache: VerdictCache,
     *,
     trim: float,
     without: frozenset[str] = frozenset(),
@@ -379,9 +379,11 @@ def picture(
         StudyPlan(*bare.spread(pick), seed, SAMPLES, ())
         for pick in finest(parts, synthesis.catalog)
     )
-    looker = ResponseSurvey(branch, target, seed, book, trim, without, best, jobs, progress, missed)
+    survey = ResponseSurvey(
+        branch, target, seed, verdict_cache, trim, without, best, jobs, progress, missed
+    )
     rows = [
-        [looker.with_rate(ResponseWay(r, "as it is", question))]
+        [survey.with_rate(ResponseWay(r, "as it is", question))]
         for r, question in enumerate(questions)
     ]
     order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
@@ -391,17 +393,17 @@ def picture(
     def fitted() -> tuple[PartSlot, list[ResponseWay]] | None:
         slot = trimmer_slot(synthesis, without)
         ways = (
-            None if slot is None or slot.trim is None else trimmer_ways(looker, slot.trim, firsts)
+            None if slot is None or slot.trim is None else trimmer_ways(survey, slot.trim, firsts)
         )
         return None if slot is None or ways is None else (slot, ways)
 
     out = False
     for r in order:
-        rows[r] = looker.ways(rows[r][0])
+        rows[r] = survey.ways(rows[r][0])
         out = all(way.hopeless for way in rows[r]) and fitted() is None
         if out:
             break
-    enough = [looker.enough(row[0]) or any(way.certain for way in row) for row in rows]
+    enough = [survey.enough(row[0]) or any(way.certain for way in row) for row in rows]
     if not out and not all(enough) and (trimmer := fitted()) is not None:
         parts = (*parts, trimmer[0])
         for way in trimmer[1]:

@@ -238,7 +238,7 @@ def is_rare(target: float) -> bool:
 def measure(
     plan: StudyPlan,
     target: float,
-    book: VerdictCache,
+    verdict_cache: VerdictCache,
     *,
     trim: float | DcTrim | None = None,
     least: int = 2 * BLOCK,
@@ -263,7 +263,7 @@ def measure(
         if not letters and first is not None:
             stop = first
         indices = range(len(letters), min(stop, most))
-        letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
+        letters += verdict_cache.block(replace(plan, samples=most), indices, trim, jobs)[0]
         result = MeasuredYield(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
         shown = plan.questions[0].wanted.expect
         doing(f"{result.counts.ok} of {len(letters)} boards show {shown or 'the response'}")
@@ -271,10 +271,10 @@ def measure(
     return result
 
 
-def measure_together(
+def measure_all(
     plans: Sequence[tuple[StudyPlan, float | DcTrim | None] | None],
     target: float,
-    book: VerdictCache,
+    verdict_cache: VerdictCache,
     *,
     whole: bool = False,
     jobs: int = 1,
@@ -301,11 +301,11 @@ def measure_together(
             plan, trim = study
             if most > BLOCK and is_rare(target) and not measured[k].missed:
                 assert trim is None, "boards that are trimmed are counted"
-                measured[k] = _estimated(plan, measured[k], book, whole, jobs, progress)
+                measured[k] = _estimated(plan, measured[k], verdict_cache, whole, jobs, progress)
             else:
                 measured[k] = measure(
-                    plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
-                    progress=progress,
+                    plan, target, verdict_cache, trim=trim, least=least, most=most, first=FIRST,
+                    jobs=jobs, progress=progress,
                 )  # fmt: skip
     return tuple(measured)
 
@@ -319,7 +319,7 @@ def telling(target: float) -> int:
 def _estimated(
     plan: StudyPlan,
     counted: MeasuredYield,
-    book: VerdictCache,
+    verdict_cache: VerdictCache,
     whole: bool,
     jobs: int,
     progress: Callable[[], None],
@@ -329,12 +329,12 @@ def _estimated(
     Where no search met a loss, boards drawn as they are bound the share, as many as the target
     takes; a loss among them is one that the searches did not meet: then these boards decide.
     """
-    rare = book.rare(plan, None if whole else 1.0 - counted.target, jobs, progress)
+    rare = verdict_cache.rare(plan, None if whole else 1.0 - counted.target, jobs, progress)
     if rare.lost > 0.0 or 1.0 - rare.high >= counted.target:
         return replace(counted, rare=rare)
     drawn = unseen_share(0, 1) / rare.unseen
     plain = measure(
-        plan, counted.target, book, block=PLAIN_BLOCK, jobs=jobs, progress=progress,
+        plan, counted.target, verdict_cache, block=PLAIN_BLOCK, jobs=jobs, progress=progress,
         least=ceil(telling(counted.target) - drawn), most=MOST_PLAIN,
     ).counts  # fmt: skip
     if plain.lost + plain.grazing:

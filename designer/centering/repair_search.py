@@ -30,7 +30,7 @@ from designer.centering.repair_measure import (
     VerdictCache,
     is_rare,
     measure,
-    measure_together,
+    measure_all,
     plan_of,
     questions_of,
     study_seed,
@@ -76,7 +76,7 @@ def find_repair(
     without: frozenset[str] = frozenset(),
     seed: int = 1,
     jobs: int | None = None,
-    book: VerdictCache | None = None,
+    verdict_cache: VerdictCache | None = None,
     progress: Progress | None = None,
 ) -> Repair:
     """Search, in memory.
@@ -85,7 +85,7 @@ def find_repair(
     lost that counting does not tell (``is_rare``), losses are estimated, of boards as built: none
     is trimmed. budget : most that upgrades may cost [euro]. trim : half-width of the band of the
     generator's DC offset. without : kinds of upgrades that are not wanted
-    (``repair_branch.KINDS``). book : verdicts that are known.
+    (``repair_branch.KINDS``). verdict_cache : verdicts that are known.
 
     Raises
     ------
@@ -93,11 +93,11 @@ def find_repair(
     """
     need_responses(base.modelfile)
     progress = Progress() if progress is None else progress
-    book = VerdictCache() if book is None else book
+    verdict_cache = VerdictCache() if verdict_cache is None else verdict_cache
     threads = cores() if jobs is None else jobs
     if is_rare(target):
         without, trim = without | {TRIM, TRIMMER}, 0.0
-    search = _Search(base, target, budget, trim, without, seed, threads, book, progress)
+    search = _Search(base, target, budget, trim, without, seed, threads, verdict_cache, progress)
     with seeking("cure"):
         return search.run()
 
@@ -112,12 +112,12 @@ class _Search:
         without: frozenset[str],
         seed: int,
         jobs: int,
-        book: VerdictCache,
+        verdict_cache: VerdictCache,
         progress: Progress,
     ) -> None:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
         self.without, self.seed, self.jobs = without, seed, jobs
-        self.book, self.progress = book, progress
+        self.verdict_cache, self.progress = verdict_cache, progress
         self.waiting = branches(base, without)
         self.known: list[RepairBranch] = []
         self.pictures: list[LinearModel] = []
@@ -214,14 +214,14 @@ class _Search:
     ) -> tuple[MeasuredYield, ...]:
         """The yields of these studies; boards, whole : as of ``_trial``."""
         if boards is None:
-            return measure_together(
-                plans, self.target, self.book, whole=whole, jobs=self.jobs, progress=step
+            return measure_all(
+                plans, self.target, self.verdict_cache, whole=whole, jobs=self.jobs, progress=step
             )
         block = PLAIN_BLOCK if is_rare(self.target) else BLOCK
         return tuple(
             measure(
-                plan, self.target, self.book, trim=trim, least=boards, most=boards, first=FIRST,
-                block=block, jobs=self.jobs, progress=step,
+                plan, self.target, self.verdict_cache, trim=trim, least=boards, most=boards,
+                first=FIRST, block=block, jobs=self.jobs, progress=step,
             )
             for plan, trim in filter(None, plans)
         )  # fmt: skip
@@ -252,7 +252,7 @@ class _Search:
                 branch,
                 self.target,
                 study_seed(self.seed, 0),
-                self.book,
+                self.verdict_cache,
                 trim=self.trim,
                 without=self.without,
                 missed=[r for r, m in enumerate(measured) if m.missed],
@@ -368,7 +368,7 @@ class _Search:
         """A choice, measured on fresh boards.
 
         boards : their number, for each response; None: more until it is decided whether all
-        responses reach the target. whole : as ``measure_together`` has it."""
+        responses reach the target. whole : as ``measure_all`` has it."""
         model = self.pictures[which]
         cost = self._price(which, pick)
         step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")

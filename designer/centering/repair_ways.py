@@ -117,7 +117,7 @@ class ResponseSurvey:
     """Yield that is wanted of every response."""
     seed: int
     """Seed of the boards."""
-    book: VerdictCache
+    verdict_cache: VerdictCache
     """Keeps what has been computed."""
     trim: float
     """Half-width of the band of the DC offset, over the amplitude."""
@@ -217,7 +217,7 @@ class ResponseSurvey:
                         return row
         if TRIM not in self.without and self.trim > 0.0:
             few = measure(
-                plan, self.target, self.book, trim=self.trim, first=TRIM_FIRST,
+                plan, self.target, self.verdict_cache, trim=self.trim, first=TRIM_FIRST,
                 least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=self.jobs,
             )  # fmt: skip
             self.progress()

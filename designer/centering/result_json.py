@@ -140,7 +140,7 @@ def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
                 "b": r.b,
                 "expected": r.expected,
                 "distance": s.reliability_index if math.isfinite(s.reliability_index) else None,
-                "predicted_yield": s.counts.predicted if s.stand is not None else 0.0,
+                "predicted_yield": s.counts.predicted if s.operating_orbit is not None else 0.0,
                 "ok": list(s.counts.ok),
             }
             for r, s in zip(candidate.model_responses, candidate.scored, strict=True)

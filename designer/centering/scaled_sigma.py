@@ -113,9 +113,14 @@ class ScaledBoards:
         shares = np.concatenate([[0.0], np.repeat(LADDER, count)])
         self._boards = Ensemble(between(boards.take(rows), shares), jobs=jobs)
         circuit = design.circuit
-        self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
+        self._boards_key = [
+            circuit.opamp,
+            sorted(circuit.values.items()),
+            plain(spread.as_dict()),
+            seed,
+        ]
 
-    def stands(
+    def operating_orbits(
         self, wanted: Sequence[tuple[Response, OperatingPoint]]
     ) -> list[OperatingOrbit | None]:
         """Each place on the nominal board; None where that does not show the response there."""
@@ -134,16 +139,18 @@ class ScaledBoards:
 
     def ask(
         self,
-        stands: Sequence[OperatingOrbit],
+        operating_orbits: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float] = LADDER,
         progress: Callable[[], None] = lambda: None,
     ) -> list[StretchCounts]:
         """What these boards show at each place. stretches : some of ``LADDER``."""
-        queries = [self.query(stand, boards, stretches) for stand in stands]
+        queries = [
+            self.query(operating_orbit, boards, stretches) for operating_orbit in operating_orbits
+        ]
 
         def make(new: list[int]) -> list[tuple[int, ...]]:
-            return self._made([stands[k] for k in new], boards, stretches, progress)
+            return self._made([operating_orbits[k] for k in new], boards, stretches, progress)
 
         samples = (len(boards),) * len(stretches)
         answers = self._memory.get_all(queries, make, samples)
@@ -151,7 +158,7 @@ class ScaledBoards:
 
     def _made(
         self,
-        stands: Sequence[OperatingOrbit],
+        operating_orbits: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float],
         progress: Callable[[], None],
@@ -159,70 +166,83 @@ class ScaledBoards:
         """For each place the boards that show the response, by stretch."""
         places = [LADDER.index(s) for s in stretches]
         rows = [1 + r * self.count + i for r in places for i in boards]
-        which = [row for row in rows for _ in stands]
-        drives = [s.drive for _ in rows for s in stands]
-        starts = np.array([s.orbit.start for _ in rows for s in stands])
+        which = [row for row in rows for _ in operating_orbits]
+        drives = [s.drive for _ in rows for s in operating_orbits]
+        starts = np.array([s.orbit.start for _ in rows for s in operating_orbits])
         orbits = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
-        fine = [_shows(orbit, stands[k % len(stands)]) for k, orbit in enumerate(orbits)]
-        ok = np.array(fine).reshape(len(places), len(boards), len(stands)).sum(axis=1)
-        return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
+        fine = [
+            _shows(orbit, operating_orbits[k % len(operating_orbits)])
+            for k, orbit in enumerate(orbits)
+        ]
+        ok = np.array(fine).reshape(len(places), len(boards), len(operating_orbits)).sum(axis=1)
+        return [tuple(int(v) for v in ok[:, k]) for k in range(len(operating_orbits))]
 
-    def query(self, stand: OperatingOrbit, boards: range, stretches: Sequence[float]) -> object:
+    def query(
+        self, operating_orbit: OperatingOrbit, boards: range, stretches: Sequence[float]
+    ) -> object:
         """Everything that decides an answer, as plain data."""
-        drive, spec = stand.drive, stand.spec
-        setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
+        drive, spec = operating_orbit.drive, operating_orbit.spec
+        setting = [drive.omega, drive.amplitude, *(float(v) for v in operating_orbit.orbit.start)]
         if not drive.is_sine:
             setting += np.ravel(drive.shape).tolist()
         if drive.second is not None:
             setting += [drive.second.amplitude, *np.ravel(drive.second.shape).tolist()]
         wanted = [str(spec.expect), spec.twin, spec.symmetric]
         extent = [boards.start, boards.stop, list(stretches)]
-        return [self._whose, nine_digits(setting), wanted, extent]
+        return [self._boards_key, nine_digits(setting), wanted, extent]
 
     def excitation(self, place: OperatingPoint) -> Excitation:
         """The generator's setting for a place."""
         return self.design.excitation(place.b, place.omega)
 
-    def nominal(self, stand: OperatingOrbit) -> GateSubject:
+    def nominal(self, operating_orbit: OperatingOrbit) -> GateSubject:
         """The nominal board at a place, for ngspice."""
-        return GateSubject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
+        return GateSubject(
+            self._boards.reduction(0), self.excitation(operating_orbit.place), operating_orbit.orbit
+        )
 
-    def subjects(self, stand: OperatingOrbit, boards: range, stretch: float) -> list[GateSubject]:
+    def subjects(
+        self, operating_orbit: OperatingOrbit, boards: range, stretch: float
+    ) -> list[GateSubject]:
         """Those of these boards that show the response at this stretch, for ngspice."""
-        excitation = self.excitation(stand.place)
+        excitation = self.excitation(operating_orbit.place)
         return [
             GateSubject(self._boards.reduction(row), excitation, orbit)
-            for row, orbit in self._showing(stand, boards, stretch)
+            for row, orbit in self._showing(operating_orbit, boards, stretch)
         ]
 
-    def lagging(self, stand: OperatingOrbit, boards: range, stretch: float) -> list[Orbit]:
+    def lagging(
+        self, operating_orbit: OperatingOrbit, boards: range, stretch: float
+    ) -> list[Orbit]:
         """Where those of these boards that show the response at this stretch settle from their own
         orbit, their op-amps with bandwidth."""
-        showing = self._showing(stand, boards, stretch)
+        showing = self._showing(operating_orbit, boards, stretch)
         if not showing:
             return []
         rows, orbits = zip(*showing, strict=True)
         boards_with = replace(self._boards.boards.take(rows), bandwidth=True)
         some = Ensemble(boards_with, jobs=self.jobs)
         starts = np.array([orbit.start for orbit in orbits])
-        drives = [stand.drive] * len(rows)
+        drives = [operating_orbit.drive] * len(rows)
         return some.settle(range(len(rows)), drives, starts, jobs=self.jobs)
 
     def _showing(
-        self, stand: OperatingOrbit, boards: range, stretch: float
+        self, operating_orbit: OperatingOrbit, boards: range, stretch: float
     ) -> list[tuple[int, Orbit]]:
         """Rows and orbits of those of these boards that show the response at this stretch."""
         rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
-        starts = np.tile(stand.orbit.start, (len(rows), 1))
-        orbits = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
+        starts = np.tile(operating_orbit.orbit.start, (len(rows), 1))
+        orbits = self._boards.quick(
+            rows, [operating_orbit.drive] * len(rows), starts, jobs=self.jobs
+        )
         return [
             (row, orbit)
             for row, orbit in zip(rows, orbits, strict=True)
-            if orbit is not None and _shows(orbit, stand)
+            if orbit is not None and _shows(orbit, operating_orbit)
         ]
 
 
-def _shows(orbit: Orbit | None, stand: OperatingOrbit) -> bool:
+def _shows(orbit: Orbit | None, operating_orbit: OperatingOrbit) -> bool:
     if orbit is None or orbit.status is not OrbitStatus.PERIODIC:
         return False
-    return judge(orbit, stand.spec, stand.orbit)[0] is Verdict.OK
+    return judge(orbit, operating_orbit.spec, operating_orbit.orbit)[0] is Verdict.OK

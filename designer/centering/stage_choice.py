@@ -150,7 +150,7 @@ def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> s
         try:
             there = with_stage(modelfile, kind), synthesis.catalog
             met = synthesis.model_responses
-            other = synthesis_result.synthesise(*there, jobs=jobs, told=False, shown=met)
+            other = synthesis_result.synthesise(*there, jobs=jobs, announced=False, shown=met)
             others = boards_that_keep(other, jobs)
         except (InputError, Unreachable):
             return ""

@@ -126,7 +126,7 @@ def of_model(
     return replace(result, basins=tuple(sorted(result.basins, key=lambda b: -b.count)))
 
 
-def beside(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
+def coexisting_with(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
     """The attractors that coexist with a response of the model, by ``DRAWN_STARTS`` starts: the
     largest share first, then those that only the search for the response came to.
 

@@ -64,7 +64,7 @@ class LawMisfit:
     def _spring(self) -> bool:
         return len(self.where) == 2
 
-    def told(self, response: str, *, in_si: bool) -> str:
+    def text(self, response: str, *, in_si: bool) -> str:
         """It in words. response : what draws it so far. in_si : whether lengths are in metres."""
         reached, span = (
             value_text(x, "m") if in_si else f"{x:.4g}" for x in (self.reached, self.span)

@@ -136,16 +136,16 @@ def coefficient_errors(
     if model.wired.constant.any():
         errors |= _constants(rest.d, zones, lead, model, scales)
     none = np.zeros_like(rest.B)
-    drive, beside = (
+    drive, second_drive = (
         -inputs[1::2] * scales.seconds / scales.volts[1::2] * model.mass
-        for inputs in (rest.B, none if rest.beside is None else rest.beside)
+        for inputs in (rest.B, none if rest.second is None else rest.second)
     )
     return CoefficientErrors(
         errors=errors,
         max_error=max(abs(e) for e in errors.values()),
         scales=scales,
         drive_gain=drive,
-        second_gain=beside,
+        second_gain=second_drive,
         slopes=_scale_slopes(coefficients, errors, len(wanted)),
     )
 

@@ -289,7 +289,7 @@ def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[Genera
     out = []
     for r in responses:
         to = design.excitation(r.b, r.omega)
-        whose = r.omega, r.expected, to.frequency, to.amplitude
+        stated = r.omega, r.expected, to.frequency, to.amplitude
         base = design.base_per_volt(r.b, r.omega)
-        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second, base=base))
+        out.append(GeneratorSetting(*stated, shape=to.shape, second=to.second, base=base))
     return tuple(out)

@@ -572,7 +572,7 @@ class Excitation:
     def at_start(self) -> tuple[float, float]:
         """Voltages of the generator's channels at t = 0 [V]."""
         start = np.zeros(1)
-        return float(self.drive.at(start)[0]), float(self.drive.beside_at(start)[0])
+        return float(self.drive.at(start)[0]), float(self.drive.second_at(start)[0])
 
     def as_dict(self) -> dict[str, Any]:
         """Its fields; the shape where it is no sine, the second channel where there is one."""

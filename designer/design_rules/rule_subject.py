@@ -23,7 +23,7 @@ from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
-from designer.synthesis.operating_point import Operating, operating, stuck, together
+from designer.synthesis.operating_point import Operating, merged, operating, stuck
 from designer.synthesis.output_loads import Run
 from designer.synthesis.static_shifts import Shifts, forces, least_drive
 
@@ -115,7 +115,7 @@ class RuleSubject:
         ------
         NotRun : there is no orbit to go by.
         """
-        found = together(list(self.each_run.values()))
+        found = merged(list(self.each_run.values()))
         found.left_out |= self._runs[1]
         return _complete(found, "at")
 

@@ -172,8 +172,8 @@ class Flow:
         """Key of the mode that holds at state x (n,) and drive phase ``phase`` [rad]; as of
         ``PiecewiseLinearSystem.mode_at``."""
         angle = np.array([phase])
-        u, beside = float(self.drive.at(angle)[0]), float(self.drive.beside_at(angle)[0])
-        return self.system.mode_at(x, u, near, beside=beside)
+        u, second_drive = float(self.drive.at(angle)[0]), float(self.drive.second_at(angle)[0])
+        return self.system.mode_at(x, u, near, second_drive=second_drive)
 
     def to_strobe(self, x: Array, phase: float) -> FlowResult:
         """Start in state x (n,) at drive phase ``phase`` [rad] and run to the next strobe; by the

@@ -224,7 +224,7 @@ def borders(request: MapRequest) -> Iterator[Message]:
     if hindrance:
         yield _borders_message([], hindrance, done=True)
         return
-    (x, y), whose = request.at, f"Borders of {summary(orbit)}"
+    (x, y), title = request.at, f"Borders of {summary(orbit)}"
     plan = CurvePlan(request.subject, request.x.name, request.y.name, y, request.window)
     curves: list[BorderCurve] = []
 
@@ -232,8 +232,8 @@ def borders(request: MapRequest) -> Iterator[Message]:
         curves.extend(border_curves.around(plan, orbit, x, step))
 
     for points, _ in enumerate(stepped(follow)):
-        yield _borders_message(curves, f"{whose}: being followed, {points} points so far")
-    words = whose if curves else f"{whose}: none was found within the map"
+        yield _borders_message(curves, f"{title}: being followed, {points} points so far")
+    words = title if curves else f"{title}: none was found within the map"
     yield _borders_message(curves, words, done=True)
 
 

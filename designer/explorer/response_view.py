@@ -214,13 +214,13 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):
-            rows.append((name, _together([low, high], "m", place, 4, " to ")))
+            rows.append((name, _in_one_unit([low, high], "m", place, 4, " to ")))
     if orbit.n:
         rows += _impact_rows(orbit, place)
     if np.isfinite(orbit.penetration):
-        rows.append(("shallowest contact", _together([orbit.penetration], "m", place, 3)))
+        rows.append(("shallowest contact", _in_one_unit([orbit.penetration], "m", place, 3)))
     if np.isfinite(orbit.miss):
-        rows.append(("nearest miss", _together([orbit.miss], "m", place, 3)))
+        rows.append(("nearest miss", _in_one_unit([orbit.miss], "m", place, 3)))
     return rows
 
 
@@ -241,10 +241,10 @@ def _impacts_text(rate: str, velocities: Array, place: ModelPlace) -> str:
     few = count <= LISTED
     listed, between = (velocities, ", ") if few else (velocities[[0, -1]], " to ")
     words = "1 impact" if count == 1 else f"{count} impacts"
-    return f"{words}, {rate}\u00a0=\u00a0{_together(listed, 'm/s', place, 3, between)}"
+    return f"{words}, {rate}\u00a0=\u00a0{_in_one_unit(listed, 'm/s', place, 3, between)}"
 
 
-def _together(
+def _in_one_unit(
     values: Sequence[float] | Array, unit: str, place: ModelPlace, digits: int, between: str = ""
 ) -> str:
     """Values in one unit, which suits the largest of them."""

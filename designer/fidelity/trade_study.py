@@ -191,11 +191,11 @@ def _of_boards(responses: Sequence[TradedResponse]) -> list[Cheapest]:
     out = [_of_some([b]) for b in asked]
     if len(asked) > 1 or (asked and missing):
         note = f"without response {', '.join(missing)}" if missing else ""
-        out.append(_of_some(asked, note, together=True))
+        out.append(_of_some(asked, note, combined=True))
     return out
 
 
-def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = False) -> Cheapest:
+def _of_some(some: Sequence[BoardTrade], note: str = "", *, combined: bool = False) -> Cheapest:
     measured = max(b.bound for b in some)
     off = any(b.off(YIELD) for b in some)
     fidelity = "ideal" if off else CIRCUIT
@@ -208,7 +208,7 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
     return Cheapest(
         SHARE,
         IDEAL,
-        None if together else some[0].label,
+        None if combined else some[0].label,
         fidelity,
         "gate" if off else "exact",
         YIELD,

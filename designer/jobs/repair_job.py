@@ -232,7 +232,7 @@ def _find_and_write(
                 without=unwanted,
                 seed=options.seed,
                 jobs=options.jobs,
-                book=VerdictCache(studies_before, save),
+                verdict_cache=VerdictCache(studies_before, save),
                 progress=progress,
             )
         progress.stage("report of the cure")

@@ -98,7 +98,7 @@ def searched_into(
             jobs=options.workers,
             memory=memory,
             windows=windows,
-            listen=AgreementCheck(pool, memory),
+            ask_agreement=AgreementCheck(pool, memory),
             progress=progress,
         )
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)

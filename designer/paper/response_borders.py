@@ -101,8 +101,8 @@ def report(*, out: Path, jobs: int, progress: Progress) -> Mapping[str, Response
     borders_of = {name: response_borders(windows, name, jobs, progress) for name in SECOND}
     for borders in borders_of.values():
         figure = borders.figure()
-        for form in ("png", "svg"):
-            write(out / f"{borders.name}.{form}", picture(figure, form, 160.0))
+        for file_format in ("png", "svg"):
+            write(out / f"{borders.name}.{file_format}", picture(figure, file_format, 160.0))
         write(out / f"{borders.name}.csv", borders.table())
     if (out / README).is_file():
         write(out / README, _with_pictures((out / README).read_text("utf-8"), borders_of.values()))

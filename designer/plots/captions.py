@@ -66,10 +66,10 @@ def missing(end: SweptEnd, parameter: str, unit: str = "") -> str:
 
     parameter : how it is written. unit : of it.
     """
-    whose = label(end.window.response, end.window.symmetric)
+    owner = label(end.window.response, end.window.symmetric)
     which, way = ("upper", "up") if end.side > 0 else ("lower", "down")
     place = f"{parameter} = {end.value:.9g}{' ' + unit if unit else ''}"
-    return f"{which} end of {whose} {end.kind}, known {way} to {place}: {end.reason}"
+    return f"{which} end of {owner} {end.kind}, known {way} to {place}: {end.reason}"
 
 
 def family(response: str) -> str:

@@ -26,10 +26,10 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     parameter : how it is written; "" leaves out where the point lies. unit : of it.
     """
     place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
-    whose = f" of {label(point.response, point.symmetric)}"
+    owner = f" of {label(point.response, point.symmetric)}"
     if point.kind is PointKind.GRAZING:
-        whose = f" at {point.stops}" if point.stops else ""
-    return f"{NAMES[point.kind]}{whose}{place}: {_change(point)}"
+        owner = f" at {point.stops}" if point.stops else ""
+    return f"{NAMES[point.kind]}{owner}{place}: {_change(point)}"
 
 
 def label(response: str, symmetric: bool | None) -> str:

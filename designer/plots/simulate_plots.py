@@ -258,10 +258,10 @@ def write(
     for stem, response in zip(stems, simulated, strict=True):
         for kind, draw in KINDS.items() if response.traces else ():
             figure = draw(response, units)
-            for form in FORMATS:
-                names.append(_file(stem, kind, form))
+            for file_format in FORMATS:
+                names.append(_file(stem, kind, file_format))
                 with appearing(folder / names[-1], "--plots", FOLDER) as partial:
-                    partial.write_bytes(picture(figure, form, 200.0))
+                    partial.write_bytes(picture(figure, file_format, 200.0))
         for kind, table in TABLES.items() if response.traces else ():
             names.append(_file(stem, kind, "csv"))
             with appearing(folder / names[-1], "--plots", FOLDER) as partial:
@@ -375,8 +375,8 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 )
 
 
-def _file(stem: str, kind: str, form: str) -> str:
-    return f"{stem}-{kind}.{form}"
+def _file(stem: str, kind: str, file_format: str) -> str:
+    return f"{stem}-{kind}.{file_format}"
 
 
 def _traced_orbits(response: Simulated) -> list[Orbit]:

@@ -37,17 +37,17 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
     name : the model's title, or "". width : characters of a line.
     """
-    whose = plan.subject.name
+    owner = plan.subject.name
     if isinstance(plan, SweepPlan):
         over = parameter_name(plan.subject, plan.parameter)
-        heading = f"bifurcation diagram of the {whose} over {over}, {_way(plan)}"
+        heading = f"bifurcation diagram of the {owner} over {over}, {_way(plan)}"
         changed: Mapping[str, float | None] = {plan.parameter: None}
     elif isinstance(plan, MapPlan):
         over = _both(plan.subject, plan.x, plan.y)
-        heading = f"responses n-p-q of the {whose} over {over}, from rest"
+        heading = f"responses n-p-q of the {owner} over {over}, from rest"
         changed = {plan.x: None, plan.y: None}
     else:
-        heading = f"basins of attraction of the {whose}, by the initial "
+        heading = f"basins of attraction of the {owner}, by the initial "
         heading += f"{_both(plan.subject, plan.x, plan.y)}, other states 0"
         changed = plan.changes
     lines = [name, heading, "held: " + ", ".join(_fixed(plan.subject, changed))]

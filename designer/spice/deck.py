@@ -285,7 +285,7 @@ def following(
         return {}
     reduction = Reduction(circuit, board)
     try:
-        key = reduction.system().mode_at(states, channels[0], beside=channels[1])
+        key = reduction.system().mode_at(states, channels[0], second_drive=channels[1])
         volts = reduction.voltages(key, states, channels)
     except ArithmeticError:
         return {}

@@ -115,12 +115,13 @@ class ScaleBox:
             if self.point(any_point, without={*gone, limit}) is None:
                 gone.append(limit)
         held = [limit for limit in limits if limit not in gone]
-        whose = {
+        by_condition = {
             limit.condition: [one for one in limits if one.condition == limit.condition]
             for limit in held
         }
         frees = {
-            name: self.point(any_point, without=own) is not None for name, own in whose.items()
+            name: self.point(any_point, without=own) is not None
+            for name, own in by_condition.items()
         }
         return [Conflict(limit, self._needed(limit), frees[limit.condition]) for limit in held]
 

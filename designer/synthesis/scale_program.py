@@ -56,7 +56,7 @@ STILL = 1e-6
 CATALOGUE, TRIED, STAGE = "catalogue", "tried", "stage"
 """Limits that neither a side condition nor a key sets: by what can be bought, by the values that a
 search tries, by a stage's own way to work."""
-_TOLD = {
+_SOURCES = {
     CATALOGUE: "no other can be bought",
     TRIED: "no other is tried there",
     STAGE: "of the stage itself",
@@ -78,18 +78,18 @@ class StatedLimit:
     least: bool = False
     """Whether it is a limit from below."""
 
-    def told(self, value: float) -> str:
+    def text(self, value: float) -> str:
         """The limit in words, at this value."""
         number = format_quantity(value, self.unit, 3)
         keys = {each.name for each in fields(CircuitSpec)}
-        whose = f"rule {self.condition}"
-        if self.condition in _TOLD:
-            whose = _TOLD[self.condition]
+        source = f"rule {self.condition}"
+        if self.condition in _SOURCES:
+            source = _SOURCES[self.condition]
         elif self.condition in SIDE_CONDITIONS:
-            whose = f"side condition {self.condition}"
+            source = f"side condition {self.condition}"
         elif self.condition in keys:
-            whose = f"circuit.{self.condition}"
-        return f"{self.what} {'>=' if self.least else '<='} {number} ({whose})"
+            source = f"circuit.{self.condition}"
+        return f"{self.what} {'>=' if self.least else '<='} {number} ({source})"
 
 
 @dataclass(frozen=True)
@@ -380,14 +380,14 @@ class _Maker:
         )
         allowed = series_values(series, *span)[-1 if most else 0]
         sold = bought.max() if most else bought.min()
-        whose = TRIED
+        source = TRIED
         if np.isclose(value, allowed, rtol=EQUAL, atol=0.0):
-            whose = f"{kind}_range"
+            source = f"{kind}_range"
         elif np.isclose(value, sold, rtol=EQUAL, atol=0.0):
-            whose = CATALOGUE
+            source = CATALOGUE
         # One key is one limit for every part that it bounds.
         what = f"the {'largest' if most else 'smallest'} {kind}"
-        return StatedLimit(whose, what, value, unit, least=not most)
+        return StatedLimit(source, what, value, unit, least=not most)
 
     def _row(
         self,

@@ -306,7 +306,7 @@ def tables(answer: Mapping[str, Any]) -> None:
             say(f"{place}: {r['response']}: {r['reason']}")
         for each in (r, *r["others"]):
             for misfit in misfits_in(each):
-                say(f"{place}: {misfit.told(each['response'], in_si=in_si)}")
+                say(f"{place}: {misfit.text(each['response'], in_si=in_si)}")
         if r["frequencies"] is not None:
             say(f"{place}: {frequencies(r)}")
         for other in r["others"]:

@@ -284,7 +284,7 @@ class BoardFit:
     """Steps that the search took."""
 
     @property
-    def told(self) -> float:
+    def determined(self) -> float:
         """How many numbers the records tell of the board, a coordinate of one each."""
         return float(len(self.centre) - np.trace(self.covariance))
 

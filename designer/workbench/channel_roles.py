@@ -67,12 +67,12 @@ def recorded_motion(
     prediction: BoardPrediction,
     *,
     frequency: float | None = None,
-    told: Mapping[str, str] | None = None,
+    stated: Mapping[str, str] | None = None,
 ) -> RecordedMotion:
     """A record with the nets that its channels show and its drive.
 
     frequency : about that of the drive [Hz], for a record without the generator; else it is found.
-    told : the channel of each net; what it does not name is left out. Else the channels are
+    stated : the channel of each net; what it does not name is left out. Else the channels are
     recognised: by the board's equations of motion (``force_balance``), and where these say nothing
     by the shapes that the nets have at the nearest settings.
 
@@ -81,24 +81,24 @@ def recorded_motion(
     InputError : a net or channel that is not there; a record shorter than two drive periods; or one
         whose channels are like no nets of the board.
     """
-    if told:
-        _check(record, prediction, told)
-        if set(told) == {prediction.generator}:
+    if stated:
+        _check(record, prediction, stated)
+        if set(stated) == {prediction.generator}:
             expected = "a net of the board as well"
             raise InputError(None, "--channels", "the generator alone", expected)
-    channels = tuple(dict.fromkeys(told.values())) if told else tuple(record.signals)
+    channels = tuple(dict.fromkeys(stated.values())) if stated else tuple(record.signals)
     shown = [c for c in channels if record.moves(c)]
     if not shown:
         raise InputError(record.source, "its channels", "no signal", "a channel that moves")
     band = (0.0, math.inf) if frequency is None else _near(frequency)
     balance = ForceBalance(prediction, *_stretch(record, shown, prediction), band)
-    if told:
-        net_of = {channel: net for net, channel in told.items()}
+    if stated:
+        net_of = {channel: net for net, channel in stated.items()}
         best, doubt, remedy = balance.balance([net_of[c] for c in shown]), "", ""
     else:
         best, doubt, remedy = _recognised(balance, shown, prediction.generator)
         _not_alone(record, best.nets, shown[0], prediction)
-    nets = dict(told) if told else dict(zip(best.nets, shown, strict=False))
+    nets = dict(stated) if stated else dict(zip(best.nets, shown, strict=False))
     drive = best.frequency
     if best.misfit > LOOSE and prediction.generator not in nets:
         drive = math.nan
@@ -115,11 +115,11 @@ def recorded_motion(
         _not_alone(record, nets, shown[0], prediction)
         doubt = doubt or "its channels were recognised by their shapes alone"
         remedy = remedy or _example(nets)
-    if not told and not doubt and (other := _cut_as_an_output(record, nets, prediction)):
+    if not stated and not doubt and (other := _cut_as_an_output(record, nets, prediction)):
         channel, output = other
         doubt = f"{channel}, which is cut off where {output} rests, may be {output}"
         remedy = _example({**{n: c for n, c in nets.items() if c != channel}, output: channel})
-    if not told and not doubt and prediction.circuit.bends:
+    if not stated and not doubt and prediction.circuit.bends:
         laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
         doubt = f"its channels were recognised without the spread of the bends of {laws}"
         remedy = _example(nets)
@@ -155,9 +155,9 @@ def _recognised(
     displacement: in a linear part of the board, far from the stops, that is one as well.
     """
     loose = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= LOOSE]
-    loose.sort(key=lambda each: -each.told)
+    loose.sort(key=lambda each: -each.explained)
     every = [each for each in loose if not each.misfit >= FITS]
-    if not every or not every[0].told > LITTLE:
+    if not every or not every[0].explained > LITTLE:
         return _by_shapes(balance, shown)
     # One that hardly fits is not taken, but rules out that another is sure.
     best = every[0]
@@ -170,7 +170,7 @@ def _recognised(
         place = sine_as.nets.index(generator)
         doubt = f"{shown[place]}, a sine as the generator's, may be {best.nets[place]} as well"
         return sine_as, doubt, _example(dict(zip(sine_as.nets, shown, strict=True)))
-    if others and best.told - others[0].told < CLEARER:
+    if others and best.explained - others[0].explained < CLEARER:
         if not best.whole:
             return _by_shapes(balance, shown)
         other = ", ".join(f"{net}={c}" for net, c in zip(others[0].nets, shown, strict=True))
@@ -283,8 +283,8 @@ def _motion(
     return RecordedMotion(record, dict(nets), generator, frequency, error, amplitude, offset, phase)
 
 
-def _check(record: Record, prediction: BoardPrediction, told: Mapping[str, str]) -> None:
-    for net, channel in told.items():
+def _check(record: Record, prediction: BoardPrediction, stated: Mapping[str, str]) -> None:
+    for net, channel in stated.items():
         if net not in prediction.nets:
             expected = f"one of the nets {', '.join(prediction.nets)}"
             raise InputError(None, "--channels", net, expected)

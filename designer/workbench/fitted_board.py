@@ -2,7 +2,7 @@
 
 A record can tell figures of a board, with intervals: gaps, constant force, resonances. What a
 record leaves open is not reported: a figure is told where the records have narrowed it to less than
-``TOLD`` of what the spread alone says.
+``DETERMINED`` of what the spread alone says.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from designer.workbench.naming import NamedMotion
 from designer.workbench.observation import Observation, observe
 from designer.workbench.prediction import BoardPrediction, PredictedResponse
 
-TOLD = 0.5
+DETERMINED = 0.5
 """Of the standard deviation over the spread."""
 DRAWS = 256
 """Boards of the spread that say how far a figure varies; the first is the middle one."""
@@ -57,18 +57,18 @@ class BoardFigure:
     """Standard deviation over the boards of the spread."""
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the records say more of it than the spread does."""
-        return self.high - self.low < TOLD * 2.0 * NORMAL * self.sigma
+        return self.high - self.low < DETERMINED * 2.0 * NORMAL * self.sigma
 
     def as_dict(self) -> dict[str, Any]:
         """As a JSON answer has it."""
         return asdict(self)
 
 
-def told_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
+def determined_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
     """The figures that the records tell."""
-    return tuple(figure for figure in figures(fit) if figure.told)
+    return tuple(figure for figure in figures(fit) if figure.determined)
 
 
 def figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
@@ -244,7 +244,7 @@ def board_behind(
         return FittedBoard(name, files, reason=str(error))
     questions = [r.question for r in (prediction.responses if wanted is None else wanted)]
     advice = advise(fit, questions, prediction.synthesis.modelfile.tuning)
-    return FittedBoard(name, files, fit, told_figures(fit), advice)
+    return FittedBoard(name, files, fit, determined_figures(fit), advice)
 
 
 def _observation(named: NamedMotion, prediction: BoardPrediction) -> Observation:

@@ -52,7 +52,7 @@ class Balance:
     misfit: float
     """What is left over, in units of what a usual board leaves: about 1 or less for the right
     one; nan where these channels test nothing."""
-    told: float
+    explained: float
     """How much of the channels it explains: the sum of -log of the share of its own power that is
     left of each; a channel that nothing tests adds nothing."""
     whole: bool
@@ -135,8 +135,10 @@ class ForceBalance:
                 if net not in tests:
                     tests[net] = self._driven(forces, of[net], net, drive, allowed)
         misfit = max((test.left / test.allowed for test in tests.values()), default=math.nan)
-        told = sum(-math.log(min(max(test.share, LEAST_SHARE), 1.0)) for test in tests.values())
-        return Balance(tuple(nets), misfit, told, len(tests) == len(nets), frequency)
+        explained = sum(
+            -math.log(min(max(test.share, LEAST_SHARE), 1.0)) for test in tests.values()
+        )
+        return Balance(tuple(nets), misfit, explained, len(tests) == len(nets), frequency)
 
     def sine(self, channel: int) -> tuple[float, float]:
         """Frequency [Hz] of the sine that is most like a channel, and the share of its power that

@@ -148,10 +148,10 @@ def _even(times: Array, path: Path, lines: Sequence[int]) -> Array:
     return np.asarray(begin + step * k)
 
 
-def _check_times(path: Path, time: Array, told: float | None) -> None:
+def _check_times(path: Path, time: Array, stated: float | None) -> None:
     """InputError for steps that no oscilloscope has, or that the digits of a number do not hold.
-    told : the step that a header says [s]."""
-    step = float(time[-1] - time[0]) / (len(time) - 1) if told is None else told
+    stated : the step that a header says [s]."""
+    step = float(time[-1] - time[0]) / (len(time) - 1) if stated is None else stated
     low, high = STEPS
     if not low <= step <= high:
         expected = f"from {low:g} s to {high:g} s"

@@ -37,7 +37,7 @@ LOST, KEPT = 50, 20
 """Boards of each response that are replayed: lost ones, and ok ones, in order of the samples."""
 PROBE = 10
 """Lost boards of a response of which no board is ok that decide whether more are replayed."""
-TOGETHER = 8
+AT_ONCE = 8
 """Boards that are replayed before what they showed is stored; no answer depends on it."""
 BUDGET = 20_000
 """Steps of an attribution, about, where nobody says another number."""
@@ -286,8 +286,8 @@ def _all(
             for _ in extent.changes:
                 progress()
     missing = [r for r in replays if r not in results]
-    for start in range(0, len(missing), TOGETHER):
-        some = missing[start : start + TOGETHER]
+    for start in range(0, len(missing), AT_ONCE):
+        some = missing[start : start + AT_ONCE]
         columns = _some(plan, extent, some, jobs, progress)
         results |= {r: list(row) for r, row in zip(some, zip(*columns, strict=True), strict=True)}
         parts.put({r.part: "".join(str(v)[0] for v in results[r]) for r in some})

@@ -250,9 +250,9 @@ def _stored_crossings(
             for _ in range(ROUNDS):
                 progress()
     missing = [pair for pair in lost if pair not in by_board]
-    fresh = crossings(boards, missing, questions, jobs=jobs, progress=progress)
-    parts.put({f"crossing {c.question} {c.board}": c for c in fresh})
-    by_board |= {(c.question, c.board): c for c in fresh}
+    computed = crossings(boards, missing, questions, jobs=jobs, progress=progress)
+    parts.put({f"crossing {c.question} {c.board}": c for c in computed})
+    by_board |= {(c.question, c.board): c for c in computed}
     return [by_board[pair] for pair in lost]
 
 

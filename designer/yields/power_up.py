@@ -251,13 +251,13 @@ def _arrivals(
     ]
 
     boards = list(dict.fromkeys(board for board, _ in groups))
-    beside = {b: boards[k - k % BESIDE :][:BESIDE] for k, b in enumerate(boards)}
+    neighbours = {b: boards[k - k % BESIDE :][:BESIDE] for k, b in enumerate(boards)}
 
     def arrive(task: tuple[tuple[int, Recipe], list[int]]) -> list[Arrival | str]:
         (board, recipe), members = task
         try:
             system = ensemble.reduction(board).system()
-            swept = partial(ensemble.swept, board, beside=beside[board])
+            swept = partial(ensemble.swept, board, neighbours=neighbours[board])
             phases = [starts[k][3] for k in members]
             orbit = known[members[0]] if known else None
             if orbit is None:

@@ -352,8 +352,8 @@ def rare_losses(
         doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
         narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
         narrow = narrow and result.effective >= ENOUGH
-        told = bound is not None and _beside(result, bound)
-        if count >= most or ((narrow or told) and count >= LEAST_BOARDS):
+        decided = bound is not None and _is_decided(result, bound)
+        if count >= most or ((narrow or decided) and count >= LEAST_BOARDS):
             break
         sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
     spent = found.boards + count
@@ -427,7 +427,7 @@ def _interval(mean: float, error: float, outside: float) -> tuple[float, float]:
     return mean / spread, min(mean * spread, 1.0)
 
 
-def _beside(estimate: _Estimate, bound: float) -> bool:
+def _is_decided(estimate: _Estimate, bound: float) -> bool:
     """Whether an estimate's interval lies on one side of a share, by enough lost boards."""
     if estimate.effective < SOME:
         return False

@@ -211,11 +211,11 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
 def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
     """Those that differ from what was tried, from as built and from each other."""
     earlier = [AS_BUILT, *(t.setting for t in case.tries)]
-    fresh: list[Adjustment] = []
+    untried: list[Adjustment] = []
     for setting in settings:
-        if all(_distance(setting, other, bands) > APART for other in (*earlier, *fresh)):
-            fresh.append(setting)
-    return fresh
+        if all(_distance(setting, other, bands) > APART for other in (*earlier, *untried)):
+            untried.append(setting)
+    return untried
 
 
 def _distance(a: Adjustment, b: Adjustment, bands: Bands) -> float:

@@ -195,19 +195,19 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     wanted = parse_model_file(LOW_BAND)
 
     def checks_of(limit: float) -> list[FidelityOutcome]:
-        def listen(
+        def ask_agreement(
             bench: ScaledBoards,
-            stands: Sequence[OperatingOrbit | None],
+            operating_orbits: Sequence[OperatingOrbit | None],
             progress: Callable[[], None],
         ) -> tuple[Agreement, ...]:
             fast = bench.design.errors.scales.frequency(1.0) > limit
-            assert all(s is not None for s in stands)
-            return (Agreement(16, 8 if fast else 15),) * len(stands)
+            assert all(s is not None for s in operating_orbits)
+            return (Agreement(16, 8 if fast else 15),) * len(operating_orbits)
 
-        found = search(wanted, catalog(), listen=listen)
+        found = search(wanted, catalog(), ask_agreement=ask_agreement)
         lagging = [h for h in found.checks if h.fidelity == BANDWIDTH]
         checks = [h for h in found.checks if h.fidelity == FIDELITY]
-        assert all(h.stands for h in lagging)
+        assert all(h.holds for h in lagging)
         assert [h.frequency for h in lagging] == [h.frequency for h in checks]
         (kept,) = [h for h in checks if h.adopted]
         assert found.synthesis.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
@@ -231,15 +231,17 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     """ngspice bears the slower one out, but few of its boards show the response at all."""
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
 
-    def listen(
-        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], progress: Callable[[], None]
+    def ask_agreement(
+        bench: ScaledBoards,
+        operating_orbits: Sequence[OperatingOrbit | None],
+        progress: Callable[[], None],
     ) -> tuple[Agreement, ...]:
         first = bench.design.errors.scales.frequency(1.0) == pytest.approx(fastest[0])
-        return (Agreement(16, 13) if first else Agreement(10, 10),) * len(stands)
+        return (Agreement(16, 13) if first else Agreement(10, 10),) * len(operating_orbits)
 
     wanted = file(PLACE)
     fastest = [search(wanted, catalog()).synthesis.design.errors.scales.frequency(1.0)]
-    found = search(wanted, catalog(), listen=listen)
+    found = search(wanted, catalog(), ask_agreement=ask_agreement)
     assert [h.adopted for h in found.checks if h.fidelity == FIDELITY] == [True, False]
 
 
@@ -251,19 +253,21 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     heard: list[float] = []
 
-    def listen(
-        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], _: object
+    def ask_agreement(
+        bench: ScaledBoards, operating_orbits: Sequence[OperatingOrbit | None], _: object
     ) -> Agreements:
         heard.append(bench.design.errors.scales.frequency(1.0))
-        return (Agreement(16, 16),) * len(stands)
+        return (Agreement(16, 16),) * len(operating_orbits)
 
     played = itertools.chain([8, 8], itertools.repeat(15 if bears_out else 8))
 
     def lagging(_: object) -> Callable[..., Agreements]:
-        return lambda bench, stands, progress: (Agreement(16, next(played)),) * len(stands)
+        return lambda bench, operating_orbits, progress: (
+            (Agreement(16, next(played)),) * len(operating_orbits)
+        )
 
     monkeypatch.setattr("designer.centering.design_search.LaggingBoards", lagging)
-    found = search(parse_model_file(LOW_BAND), catalog(), listen=listen)
+    found = search(parse_model_file(LOW_BAND), catalog(), ask_agreement=ask_agreement)
     answers = [h.adopted for h in found.checks if h.fidelity == BANDWIDTH]
     if bears_out:
         assert answers == [False, False, True]

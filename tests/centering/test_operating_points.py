@@ -39,7 +39,7 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
     top = max(s.reliability_index for s in dense)
     # The grid has 48 places; a pattern of finite steps may stay a little below its best one.
     assert best.reliability_index >= 0.95 * top
-    assert sum(s.stand is not None for s in dense) > 20
+    assert sum(s.operating_orbit is not None for s in dense) > 20
 
 
 def test_what_is_fixed_stays_fixed() -> None:

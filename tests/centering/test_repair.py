@@ -35,7 +35,7 @@ from designer.centering.repair_measure import (
     RareShare,
     VerdictCache,
     measure,
-    measure_together,
+    measure_all,
     telling,
 )
 from designer.centering.repair_milp import cheapest
@@ -153,7 +153,9 @@ def test_beyond_what_boards_show_a_tail_is_a_normal_s() -> None:
 def truth(nominal: float, otherwise: bool = False) -> Any:
     """What a study measures where the limit is known: boards are ok where it is positive."""
 
-    def of(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
+    def of(
+        plan: StudyPlan, target: float, verdict_cache: VerdictCache, **_: object
+    ) -> MeasuredYield:
         boards = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((known_margin(nominal, otherwise).of(boards) > 0.0).sum())
         return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)
@@ -184,7 +186,7 @@ def searched(
     taken = (lambda *_, **__: picture) if isinstance(picture, LinearModel) else picture
     monkeypatch.setattr(repair_search, "picture", taken)
     monkeypatch.setattr(repair_search, "measure", real)
-    monkeypatch.setattr(repair_measure, "measure", real)  # as measure_together calls it
+    monkeypatch.setattr(repair_measure, "measure", real)  # as measure_all calls it
     monkeypatch.setattr(repair_search, "questions_of", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(repair_search, "branches", lambda *_: iter([branch()]))
     return find_repair(one_response(), target, budget=budget, seed=1, jobs=1, progress=progress)
@@ -213,7 +215,9 @@ def test_a_rare_loss_is_repaired_for_the_least_price(monkeypatch: pytest.MonkeyP
         ends = {"low": max(lost - error, 0.0), "high": lost + error}
         return SimpleNamespace(lost=lost, **ends, unseen=1e-3, boards=DRAWN, pilots=0)
 
-    def few(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
+    def few(
+        plan: StudyPlan, target: float, verdict_cache: VerdictCache, **_: object
+    ) -> MeasuredYield:
         lost = share_lost(plan.circuit, plan.spread, plan.seed, nominal)
         return MeasuredYield(Yield(250 - round(250 * lost), round(250 * lost), 0, 0), target)
 
@@ -346,17 +350,17 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(exact_circuit, "block", coin)
     plan = bench_plans.plan(1, samples=8000)
     kept: dict[str, Any] = {}
-    book = VerdictCache(save=kept.update)
+    verdict_cache = VerdictCache(save=kept.update)
     for target in (0.85, 0.93, 0.9):
-        found = measure(plan, target, book)
+        found = measure(plan, target, verdict_cache)
         low, high = found.counts.interval
         assert found.decided is (low >= target or high < target)
         assert found.decided or found.counts.samples == 8000
         for shorter in range(500, found.counts.samples, 250):
-            assert not measure(plan, target, book, least=shorter, most=shorter).decided
+            assert not measure(plan, target, verdict_cache, least=shorter, most=shorter).decided
     assert sorted(set(blocks)) == sorted(blocks)
     again = measure(plan, 0.9, VerdictCache(json.loads(json.dumps(kept))["studies"]))
-    assert again == measure(plan, 0.9, book)
+    assert again == measure(plan, 0.9, verdict_cache)
     assert sorted(set(blocks)) == sorted(blocks)
     for letters in ("!" * 250, ["o"] * 250, 250, None):  # with a seal that is right
         blocks.clear()
@@ -383,15 +387,15 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
     fine, other, out = (
         (replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (5, 6, 1)
     )
-    book = VerdictCache(save=kept.update)
-    good, open_ = measure_together([fine, other], 1.0 - 1e-5, book)
+    verdict_cache = VerdictCache(save=kept.update)
+    good, open_ = measure_all([fine, other], 1.0 - 1e-5, verdict_cache)
     assert good.reached
     assert good.rate == 1.0 - 5e-6
     assert not open_.reached
     assert not open_.missed
     assert estimated == [5, 6]
     stored = json.loads(json.dumps(kept))["studies"]
-    assert measure_together([fine, other], 1.0 - 1e-5, VerdictCache(stored)) == (good, open_)
+    assert measure_all([fine, other], 1.0 - 1e-5, VerdictCache(stored)) == (good, open_)
     assert estimated == [5, 6]
     assert good.rare is not None
     strange_ones: tuple[object, ...] = (
@@ -399,9 +403,9 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
     )  # fmt: skip
     for damage in strange_ones:
         strange = {s: {**known, "rare": damage} for s, known in stored.items()}
-        assert measure_together([fine], 1.0 - 1e-5, VerdictCache(strange)) == (good,)
+        assert measure_all([fine], 1.0 - 1e-5, VerdictCache(strange)) == (good,)
     assert estimated == [5, 6, 5, 5, 5, 5]
-    lost, waits = measure_together([out, fine], 1.0 - 1e-5, VerdictCache())
+    lost, waits = measure_all([out, fine], 1.0 - 1e-5, VerdictCache())
     assert lost.missed
     assert waits.rare is None
 
@@ -418,14 +422,14 @@ def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
     monkeypatch.setattr(repair_measure, "rare_losses", none)
     coins(monkeypatch, asked, 1.0)
     plan = replace(bench_plans.plan(1, samples=8000), seed=2)
-    (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
+    (found,) = measure_all([(plan, None)], 1.0 - 1e-4, VerdictCache())
     assert found.reached
     assert found.rare is not None
     boards = asked[-1][1].stop + 3000  # what the searches had drawn as they are
     assert found.rare.high == pytest.approx(3.0 / boards, rel=2e-3)
     assert 3.0 / (boards - repair_measure.PLAIN_BLOCK) > 1e-4  # no more than the target takes
     coins(monkeypatch, asked, 1.0 - 1.5e-4)
-    (found,) = measure_together([(plan, None)], 1.0 - 1e-4, VerdictCache())
+    (found,) = measure_all([(plan, None)], 1.0 - 1e-4, VerdictCache())
     assert not found.reached
     assert found.rare is None
     assert found.counts.lost > 0
@@ -493,7 +497,7 @@ def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.Mo
     asked: list[tuple[int, range]] = []
     coins(monkeypatch, asked)
     plans = [(replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (2, 1, 4, 3)]
-    fine, out, close, last = measure_together(plans, 0.99, VerdictCache())
+    fine, out, close, last = measure_all(plans, 0.99, VerdictCache())
     assert out.missed
     assert out.counts.samples == repair_measure.FIRST
     assert close.missed
@@ -502,10 +506,10 @@ def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.Mo
         assert not other.missed
         assert other.counts.samples == BLOCK
     known = len(asked)
-    both = measure_together([plans[0], plans[3]], 0.99, VerdictCache())
+    both = measure_all([plans[0], plans[3]], 0.99, VerdictCache())
     assert len(asked) > known
     assert all(m.reached and m.counts.samples >= 2 * BLOCK for m in both)
-    nothing, waits = measure_together([None, plans[0]], 0.99, VerdictCache())
+    nothing, waits = measure_all([None, plans[0]], 0.99, VerdictCache())
     assert nothing.counts.samples == 0
     assert waits.counts.samples == BLOCK
 
@@ -519,10 +523,10 @@ def test_the_boards_of_a_study_are_those_of_a_longer_one(monkeypatch: pytest.Mon
     early = measure(plan, 0.99, VerdictCache(), first=repair_measure.FIRST)
     boards = [i for _, indices in asked for i in indices]
     assert boards == list(range(early.counts.samples))
-    book = VerdictCache()
-    assert measure(plan, 0.99, book, most=early.counts.samples) == early
+    verdict_cache = VerdictCache()
+    assert measure(plan, 0.99, verdict_cache, most=early.counts.samples) == early
     known = len(asked)
-    book.block(plan, range(repair_measure.FIRST), None, 1)
+    verdict_cache.block(plan, range(repair_measure.FIRST), None, 1)
     assert len(asked) == known
 
 
@@ -765,10 +769,12 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
     """Few boards promised what many do not show: the next choice is the cheapest of grades."""
     real = truth(6.5)
 
-    def of(plan: StudyPlan, target: float, book: VerdictCache, **more: object) -> MeasuredYield:
+    def of(
+        plan: StudyPlan, target: float, verdict_cache: VerdictCache, **more: object
+    ) -> MeasuredYield:
         if more.get("trim") is not None:
             return MeasuredYield(Yield(7000, 1000, 0, 0), target)
-        return cast(MeasuredYield, real(plan, target, book))
+        return cast(MeasuredYield, real(plan, target, verdict_cache))
 
     seen = with_trimmer(6.5, 1.0)
     free = replace(
@@ -798,13 +804,13 @@ def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     question = bench_plans.question(3)
     circuit = made.design.circuit
     plan = StudyPlan(circuit, Spread(0.01, 0.01, 3e-4, 1e-3), 7, 6, (question,))
-    book = VerdictCache()
-    letters, new = book.block(plan, range(6), slot.trim, 1)
+    verdict_cache = VerdictCache()
+    letters, new = verdict_cache.block(plan, range(6), slot.trim, 1)
     assert new
     rows = trimmed_block(slot.trim, plan, range(6), 1)
     assert [repair_measure.VERDICTS[letter] for letter in letters] == [r.verdict for r in rows]
-    assert book.block(plan, range(6), slot.trim, 1) == (letters, False)
-    assert book.block(plan, range(6), None, 1)[1]
+    assert verdict_cache.block(plan, range(6), slot.trim, 1) == (letters, False)
+    assert verdict_cache.block(plan, range(6), None, 1)[1]
 
 
 def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> LinearModel:

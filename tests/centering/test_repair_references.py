@@ -59,7 +59,9 @@ def test_the_references_are_taken_where_they_move_the_limit(
     sigma = float(Margin(differing, (limit,)).each(boards).std())
     margin = Margin(differing, (replace(limit, sigma=sigma),))
 
-    def counted(plan: StudyPlan, target: float, book: VerdictCache, **_: object) -> MeasuredYield:
+    def counted(
+        plan: StudyPlan, target: float, verdict_cache: VerdictCache, **_: object
+    ) -> MeasuredYield:
         drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((margin.of(drawn) > 0.0).sum())
         return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)

@@ -59,9 +59,9 @@ class _Looker(ResponseSurvey):
 
 def ways(best: StudyPlan, target: float) -> list[ResponseWay] | None:
     none = cast(Any, None)
-    looker = _Looker(none, target, 1, VerdictCache(), 0.0, frozenset(), (best,), 2, lambda: None)
+    survey = _Looker(none, target, 1, VerdictCache(), 0.0, frozenset(), (best,), 2, lambda: None)
     return trimmer_ways(
-        looker, trim(), [ResponseWay(0, "as it is", plan(6, spread=ROUGH).questions[0])]
+        survey, trim(), [ResponseWay(0, "as it is", plan(6, spread=ROUGH).questions[0])]
     )
 
 

@@ -52,7 +52,7 @@ class _Boards:
         return _Boards([self.which[k] for k in which])
 
 
-def looker(
+def survey(
     monkeypatch: pytest.MonkeyPatch, lost: dict[int, int], verdict: Verdict
 ) -> ResponseSurvey:
     """lost : boards without an answer among those from this number on; verdict : that all of them
@@ -73,7 +73,7 @@ def bounded(
 ) -> ResponseWay:
     way = ResponseWay(0, "as it is", cast(Any, None), rate=0.5)
     boards = [cast(Any, _Boards())]
-    return looker(monkeypatch, {0: first, FEW: second}, verdict).bounded(way, boards)
+    return survey(monkeypatch, {0: first, FEW: second}, verdict).bounded(way, boards)
 
 
 def test_a_way_is_given_up_rarely_at_the_target_and_mostly_far_below(
@@ -136,15 +136,15 @@ def test_boards_that_settle_slowly_are_not_lost() -> None:
     assert set(settled(boards, question, 2)) == {Verdict.OK}
     assert {a.verdict for a in foretold(boards, question, 2)} == {Verdict.OK}
     none = cast(Any, None)
-    looker = ResponseSurvey(
+    survey = ResponseSurvey(
         none, TARGET, 1, VerdictCache(), 0.0, frozenset(), (plan,), 2, lambda: None
     )
-    assert not looker.bounded(ResponseWay(0, "as it is", question, rate=0.5)).hopeless
+    assert not survey.bounded(ResponseWay(0, "as it is", question, rate=0.5)).hopeless
 
 
 def test_a_way_that_lost_no_board_is_not_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     sure = ResponseWay(0, "omega", cast(Any, None), rate=1.0)
-    assert looker(monkeypatch, {0: FEW}, Verdict.LOST).bounded(sure) is sure
+    assert survey(monkeypatch, {0: FEW}, Verdict.LOST).bounded(sure) is sure
     assert sure.certain
 
 
@@ -159,9 +159,9 @@ def test_what_was_measured_to_miss_gets_further_ways(
         repair_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
     )
     branch = cast(Any, SimpleNamespace(synthesis=nothing))
-    looker = ResponseSurvey(
+    survey = ResponseSurvey(
         branch, TARGET, 1, VerdictCache(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
     )
-    found = looker.ways(ResponseWay(0, "as it is", nothing, rate=1.0))
+    found = survey.ways(ResponseWay(0, "as it is", nothing, rate=1.0))
     assert [way.kind for way in found] == ["as it is", "trim"][:kinds]
     assert not any(way.hopeless for way in found)

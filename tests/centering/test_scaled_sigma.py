@@ -55,20 +55,24 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
     synthesis, response = made(), made().model_responses[0]
     bench = ScaledBoards(synthesis.design, spread(), 5, COUNT)
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
-    (stand,) = bench.stands([(response.spec, place)])
-    assert stand is not None
-    (found,) = bench.ask([stand], range(COUNT))
+    (operating_orbit,) = bench.operating_orbits([(response.spec, place)])
+    assert operating_orbit is not None
+    (found,) = bench.ask([operating_orbit], range(COUNT))
 
     drawn = draw_many(synthesis.design.circuit, spread(), 5, range(COUNT), STREAM)
     seen = 0
     for number, stretch in enumerate(LADDER):
         boards = Ensemble(between(drawn, np.full(COUNT, stretch)), fast=False)
         orbits = boards.settle(
-            range(COUNT), [stand.drive] * COUNT, np.tile(stand.orbit.start, (COUNT, 1))
+            range(COUNT),
+            [operating_orbit.drive] * COUNT,
+            np.tile(operating_orbit.orbit.start, (COUNT, 1)),
         )
-        ok = [judge(o, response.spec, stand.orbit)[0] is Verdict.OK for o in orbits]
+        ok = [judge(o, response.spec, operating_orbit.orbit)[0] is Verdict.OK for o in orbits]
         answered = Ensemble(boards.boards).quick(
-            range(COUNT), [stand.drive] * COUNT, np.tile(stand.orbit.start, (COUNT, 1))
+            range(COUNT),
+            [operating_orbit.drive] * COUNT,
+            np.tile(operating_orbit.orbit.start, (COUNT, 1)),
         )
         # A board that takes long, or clips on its way, stays open: lost, in a prediction.
         soon = sum(good and quick is not None for good, quick in zip(ok, answered, strict=True))
@@ -78,14 +82,14 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
     assert seen > len(LADDER) * COUNT // 2
 
 
-def test_a_place_without_the_response_has_no_stand() -> None:
+def test_a_place_without_the_response_has_no_orbit() -> None:
     bench = ScaledBoards(made().design, spread(), 5, 1)
     response = made().model_responses[0]
     there = OperatingPoint(0.85, 0.25, response.orbit.start)
     elsewhere = OperatingPoint(0.6, 0.25, response.orbit.start)
-    stands = bench.stands([(response.spec, there), (response.spec, elsewhere)])
-    assert stands[0] is not None
-    assert stands[1] is None
+    operating_orbits = bench.operating_orbits([(response.spec, there), (response.spec, elsewhere)])
+    assert operating_orbits[0] is not None
+    assert operating_orbits[1] is None
 
 
 def test_what_is_known_is_not_asked_again() -> None:
@@ -95,8 +99,8 @@ def test_what_is_known_is_not_asked_again() -> None:
     answers = []
     for _ in range(2):
         bench = ScaledBoards(made().design, spread(), 5, COUNT, memory=memory)
-        (stand,) = bench.stands([(response.spec, place)])
-        assert stand is not None
-        answers.append(bench.ask([stand], range(COUNT), progress=lambda: steps.append(1)))
+        (operating_orbit,) = bench.operating_orbits([(response.spec, place)])
+        assert operating_orbit is not None
+        answers.append(bench.ask([operating_orbit], range(COUNT), progress=lambda: steps.append(1)))
     assert answers[0] == answers[1]
     assert len(steps) == 1  # one chunk of questions, once

@@ -18,7 +18,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, parse_json, read_bytes, read_text, reading
 from designer.base.keyed_store import KeyedStore
 from designer.base.manifest import MANIFEST, read_json
-from designer.base.parquet_entry import ParquetForm
+from designer.base.parquet_entry import ParquetCodec
 from designer.base.report_pieces import check_report_folder
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board
@@ -67,14 +67,14 @@ def nothing(_name: str, _content: bytes) -> None:
 def parquet(path: Path) -> object:
     """A block without a seal that a manifest vouches for: its bytes reach the library."""
     schema = pa.schema([("sample", pa.int64()), ("reason", pa.string())])
-    store = KeyedStore(path.parent, ParquetForm(schema), vouch=lambda *_: True)
+    store = KeyedStore(path.parent, ParquetCodec(schema), vouch=lambda *_: True)
     return store.read(path.name, {"study": "a"})
 
 
 def parquet_bytes() -> bytes:
     schema = pa.schema([("sample", pa.int64()), ("reason", pa.string())])
     rows = [{"sample": i, "reason": "why" * i} for i in range(20)]
-    return ParquetForm(schema).encode({"study": "a", "rows": 20}, rows)
+    return ParquetCodec(schema).encode({"study": "a", "rows": 20}, rows)
 
 
 def npz_bytes(folder: Path) -> bytes:

@@ -192,8 +192,8 @@ def test_a_damaged_study_is_made_again_and_no_other(
     out = shutil.copytree(another, tmp_path / "out")
     studies, seen = {"a" * 64: {"0": "olg", "250": "o"}, "b" * 64: {"0": "ll"}}, []
 
-    def interrupted(*_: Any, book: Any, **__: Any) -> None:
-        known, save = book
+    def interrupted(*_: Any, verdict_cache: Any, **__: Any) -> None:
+        known, save = verdict_cache
         seen.append(known)
         save({"format": 1, "studies": studies})
         raise KeyboardInterrupt

@@ -414,7 +414,7 @@ def test_an_attribution_that_was_interrupted_goes_on_where_it_was(
         if steps > 0.6 * total:
             raise _Stopped
 
-    monkeypatch.setattr(loss_replay, "TOGETHER", 1)
+    monkeypatch.setattr(loss_replay, "AT_ONCE", 1)
     with pytest.raises(_Stopped):
         attribute(few, some, lost=2, ok=1, jobs=1, progress=stop_late, parts=pieces)
     before = dict(pieces.known)
