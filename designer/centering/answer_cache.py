@@ -23,7 +23,7 @@ FORMAT = 2
 
 
 class AnswerCache:
-    """Answers by key.
+    """The answers of a search by key, in a file.
 
     path : the file that holds them; None: memory alone. search : names the search; the file of
     another search is not read. note : called with a message where lines are damaged.

@@ -15,7 +15,7 @@ from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.verdicts.verdict import Verdict, judge
 
 BANDWIDTH = "bandwidth"
-"""Name of the fidelity."""
+"""Name of the fidelity that is asked."""
 
 
 class LaggingBoards:

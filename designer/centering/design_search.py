@@ -107,7 +107,7 @@ def search(
 def look(
     modelfile: ModelFile, catalog: Catalog, jobs: int, progress: Progress
 ) -> tuple[tuple[Stretch, ...], ...]:
-    """Everything that may be refused, refused; and where the model shows each response.
+    """Refuse everything that may be refused, and say where the model shows each response.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
 
 
 class _DesignSearch:
-    """One search. ``steps`` and the counters grow while it runs."""
+    """One search of a design. ``steps`` and the counters grow while it runs."""
 
     def __init__(
         self,
@@ -235,7 +235,7 @@ class _DesignSearch:
         return start, best
 
     def _placed(self, best: Candidate) -> Candidate:
-        """The same choice with every open response at its best place."""
+        """The best candidate with every open response moved to its best place."""
         spread = spread_of(self.modelfile, best.design.circuit, self.catalog)
         bench = ScaledBoards(
             best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory
@@ -306,7 +306,7 @@ class _DesignSearch:
                 yield candidate
 
     def _frequency(self, candidate: Candidate) -> float:
-        """[Hz] at ω = 1."""
+        """The frequency [Hz] of a candidate at ω = 1."""
         unit = self.modelfile.model.second_order().own_frequency
         return candidate.design.errors.scales.frequency(unit)
 

@@ -36,7 +36,7 @@ NAMES = {
     COEFFICIENTS: COEFFICIENTS,
 }
 HALF = 0.5
-"""Of the variance, or of the lost boards: from here on a cause is the one that is named."""
+"""Share of the variance, or of the lost boards, from which on a cause is named."""
 JOINT_BOARDS = 4000
 """Boards from which a covariance is taken: a share is then known to about 2 %."""
 STREAM = "limiting:"
@@ -58,7 +58,7 @@ class Limiting:
     line: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
+        """The record as plain data for JSON."""
         return dict(self.__dict__)
 
 
@@ -115,7 +115,7 @@ def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
 def shares(
     quantities: Sequence[Quantity], limit: Limit, boards: Boards | None = None
 ) -> dict[str, float]:
-    """Of the variance of a limit, by what moves it; they sum to 1.
+    """Shares of a limit's variance, by what moves it; they sum to 1.
 
     boards : boards on which quantities vary together; None: each varies by itself. A cause's share
     is the covariance of what it adds with the whole: below 0 where it takes off what another adds.

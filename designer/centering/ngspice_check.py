@@ -45,7 +45,7 @@ class Agreement:
     exact: int
     """Boards that show it on the exact circuit."""
     survivors: int
-    """Of these, boards that show it with those op-amps as well."""
+    """How many of these boards show it with those op-amps as well."""
     unanswered: int = 0
     """Boards of these without an answer: too long a way to be asked, runs that failed,
     step sizes of which one shows it, a contact that cannot be counted, a numerics gate that does
@@ -65,7 +65,8 @@ class Agreement:
 AskAgreement = Callable[
     [ScaledBoards, Sequence[OperatingOrbit | None], Callable[[], None]], tuple[Agreement, ...]
 ]
-"""Of the boards of a design and its responses' stands; the last is called once a response."""
+"""Asks how many boards of a design show each response with op-amps that take time. It takes the
+boards, the nominal board's orbit of each response, and what is called once a response."""
 
 
 Count = Callable[[ScaledBoards, OperatingOrbit, Sequence[int]], list[tuple[int, ...]]]

@@ -19,7 +19,8 @@ from designer.centering.scaled_sigma import LADDER, OperatingOrbit, ScaledBoards
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
-"""Of a stretch: where it is scanned. The first of equal places is taken, so the middle is first."""
+"""Shares of a stretch at which it is scanned. The first of equal places is taken, so the middle is
+first."""
 SCAN, SOME, MANY = 8, 24, 64
 """Boards of the scan, of the second round and of the pattern."""
 SCANNED, KEPT, STARTS = (2.0,), 10, 2
@@ -109,13 +110,14 @@ def score(
 
 
 def best(scored: Sequence[Scored], count: int) -> list[Scored]:
-    """Those of the largest distances that the nominal board shows; the earlier of equals first."""
+    """The places with the largest reliability indices that the nominal board shows; the earlier of
+    equals first."""
     there = [s for s in scored if s.operating_orbit is not None]
     return sorted(there, key=lambda s: -s.reliability_index)[:count]
 
 
 def _step(stretches: Sequence[Stretch], place: OperatingPoint) -> float:
-    """Of ln ω: half the distance of the places that were scanned."""
+    """The first step in ln ω: half the distance of the places that were scanned."""
     home = next(s for s in stretches if any(p is place for p in s.places))
     return max(math.log(home.high / home.low) * 0.1, 1e-3)
 

@@ -44,7 +44,7 @@ class RepairBranch:
 
     @property
     def name(self) -> str:
-        """In words; "as it is" for the design that is repaired."""
+        """The branch in words; "as it is" for the design that is repaired."""
         u = self.upgrades
         phrases = [f"op-amp {u.opamp}"] if u.opamp else []
         phrases += [f"dead zone: {u.dead_zone}"] if u.dead_zone else []

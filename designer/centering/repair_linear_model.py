@@ -52,7 +52,7 @@ from designer.yields.rare_losses import OFTEN, WIDE
 from designer.yields.trimmed_yield import HIGH, LOW, DcTrim, trimmed_boards
 
 SHOWN = 4
-"""Of the boards drawn, the fewest by which a share is read off."""
+"""The fewest of the boards drawn by which a share is read off."""
 FITTED = 1000
 """Boards from which is learnt what moves the wiper."""
 
@@ -161,7 +161,7 @@ class LinearModel:
 
     @property
     def slots(self) -> tuple[Slot, ...]:
-        """Of the program: parts, then one for each response."""
+        """The slots of the program: one for each part, then one for each response."""
         trouble = {"omega": MOVED, "b": MOVED, TRIM: TRIMMED}
         ways = [
             Slot(
@@ -442,8 +442,8 @@ def pictured(
     jobs: int,
     progress: Callable[[], None] = lambda: None,
 ) -> LinearModel:
-    """The same with margins of these ways (response, way). target : the yield that is wanted; where
-    losses are to be rare, they are sought on boards that are farther off."""
+    """The model with margins of these ways (response, way). target : the yield that is wanted;
+    where losses are to be rare, they are sought on boards that are farther off."""
     synthesis = model.branch.synthesis
     circuit = synthesis.design.circuit
     spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)

@@ -41,7 +41,7 @@ TAG = 0xC04E
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
 _RARE = "rare"
-"""In the place of a block's number: what was estimated of a study."""
+"""Takes the place of a block's number where a study was estimated."""
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from designer.base.arrays import Array
 from designer.linear_network.milp import SOLVER, chosen_row
 
 SLACK = 1e-7
-"""Of a demand's room: what the solver's tolerance may exceed it by."""
+"""Share of a demand's room by which the solver's tolerance may exceed it."""
 TIE = 1e-5
-"""Of the price: what one unit of trouble weighs. Trouble decides between equal prices only."""
+"""What one unit of trouble weighs against the price. Trouble decides between equal prices only."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Demand:
     room: float
     """Largest variance of the linear form."""
     variances: tuple[Array, ...]
-    """By slot, (options,) what each option contributes."""
+    """What each option contributes, an array (options,) for each slot."""
     when: tuple[int, int] | None = None
     """(slot, option) by their numbers: the demand holds only while that option is taken; None:
     always."""
 
     def variance(self, pick: Sequence[int]) -> float:
-        """Of the form under this choice."""
+        """The variance of the form under this choice."""
         return float(sum(v[i] for v, i in zip(self.variances, pick, strict=True)))
 
     def holds(self, pick: Sequence[int]) -> bool:

@@ -61,7 +61,7 @@ FRONT_POINTS = 5
 """Points of the front that are measured beside those of the rounds."""
 FRONT_BOARDS = 500
 TIGHTER = 0.95
-"""Of a demand's room: the least by which it is tightened where a promise was not kept."""
+"""The factor by which a demand's room is tightened at least where a promise was not kept."""
 LARGEST_STEP = 2.0
 """The factor by which a measurement brings a loss nearer than the picture has it, at most: one that
 is so wrong says little about by how much."""

@@ -30,7 +30,7 @@ class Trial:
 
     @property
     def worst(self) -> MeasuredYield:
-        """Of the response that the fewest boards show."""
+        """The yield of the response that the fewest boards show."""
         return min(self.measured, key=lambda m: (m.rate, m.interval))
 
     @property
@@ -57,7 +57,7 @@ class Repair:
     why: str
     """Why the search for upgrades ended."""
     limits: tuple[str, ...]
-    """By response, what stands in the way or comes first."""
+    """What stands in the way of each response, or would come first."""
     front: tuple[Trial, ...]
     """Trials by price."""
     refused: tuple[Refused, ...] = ()

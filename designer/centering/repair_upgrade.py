@@ -261,7 +261,8 @@ def _model_responses(base: Synthesis, modelfile: ModelFile) -> tuple[ModelRespon
 
 
 def price(synthesis: Synthesis) -> float:
-    """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
+    """The price of everything on a design's bill of materials, in euro, with the catalogue's price
+    of each class."""
     circuit, choice = board_circuit(synthesis)
     lines = bill(to_buy(components(circuit, synthesis.catalog, choice), choice))
     return float(np.sum([x.quantity * synthesis.catalog.euro(x.price_class) for x in lines]))

@@ -93,7 +93,7 @@ def settled(boards: Boards, question: Question, jobs: int) -> list[Verdict]:
 
 
 def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
-    """For each board as much of an answer as a margin needs.
+    """As much of an answer for each board as a margin needs.
 
     Of the boards that the compiled kernel leaves open a few are settled; where none of them shows
     the response, all of them count as lost.

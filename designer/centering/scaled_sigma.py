@@ -1,4 +1,4 @@
-"""How far a response is from being lost, in standard deviations: boards with a stretched spread.
+"""The reliability index of a response by scaled-sigma sampling: boards with a stretched spread.
 
 A yield near 1 tells designs apart only with thousands of boards. So every deviation from the
 nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit
@@ -36,11 +36,11 @@ from designer.verdicts.verdict import Verdict, judge
 from designer.yields.study_identity import nine_digits
 
 STREAM = "search:"
-"""Before the names of the coordinates: no study draws these boards, whatever its seed."""
+"""Stands before the names of the coordinates: no study draws these boards, whatever its seed."""
 LADDER = (1.0, 1.5, 2.0, 3.0)
 """Stretches of the spread."""
 FARTHEST = 20.0
-"""Distances further than so many standard deviations are not told apart."""
+"""Reliability indices above this, in standard deviations, are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,14 @@ class StretchCounts:
     stretches: tuple[float, ...]
     """Factors that the spread is stretched by."""
     samples: tuple[int, ...]
-    """For each stretch, boards that were asked."""
+    """How many boards were asked at each stretch."""
     ok: tuple[int, ...]
-    """For each stretch, boards that show the response."""
+    """How many boards show the response at each stretch."""
 
     @property
     def reliability_index(self) -> float:
-        """d, as above. Half a loss is added at the largest stretch, so that it is finite."""
+        """The reliability index d of the module's text. Half a loss is added at the largest
+        stretch, so that it is finite."""
         scale = 1.0 / np.array(self.stretches)
         ok = np.array(self.ok, dtype=float)
         lost = np.array(self.samples, dtype=float) - ok
@@ -77,7 +78,7 @@ class StretchCounts:
 
 @dataclass(frozen=True)
 class OperatingOrbit:
-    """A place on the nominal board of a design: the orbit there, which boards start from."""
+    """The nominal board's orbit at an operating point, which boards start from."""
 
     spec: Response
     """The wanted response."""
@@ -123,7 +124,8 @@ class ScaledBoards:
     def operating_orbits(
         self, wanted: Sequence[tuple[Response, OperatingPoint]]
     ) -> list[OperatingOrbit | None]:
-        """Each place on the nominal board; None where that does not show the response there."""
+        """The nominal board's orbit at each place; None where it does not show the response
+        there."""
         if not wanted:
             return []
         drives = [self.excitation(place).drive for _, place in wanted]
@@ -163,7 +165,7 @@ class ScaledBoards:
         stretches: Sequence[float],
         progress: Callable[[], None],
     ) -> list[tuple[int, ...]]:
-        """For each place the boards that show the response, by stretch."""
+        """How many boards show the response at each place, by stretch."""
         places = [LADDER.index(s) for s in stretches]
         rows = [1 + r * self.count + i for r in places for i in boards]
         which = [row for row in rows for _ in operating_orbits]
@@ -204,7 +206,7 @@ class ScaledBoards:
     def subjects(
         self, operating_orbit: OperatingOrbit, boards: range, stretch: float
     ) -> list[GateSubject]:
-        """Those of these boards that show the response at this stretch, for ngspice."""
+        """What ngspice needs of those of these boards that show the response at this stretch."""
         excitation = self.excitation(operating_orbit.place)
         return [
             GateSubject(self._boards.reduction(row), excitation, orbit)

@@ -64,7 +64,7 @@ class StageForecast:
 
     @property
     def words(self) -> str:
-        """It in words."""
+        """The forecast in words."""
         boards = "" if self.kept is None else f"{self.kept} of {BOARDS} boards keep the responses, "
         rules = "no rule fails"
         if self.failed:
@@ -74,8 +74,8 @@ class StageForecast:
         return f"{self.kind}: {boards}{rules}, largest error {100 * error:.2g} %, {parts} parts"
 
     def better_than(self, other: StageForecast) -> bool:
-        """Whether it is to be taken: by what its boards keep, if that differs by more than chance;
-        else by the rules, the error and the number of parts."""
+        """Whether this stage is to be taken: by what its boards keep, if that differs by more than
+        chance; else by the rules, the error and the number of parts."""
         if self.kept is not None and other.kept is not None and _differ(self.kept, other.kept):
             return self.kept > other.kept
         return self._rank < other._rank

@@ -59,7 +59,7 @@ Truths = Literal["full", "vendor"]
 LEVELS = ((4.0, 1e-3), (2.0, 1e-4), (1.0, gate.RELTOL), (0.5, 0.1 * gate.RELTOL))
 """ngspice's largest step over the one that the gate tries first, and its relative tolerance."""
 STEPS = (0.04, 0.02, 0.01, runge_kutta.PAPERS_STEP)
-"""Of Runge-Kutta, in dimensionless time."""
+"""Steps of Runge-Kutta, in dimensionless time."""
 SETTLED = 40
 """Drive periods of Runge-Kutta before it is judged, from the exact orbit."""
 TIMED = 8
@@ -208,7 +208,8 @@ class _Stepper:
 
 
 def _stepper(model: MechanicalModel) -> _Stepper:
-    """The paper's two masses have one in numbers, any other system one in arrays."""
+    """The stepper of a model: the paper's two masses have one in numbers, any other system one in
+    arrays."""
     if isinstance(model, Dimensionless):
         return _Stepper(partial(runge_kutta.run, model), partial(runge_kutta.trace, model))
     any_of = system_runge_kutta
@@ -329,7 +330,7 @@ def _lagging_orbit(subject: GateSubject) -> Orbit:
 
 
 def _own(subject: GateSubject, ladder: tuple[int, float]) -> SolverSettings:
-    """Settings of so many steps a period and this tolerance."""
+    """The settings that take so many steps a period at this tolerance."""
     steps, reltol = ladder
     return SolverSettings("trap", subject.period / steps, reltol)
 

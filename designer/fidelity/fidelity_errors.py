@@ -24,7 +24,7 @@ BOARD, EQUATIONS = "board", "equations"
 
 @dataclass(frozen=True)
 class FidelityError:
-    """One fidelity at one setting on one response."""
+    """What one fidelity at one setting shows of one response, and how far it is off."""
 
     label: ResponseLabel
     """The response that it is about."""
@@ -142,7 +142,7 @@ def difference(first: Orbit, second: Orbit) -> float:
 
 
 def _speeds(orbit: Orbit, clearance: int, side: float) -> Array:
-    """Of the impacts on a stop, ascending."""
+    """The speeds of the impacts on a stop, in ascending order."""
     there = (orbit.impact_clearances == clearance) & (orbit.impact_sides == side)
     return np.sort(np.abs(orbit.impact_velocities[there]))
 

@@ -319,7 +319,7 @@ def _percent(value: float | None) -> str:
 
 
 def _short(value: float | None) -> str:
-    """To two figures, without an exponent where it need not be."""
+    """A number to two figures, without an exponent where none is needed."""
     if value is None:
         return NONE
     return f"{float(f'{value:.2g}'):.10g}"

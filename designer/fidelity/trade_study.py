@@ -30,7 +30,7 @@ RESPONSE, IMPACT, WAVE, SHARE = (
     "yield within 1 %",
 )
 QUESTIONS = (RESPONSE, IMPACT, WAVE)
-"""Of a response; ``SHARE`` is one of boards."""
+"""The questions about a response; ``SHARE`` is the one about boards."""
 NO_IMPACTS = "no impacts"
 NO_PERIOD = "no period"
 """Why questions do not arise."""
@@ -73,8 +73,8 @@ class Cheapest:
     note: str = ""
     """What else there is to say."""
     convergence: float = math.nan
-    """In place of ``measured`` where a fidelity is compared with itself: what its steps differ
-    by."""
+    """What the steps of a fidelity differ by; it takes the place of ``measured`` where a fidelity
+    is compared with itself."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
 
 
 def _no_question(question: str, of: str, truth: Truth) -> str:
-    """Why it does not arise; "" where it does."""
+    """Why a question does not arise; "" where it does."""
     if question == RESPONSE or (of == BOARD and not truth.sure):
         return ""
     if not truth.periodic[of]:
@@ -161,20 +161,23 @@ def _no_question(question: str, of: str, truth: Truth) -> str:
 
 
 def _rank(one: Cheapest) -> tuple[bool, float]:
-    """Those that keep the bound by their cost, the others by how far they are off."""
+    """The order of two candidates: those that keep the bound go by their cost, the others by how
+    far they are off."""
     measure = one.seconds if one.shown else one.measured
     return (not one.shown, math.inf if math.isnan(measure) else measure)
 
 
 def _competes(fidelity: str, of: str, picked: Sequence[FidelityError]) -> bool:
-    """Not where the gate was not passed; of the model's equations, only the ways to compute it."""
+    """Whether a fidelity may be named: it passed the gate, and against the model's equations it
+    computes the model."""
     if of == EQUATIONS:
         return fidelity in (RK4, MODEL)
     return all(row.gate is not False for row in picked)
 
 
 def _error(question: str, of: str, row: FidelityError, truth: Truth) -> float:
-    """With the uncertainty of a truth that is sure; infinite where it cannot be said."""
+    """The error of an answer plus the uncertainty of a truth that is sure; infinite where the truth
+    is not."""
     if question == RESPONSE:
         return 0.0 if row.right[of] else 1.0
     own = row.velocity if question == IMPACT else row.error

@@ -70,11 +70,11 @@ class Tally:
     lagging_decided: int = 0
     """Boards that the exact circuit decided with bandwidth and without."""
     lagging_ok: int = 0
-    """Of these, boards that are ok with bandwidth."""
+    """How many of these boards are ok with bandwidth."""
     lagging_gained: int = 0
-    """Of these, boards that are ok with bandwidth alone."""
+    """How many of these boards are ok with bandwidth alone."""
     lagging_lost: int = 0
-    """Of these, boards that are ok without bandwidth alone."""
+    """How many of these boards are ok without bandwidth alone."""
     lagging_seconds: float = 0.0
     """CPU time of the exact circuit with bandwidth [s]."""
 

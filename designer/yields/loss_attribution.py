@@ -1,4 +1,4 @@
-"""Which part is to blame when a board does not show a response.
+"""Yield-loss attribution: which parts make boards lose a response.
 
 Three answers for each response, each with what it cost: the losses that an exact part avoids or
 causes (``loss_replay``); the Sobol indices of the margin over the coordinates of the spread, with
@@ -39,7 +39,7 @@ class NearLimit:
 
 @dataclass(frozen=True)
 class ResponseAttribution:
-    """Why boards lose one response."""
+    """The attribution of one response: why boards lose it."""
 
     question: int
     """Number of the question of the plan."""
@@ -56,8 +56,8 @@ class ResponseAttribution:
     sought: int
     """Lost boards on which the response was looked for."""
     there: int
-    """Of ``sought`` lost boards, those on which the response exists and the nominal orbit
-    leads elsewhere."""
+    """How many of the ``sought`` lost boards have the response, while the nominal orbit leads
+    elsewhere."""
     corner: Corner | None
     """The worst corner; None where none was looked for."""
     limited_by: str
@@ -89,12 +89,12 @@ class Attribution:
 
     @property
     def noise_known(self) -> bool:
-        """Whether the indices have their noise; not where an earlier version made them."""
+        """Whether the indices have their noise; an earlier version made them without."""
         made = (index for response in self.responses for index in response.indices)
         return all(math.isfinite(i.total_error) for i in made if math.isfinite(i.total))
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; an undefined number is None."""
+        """The attribution as plain data for JSON; an undefined number is None."""
         rows = []
         for r in self.responses:
             row = asdict(r)
@@ -119,7 +119,7 @@ def attribute(
     progress: Callable[[], None] = lambda: None,
     parts: StoredParts | None = None,
 ) -> Attribution:
-    """Blame the parts for the losses among these answers (as built, exact circuit).
+    """Attribute the losses among these answers to parts (as built, on the exact circuit).
 
     answers : of any of the plan's samples, in any order. lost, ok : boards of each response that
     are replayed, at most. budget : steps of the work (``loss_replay``); all of it if None.
@@ -259,7 +259,7 @@ class AttributionStatus:
 
     @classmethod
     def of(cls, attribution: Attribution | None, wanted: bool = True) -> AttributionStatus:
-        """Of what a study has. wanted : whether an attribution was asked for."""
+        """The status of what a study has. wanted : whether an attribution was asked for."""
         if attribution is None and not wanted:
             return cls(AttributionStage.LEFT_OUT, 0.0, None, "it was not asked for")
         if attribution is None:
@@ -275,7 +275,7 @@ class AttributionStatus:
 
     @property
     def sentence(self) -> str:
-        """For people; "" where the attribution is whole."""
+        """The status in one sentence; "" where the attribution is whole."""
         if self.stage is AttributionStage.WHOLE:
             return ""
         if self.stage is AttributionStage.PART:
@@ -283,7 +283,7 @@ class AttributionStatus:
         return f"Blame {self.stage}: {self.reason}."
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The status as plain data for JSON."""
         return {
             "status": str(self.stage),
             "share": self.share,

@@ -40,7 +40,7 @@ PROBE = 10
 AT_ONCE = 8
 """Boards that are replayed before what they showed is stored; no answer depends on it."""
 BUDGET = 20_000
-"""Steps of an attribution, about, where nobody says another number."""
+"""About how many steps an attribution takes where nobody says another number."""
 
 PERIODS = 125
 """Drive periods of a step of that budget; nearly all boards with a periodic answer take fewer."""
@@ -62,17 +62,17 @@ class PartAttribution:
     kind: str
     """"resistor", "capacitor", "op-amp", "reference", "supply" or "group"."""
     avoided: int
-    """Of ``replayed`` boards, those that were ok then."""
+    """How many of the ``replayed`` boards were ok then."""
     replayed: int
     """Lost boards that were asked again."""
     caused: int
-    """Of ``kept`` boards, those that were lost then."""
+    """How many of the ``kept`` boards were lost then."""
     kept: int
     """Ok boards that were asked again."""
 
     @property
     def share(self) -> float:
-        """Of the losses, avoided; nan where nothing was replayed."""
+        """Share of the losses that is avoided; nan where nothing was replayed."""
         return self.avoided / self.replayed if self.replayed else float("nan")
 
     @property
@@ -92,7 +92,7 @@ class _Change:
     fields: tuple[str, ...] = ()
 
     def of(self, boards: Boards) -> Boards:
-        """The same boards with it exact."""
+        """The same boards with what is changed made exact."""
         return exact_in(boards, self.fields) if self.fields else boards.exact(self.parts)
 
 
@@ -137,12 +137,12 @@ class Extent:
 
     @property
     def share(self) -> float:
-        """Of the whole work, that which is done."""
+        """Share of the whole work that is done."""
         return self.steps / self.whole if self.whole else 1.0
 
     @property
     def hopeless(self) -> list[bool]:
-        """Of each question, whether boards were lost and none is ok."""
+        """Whether boards were lost and none is ok, for each question."""
         outcomes = [{a.verdict for a in row} for row in self.rows]
         return [Verdict.LOST in verdicts and Verdict.OK not in verdicts for verdicts in outcomes]
 
@@ -301,7 +301,7 @@ def _some(
     jobs: int,
     progress: Callable[[], None],
 ) -> list[list[Verdict]]:
-    """For each change the verdicts of these boards with it."""
+    """The verdicts of these boards with each change."""
     samples = sorted({r.sample for r in replays})
     boards = extent.boards.take(samples)
     pairs = [(samples.index(r.sample), plan.questions[r.question]) for r in replays]

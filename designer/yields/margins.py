@@ -33,9 +33,10 @@ from designer.verdicts.verdict import Answer, Question, Verdict
 from designer.yields.stored_parts import StoredParts, counted
 
 STEP = 0.02
-"""Of a quantity's standard deviation: half the span of a central difference."""
+"""Half the span of a central difference, over a quantity's standard deviation."""
 BACK = 0.8
-"""Of the way to the crossing: where its gradient is taken, since a fold has none at its end."""
+"""Share of the way to the crossing at which its gradient is taken, since a fold has none at its
+end."""
 DRAWN = 256
 """Boards, at least, from which the standard deviations of the quantities are taken."""
 NEAREST = 6
@@ -43,7 +44,7 @@ NEAREST = 6
 CROSSINGS = 8
 """Lost boards for each response whose crossings are sought."""
 PACE = 0.25
-"""Of the way to a lost board: the first steps; then the gap is halved."""
+"""Share of the way to a lost board of the first steps; then the gap is halved."""
 ROUNDS = 10
 """Attractors sought for a crossing, at most."""
 
@@ -68,7 +69,7 @@ class Limit:
 
     @property
     def reliability_index(self) -> float:
-        """Standard deviations between the nominal board and the loss."""
+        """The standard deviations between the nominal board and the loss."""
         return self.nominal / self.sigma
 
 
@@ -128,8 +129,8 @@ class Margin:
     sought: int = 0
     """Lost boards on which the response was looked for."""
     there: int = 0
-    """Of ``sought`` lost boards, those on which the response exists all the same and the
-    nominal orbit leads to another attractor."""
+    """How many of the ``sought`` lost boards have the response all the same, while the nominal
+    orbit leads to another attractor."""
 
     def each(self, boards: Boards) -> Array:
         """(N, limits) every limit on these boards, in its own standard deviations."""
@@ -317,7 +318,7 @@ class _Base:
 
 
 def _probes(board: Boards, differing: Sequence[Quantity]) -> Ensemble:
-    """For each quantity the board with a little less of it, then with a little more."""
+    """The boards with a little less, then a little more of each quantity."""
     rows = board.take(np.zeros(2 * len(differing), dtype=np.intp))
     for k, q in enumerate(differing):
         values = column(rows, q).copy()
@@ -432,7 +433,8 @@ def _limit(
 
 
 def _foretelling(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> Margin:
-    """Of its limits those that foretell the verdicts of even boards, tested on the odd ones."""
+    """The margin with those of its limits that foretell the verdicts of even boards, tested on the
+    odd ones."""
     ok, lost = (
         np.array([a.sample for a in answers if a.verdict is verdict], dtype=np.intp)
         for verdict in (Verdict.OK, Verdict.LOST)
@@ -450,7 +452,7 @@ def _foretelling(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> M
 
 
 def _picked(each: NDArray[np.bool_], ok: Index, lost: Index) -> list[int]:
-    """Of the limits, those that set more of these verdicts right, one after the other.
+    """The limits that set more of these verdicts right, one after the other.
 
     each : (boards, limits) whether each limit lets the board pass.
     """

@@ -39,7 +39,7 @@ BOARD_COLUMNS = tuple(
     "sample board number omega expected verdict response reason radius penetration miss "
     "asymmetry periods waveform".split()
 )
-"""Of the table of boards."""
+"""The columns of the table of boards."""
 _COUNTS = ("ok", "lost", "grazing", "failed", "samples", "rate")
 
 
@@ -118,7 +118,7 @@ class Study:
         return self._answers.get(index, ())
 
     def rows_of(self, index: int, rows: Sequence[Row] | None) -> tuple[Row, ...]:
-        """Those of these rows of a layer that are about response number ``index``, by sample."""
+        """The rows of a layer that are about response number ``index``, by sample."""
         return tuple(row for row in rows or () if self.response_indices[row.question] == index)
 
     def boards(self) -> pd.DataFrame:
@@ -161,7 +161,7 @@ class Study:
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out."""
+        """The yield of each response; None where it was left out."""
         return tuple(
             count(self.answers_to(i), self.plan.census) if i in self.response_indices else None
             for i in range(len(self.checked))
@@ -169,7 +169,7 @@ class Study:
 
     @cached_property
     def combined(self) -> tuple[Combined | None, ...]:
-        """For each response: both engines together; None where ngspice has no answer."""
+        """Both engines' estimate of each response; None where ngspice has no answer."""
         return tuple(
             two_engine_yield.combine(
                 self.answers_to(i),
@@ -212,8 +212,9 @@ class Study:
 
 
 def trust_of_yield(counted: Yield, nominal: Trust) -> Trust:
-    """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
-    boards without an answer that they could move it out of its own interval."""
+    """The trust in a yield. It is not better than that in the nominal orbit on which each board
+    starts, and doubted where so many boards have no answer that they could move the yield out of
+    its interval."""
     doubts = [Reason(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
     if counted.failed:
         least = counted.ok / counted.samples
@@ -260,7 +261,7 @@ class RunResult:
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out of the study."""
+        """The yield of each response; None where the study left it out."""
         return self.study.yields
 
     def _repr_html_(self) -> str:

@@ -94,7 +94,7 @@ each time all its rows are counted anew."""
 MOST_NOMINAL = 1000
 """Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
 MORE_NOMINAL = 50
-"""By how many their number grows."""
+"""By how many boards their number grows."""
 
 
 IN_VAIN = 0.1
@@ -290,22 +290,23 @@ class StudyWork:
     runner: Runner
     """Who computes blocks."""
     progress: Progress
-    """Told how far the work is."""
+    """Is told how far the work is."""
     engine: StudyEngine
     """Which engine decides."""
     attribution_budget: int = BUDGET
     """Steps that the attribution may take."""
 
     def sampled(self, study: Study) -> Study:
-        """With the exact circuit's answers of the plan's samples."""
+        """The study with the exact circuit's answers of the plan's samples."""
         return self._with_samples(study, study.plan.samples)
 
     def cross_checked(self, study: Study) -> Study:
-        """With ngspice's answers about some of the boards, or all."""
+        """The study with ngspice's answers about some of the boards, or all."""
         return self._with_all_checks(study, NOMINAL_SAMPLES)
 
     def grown(self, study: Study) -> Study:
-        """With as many samples as it takes; it stops at edges of blocks only."""
+        """The study with as many samples as its intervals take; it stops at edges of blocks
+        only."""
         until = study.until
         assert until is not None
         samples = -(-study.plan.samples // BLOCK) * BLOCK
@@ -355,7 +356,7 @@ class StudyWork:
         return not silent and _widest(study) < until
 
     def tuned(self, study: Study, bands: Bands) -> Study:
-        """With the generator free within the bands."""
+        """The study with yields where the generator is free within the bands."""
         plan, count = study.plan, len(study.plan.questions)
         more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
 
@@ -366,7 +367,7 @@ class StudyWork:
         return replace(study, tuned=self._rows("tuned", "tuned boards", plan, task, more))
 
     def trimmed(self, study: Study, trim: DcTrim) -> Study:
-        """With the trimmer of each board set once."""
+        """The study with yields where the trimmer of each board is set once."""
         plan = study.plan
 
         def task(block: range) -> Task:
@@ -376,7 +377,8 @@ class StudyWork:
         return replace(study, trimmed=rows)
 
     def powered_up(self, study: Study) -> Study:
-        """From power-up, by the recipes that the nominal circuit and a few boards suggest."""
+        """The study with yields from power-up, by the recipes that the nominal circuit and a few
+        boards suggest."""
         plan = study.plan
         self.progress.stage("start recipes")
         recipes = find_recipes(plan, self.jobs)
@@ -389,7 +391,7 @@ class StudyWork:
         return replace(study, power_ups=rows, recipes=recipes)
 
     def attributed(self, study: Study) -> Study:
-        """With the parts that the losses come from."""
+        """The study with the attribution of its losses."""
         plan, answers, budget = study.plan, study.answers, self.attribution_budget
         result = attribute(
             plan,
@@ -405,7 +407,8 @@ class StudyWork:
         return replace(study, blame=result)
 
     def drawn_where_lost(self, study: Study) -> Study:
-        """With an estimate of each response's losses by boards that are drawn where they are."""
+        """The study with an estimate of each response's losses, by boards that are drawn where they
+        are lost."""
         found, parts = [], self.stores.rare(study.plan)
         for number, index in enumerate(study.response_indices):
             name = f"rare {number}"
@@ -421,7 +424,7 @@ class StudyWork:
         return replace(study, rare=tuple(found))
 
     def mapped(self, study: Study, overs: Sequence[Over], warm: Spread | None = None) -> Study:
-        """With a yield map of each response over each of these settings.
+        """The study with a yield map of each response over each of these settings.
 
         warm : ``warmed`` of ``yield_map``.
         """
@@ -459,7 +462,8 @@ class StudyWork:
         return tuple(layers.fill(plan, store, size, task, self.runner, step, first))
 
     def _with_samples(self, study: Study, samples: int) -> Study:
-        """With the answers of so many samples; those that it has are at an edge of a block."""
+        """The study with the answers of so many samples; those that it has end at an edge of a
+        block."""
         plan = replace(study.plan, samples=samples)
         stage = f"tolerance study, {samples} boards, responses: {len(plan.questions)}"
         task = partial(layers.samples_task, plan)
@@ -473,8 +477,9 @@ class StudyWork:
         return cross_check.ask_random(study.answers, nominal)
 
     def _with_all_checks(self, study: Study, nominal: int) -> Study:
-        """With the boards at a boundary, which are known only once there is no more sample, and
-        those on which the engines differ, once that is known."""
+        """The study with ngspice's answers about the boards at a boundary, which are known only
+        once there is no more sample, and about those on which the engines differ, once that is
+        known."""
         asks = self._random(study, nominal)
         if self.engine != "ngspice":
             asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
@@ -521,7 +526,7 @@ def _more(samples: int) -> int:
 
 
 def _decided(study: Study) -> list[bool]:
-    """For each response, whether any board has an answer."""
+    """Whether any board has an answer, for each response."""
     return [y is not None and y.samples > y.failed for y in study.yields]
 
 

@@ -201,7 +201,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     ):
         stage = f"designer.jobs.search_stage.{name}"
         monkeypatch.setattr(stage, lambda *_, value=value, **__: value)
-    monkeypatch.setattr("designer.folders.kicad_files.beside", lambda *_: {})
+    monkeypatch.setattr("designer.folders.kicad_files.project_texts", lambda *_: {})
     design = "designer.folders.design_files"
     monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
     monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})
