@@ -26,7 +26,7 @@ from designer.base.seal import BLANK, intact, sealed
 Entry = TypeVar("Entry")
 Made = TypeVar("Made")
 Note = Callable[[str], None]
-"""Told what a user ought to know, a line at a time."""
+"""Is told what a user ought to know, a line at a time."""
 Vouch = Callable[[str, bytes], bool]
 """Whether somebody else, such as a manifest, knows that a file of this name has this content."""
 SEAL = "seal"
@@ -35,7 +35,7 @@ DAMAGED = "damaged, computed again"
 LARGEST = 200_000_000
 """Bytes of a file of entries."""
 UNSEALED = "written without a checksum, computed again"
-"""By versions of the tool that had none."""
+"""Said of an entry that a version of the tool without checksums wrote."""
 
 
 def nobody(_name: str, _content: bytes) -> bool:
@@ -75,7 +75,7 @@ class KeyedStore(Generic[Entry]):
     codec: EntryCodec[Entry]
     """How an entry is written."""
     note: Note = quiet
-    """Told of entries that are not taken."""
+    """Is told of entries that are not taken."""
     vouch: Vouch = nobody
     """Asked about entries without a seal."""
     put: Callable[[str, bytes], None] | None = None
@@ -178,7 +178,7 @@ class Lines:
     name: str
     """Under which the entries stand in the object."""
     key: str
-    """Of the request, on every line."""
+    """The request's key, on every line."""
 
     def text(self, entries: Mapping[str, Mapping[str, Any]]) -> str:
         """The file, in ASCII. entries : plain data by name."""

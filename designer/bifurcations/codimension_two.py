@@ -33,7 +33,7 @@ from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.points import PointKind
 
 APART = 1e-5
-"""In scaled units: step of the difference that gives the second derivative of the map."""
+"""The step, in scaled units, of the difference that gives the second derivative of the map."""
 ORDER = (
     PointKind.GRAZING,
     PointKind.FOLD,
@@ -41,19 +41,20 @@ ORDER = (
     PointKind.PITCHFORK,
     PointKind.TORUS,
 )
-"""In which the kinds that meet are named."""
+"""The order in which the kinds that meet are named."""
 SHORT = {PointKind.DOUBLING: "flip"}
 ENDS = ("degenerate grazing", "degenerate pitchfork", "degenerate period doubling")
-"""Those at which every curve ends."""
+"""The points of codimension two at which every curve ends."""
 FALLEN = 1e-7
-"""In scaled units: an orbit no farther than this from its partner has fallen together with it."""
+"""An orbit no farther than this from its partner, in scaled units, has fallen together with it."""
 
 HALVINGS, TRIES = 34, (5, 12)
-"""Of an interval in which counts change; after so many of them the point itself is tried for."""
+"""How often an interval in which counts change is halved; after so many halvings the point itself
+is tried for."""
 CORNER = 2e-2
-"""In scaled units: farthest from a curve's last point to the grazing that stops it."""
+"""The farthest, in scaled units, from a curve's last point to the grazing that stops it."""
 BESIDE = (1e-7, 1e-9)
-"""Of the displacement's peak: distances from a stop that lead on to the touch itself."""
+"""Distances from a stop, over the displacement's peak, that lead on to the grazing itself."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class CodimensionTwo:
 
     @property
     def values(self) -> tuple[float, float]:
-        """Of both parameters."""
+        """The values of both parameters."""
         return self.point.values
 
     def as_dict(self) -> dict[str, object]:
@@ -335,7 +336,8 @@ def _falls_together(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) ->
 
 
 def _nearest_to_partner(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) -> Root | None:
-    """Where they are one: the curve's equations are singular there, so by the secant alone."""
+    """The point where orbit and partner are one, by the secant alone: the curve's equations are
+    singular there."""
     one, other = (float(np.linalg.norm(p.partner)) for p in (a, b))
     share = one / (one + other)
     for shift in (0.0, 1e-4, -1e-4, 1e-2, -1e-2):

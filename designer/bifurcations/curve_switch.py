@@ -34,10 +34,10 @@ CRITICAL = 1e-4
 """How far outside the unit circle a multiplier may lie that counts as one on it: two that are one
 at a resonance are known to the square root of their product's error."""
 DEPTHS = (1e-5, 1e-4, 1e-6)
-"""Of the displacement's peak: how far clear of its stop a turning point is, where the tangent of a
-curve that ends at grazing is taken; the differences of the derivatives do not reach the stop."""
+"""How far clear of its stop a turning point is, over the displacement's peak, where the tangent of
+a curve that ends at grazing is taken; the differences of the derivatives do not reach the stop."""
 ASIDE = 1e-4
-"""In scaled units: how far along the tangent it is seen on which side a pair is complex."""
+"""How far along the tangent, in scaled units, it is seen on which side a pair is complex."""
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,20 @@ class OtherCurve:
     symmetric: bool
     """Whether the curve's orbits are symmetric ones, found by the half-period map."""
     values: tuple[float, float]
-    """Of both parameters."""
+    """The values of both parameters."""
     state: tuple[float, ...]
     """(states,) at the strobe."""
     stable: bool
     """Whether no multiplier lies outside the unit circle, so that a stable orbit may lie near."""
     touch: GrazingContact | None = None
-    """The turning point that touches a stop, of one of the two curves; None where none does."""
+    """The turning point of one of the two curves that grazes a stop; None where none does."""
     phase: float = 0.0
-    """Of that turning point, in drive periods after the strobe."""
+    """The phase of that turning point, in drive periods after the strobe."""
     size: float = 0.0
     """Peak of the displacement in its clearance."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
+        """The curve as plain data for JSON."""
         touch = None
         if self.touch is not None:
             touch = {
@@ -175,7 +175,7 @@ def _is_end(name: str) -> bool:
 
 
 def _condition(start: OtherCurve, jacobian: Array, name: str, grazing: Grazing | None) -> Condition:
-    """The other curve's, at the point."""
+    """The condition of the other curve, set up at the point."""
     if start.kind is PointKind.GRAZING:
         assert grazing is not None
         return grazing

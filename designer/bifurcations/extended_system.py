@@ -27,12 +27,12 @@ NEWTON = 14
 MOST_FLOWS = 8
 """Flows that are kept."""
 FARTHEST = 1.0
-"""In scaled units: longest step of Newton's method."""
+"""The longest step of Newton's method, in scaled units."""
 SLOW = 0.3
 """An iteration that leaves more of the residual than this has the derivatives computed anew."""
 ASTRAY = 0.5
-"""Of the distance between two neighbouring points: the most that the curve between them lies off
-its interpolation."""
+"""The most that a curve lies off its interpolation, over the distance between the two neighbouring
+points."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class CurvePoint:
 
     @property
     def values(self) -> tuple[float, float]:
-        """Of both parameters."""
+        """The values of both parameters."""
         return float(self.z[-2]), float(self.z[-1])
 
     @property
@@ -183,7 +183,8 @@ class ExtendedSystem:
     def _solve(
         self, guess: Array, border: Array, condition: Condition, along: Array
     ) -> CurvePoint | None:
-        """With border (k, unknowns), k as many rows as the equations are short of."""
+        """The point that solves the equations with a border (k, unknowns) of as many rows as they
+        are short of; None where Newton's method finds none."""
         z = centre = np.array(guess, dtype=float)
         value = self._value(z, condition)
         if value is None:

@@ -22,14 +22,14 @@ from designer.kernels.kernel_algebra import motion_terms
 FEWEST, MOST = 32, 20_000
 """Nodes in a drive period from which the motion is taken on."""
 TERMS = 24
-"""Of the Taylor series from a node on: beyond rounding for a step of the general kernel."""
+"""Terms of the Taylor series from a node on: beyond rounding for a step of the general kernel."""
 ORDERS = np.arange(float(TERMS))
-"""Of those terms."""
+"""The orders of those terms."""
 
 
 @dataclass(frozen=True)
 class GrazingContact:
-    """Which turning point touches which stop."""
+    """Which turning point grazes which stop."""
 
     clearance: int
     """Index of the clearance."""

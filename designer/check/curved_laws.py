@@ -65,7 +65,8 @@ class LawMisfit:
         return len(self.where) == 2
 
     def text(self, response: str, *, in_si: bool) -> str:
-        """It in words. response : what draws it so far. in_si : whether lengths are in metres."""
+        """The misfit in words. response : what draws the law so far. in_si : whether lengths are in
+        metres."""
         reached, span = (
             value_text(x, "m") if in_si else f"{x:.4g}" for x in (self.reached, self.span)
         )
@@ -84,14 +85,14 @@ class LawMisfit:
         return f"{response} {drawn} {few}: state more {more}, or a smaller {name}"
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The misfit as plain data for JSON."""
         own = {"between": self.where} if self._spring else {"clearance": self.where[0]}
         span = {"range" if self._spring else "depth": self.span}
         return {**own, **span, "reached": self.reached, "error": self.error}
 
 
 def misfits_in(answer: Mapping[str, Any]) -> Iterator[LawMisfit]:
-    """Those that stand in the JSON object of a response."""
+    """The misfits that stand in the JSON object of a response."""
     for each in (*answer.get("beyond_range", ()), *answer.get("coarse_range", ())):
         yield LawMisfit(tuple(each["between"]), each["range"], each["reached"], each["error"])
     for each in (*answer.get("beyond_depth", ()), *answer.get("coarse_depth", ())):

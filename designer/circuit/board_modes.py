@@ -107,7 +107,7 @@ class BoardModes:
         return np.asarray(self.modes.good.all(axis=1))
 
     def take(self, which: Index) -> BoardModes:
-        """Those of some boards, for themselves: what is added to them is not added here."""
+        """The modes of some boards, for themselves: what is added to them is not added here."""
         out = object.__new__(BoardModes)
         out._channel = self._channel
         out._boards, out.targets = self._boards.take(which), self.targets.copy()
@@ -123,7 +123,7 @@ class BoardModes:
 
     @classmethod
     def joined(cls, boards: Boards, parts: Sequence[BoardModes]) -> BoardModes:
-        """Those of all boards together; all parts have the same modes."""
+        """The modes of all boards together; all parts have the same modes."""
         out = parts[0].take(np.arange(0))
         out._boards = boards
         of_each = {

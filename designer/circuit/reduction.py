@@ -66,7 +66,7 @@ class Reduction:
 
     @cached_property
     def _second_channel(self) -> NodalEquations | None:
-        """The same over the generator's second channel; None where there is none."""
+        """The nodal equations over the generator's second channel; None where there is none."""
         return None if self.circuit.second is None else self._over(1)
 
     def _over(self, channel: int) -> NodalEquations:
@@ -116,7 +116,8 @@ class Reduction:
         return known
 
     def by_second(self, key: ModeKey) -> Solution:
-        """The same over the states, the generator's second channel in the place of the first, 1.
+        """The solution over the states, the generator's second channel in the place of the first,
+        and 1.
 
         Raises
         ------
@@ -162,7 +163,7 @@ class Reduction:
 
     @cached_property
     def _still(self) -> Mode:
-        """With every clearance open."""
+        """The mode with every clearance open."""
         return self._mode(self.circuit.open)
 
     def _mode(self, key: ModeKey) -> Mode:

@@ -58,7 +58,7 @@ _RECORDS: dict[str, type[Any]] = {
         SolverSettings, ToleranceMargin, YieldMap,
     )
 }  # fmt: skip
-"""By the name in a file, which is not to change."""
+"""The records by their names in the file, which are not to change."""
 _NAMES = {kind: name for name, kind in _RECORDS.items()}
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}
 

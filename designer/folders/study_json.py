@@ -100,7 +100,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
 
 
 def _exponents(checked: CheckedResponse) -> dict[str, dict[str, float]]:
-    """Of each engine."""
+    """The exponent by each engine."""
     return {
         engine: {"value": value, "error": error}
         for engine, (value, error) in checked.exponents.items()
@@ -154,7 +154,7 @@ def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any
 
 
 def _reached(study: Study, index: int) -> dict[str, Any] | None:
-    """From power-up by the recipe."""
+    """What the boards of a response show from power-up by the recipe."""
     rows = study.rows_of(index, study.power_ups)
     if not rows or study.recipes is None:
         return None

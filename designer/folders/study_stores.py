@@ -40,7 +40,7 @@ class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note`` is
     told of blocks that are damaged or of another study. kept : where the attribution is; pieces :
     where what is known of one that is not whole. prefix : of the names in the folder, "" or ending
-    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``). noise : whether a
+    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``). noise : whether an
     attribution counts only if the noise of its indices is known."""
 
     def __init__(

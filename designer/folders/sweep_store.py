@@ -40,9 +40,9 @@ _COLUMNS = [
 ]
 
 _MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
-"""Of systems with more clearances than one."""
+"""The column of systems with more clearances than one."""
 _FURTHER = pa.schema([*_MORE, ("further", pa.list_(pa.list_(pa.float64())))])
-"""Of sweeps that show more stops than one."""
+"""The columns of sweeps that show more stops than one."""
 
 
 def work_hash(settings: Mapping[str, Any]) -> str:

@@ -30,7 +30,7 @@ class WorkFiles:
     provenance: Mapping[str, Any]
     """Versions, seed and settings, which go into every file."""
     note: Note = quiet
-    """Told of entries that are not taken."""
+    """Is told of entries that are not taken."""
     vouch: Vouch = nobody
     """Asked about entries without a seal."""
     noted: set[str] = field(default_factory=set)

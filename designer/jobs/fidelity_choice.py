@@ -45,8 +45,8 @@ class FidelityChoice:
 
 
 def choose(folder: Folder) -> FidelityChoice:
-    """By the folder's ``trade.json``, if its stage is complete, else by what its search has kept of
-    an earlier one; else ``auto``.
+    """The fidelity by the folder's ``trade.json``, if its stage is complete, else by what its
+    search has kept of an earlier one; else ``auto``.
 
     Raises
     ------
@@ -63,7 +63,8 @@ def choose(folder: Folder) -> FidelityChoice:
 
 
 def before_search(folder: Folder, model: str) -> FidelityChoice | None:
-    """What a trade says here, if it is of the model file with this hash; None without one.
+    """The choice by a trade in the folder, if that is of the model file with this hash; None
+    without one.
 
     To be asked before a search touches the folder.
     """

@@ -40,7 +40,7 @@ KINDS: Mapping[str, tuple[Any, str]] = {
     "truth": (str, "a word"),
     FIDELITY: (str, "a word"),
 }
-"""Of what kind each of these inputs is, and that in words."""
+"""The kind of each of these inputs, and the kind in words."""
 
 
 def fidelity_input(options: Options) -> dict[str, str]:

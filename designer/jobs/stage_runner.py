@@ -122,7 +122,7 @@ class StageRunner:
         return synthesis
 
     def _with_other_stage(self, synthesis: Synthesis) -> Synthesis:
-        """With what is said of the stage that the model file does not state."""
+        """The synthesis with what is said of the stage that the model file does not state."""
         if self.modelfile.circuit.dead_zone is None:
             return synthesis
         self.progress.stage("the other stage of the clearance")

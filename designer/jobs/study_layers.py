@@ -18,7 +18,8 @@ MAP = "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
 WITHOUT_ATTRIBUTION, ATTRIBUTION_BUDGET = "without blame", "blame budget "
 NOISE = "noise of the blame"
-"""Of an attribution that an earlier version had stored without it."""
+"""The layer that makes anew the noise of an attribution which an earlier version stored without
+it."""
 
 
 def layers_of(options: Options) -> list[str]:

@@ -86,7 +86,7 @@ class Place:
 
 
 RANDOM, BUILT = Place(), Place("measured", "measured/")
-"""Of the study of random boards, and of that of the boards in a list."""
+"""The places of the study of random boards and of that of the boards in a list."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class StudyStage:
     command: str
     """The command line that its report states."""
     progress: Progress
-    """Told how far the work is."""
+    """Is told how far the work is."""
     shown: Show
     """Shows the yields while the work goes on."""
     early: bool = False
@@ -388,6 +388,6 @@ def satisfied(answer: Mapping[str, Any]) -> bool:
 
 
 def _trusted(trust: Mapping[str, Any]) -> bool:
-    """Of the engines' answers, where each has one (null: it has none); a yield says only how far
-    it is known. Older folders say nothing."""
+    """Whether the engines' answers can be trusted, where each has one (null: it has none); a yield
+    says only how far it is known. Older folders say nothing."""
     return all(engine["trusted"] is True for name, engine in trust.items() if name != "yield")

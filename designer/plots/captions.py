@@ -161,7 +161,7 @@ def _text(point: Bifurcation, before: str, after: str) -> str:
 
 
 def _of_branch(point: Bifurcation) -> TrackChange:
-    """By the branch alone, from its stable side where it has one."""
+    """The caption by the branch alone, from its stable side where it has one."""
     before, after = point.before, point.after
     if point.stable[1] and not point.stable[0]:
         before, after = after, before

@@ -16,7 +16,7 @@ NAMES = {
     PointKind.GRAZING: "grazing",
     PointKind.TORUS: "torus bifurcation",
 }
-"""Of the kinds, in a sentence."""
+"""The names of the kinds in a sentence."""
 
 
 def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
@@ -63,7 +63,7 @@ def _change(point: Bifurcation) -> str:
 
 
 def _stability(point: Bifurcation) -> str:
-    """Of the branch on both sides."""
+    """The stability of the branch on both sides."""
     sides = point.stable_sides
     assert sides is not None
     if sides[1] is sides[-1]:

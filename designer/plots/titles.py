@@ -57,7 +57,7 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
 
 def curves_title(name: str, plan: CurvePlan, width: int = 100) -> str:
-    """The same of bifurcation curves over two parameters."""
+    """The title of bifurcation curves over two parameters."""
     over = _both(plan.subject, plan.first, plan.second)
     heading = f"bifurcation curves of the {plan.subject.name} over {over}"
     held = _fixed(plan.subject, {plan.first: None, plan.second: None})
@@ -72,7 +72,7 @@ def _both(subject: Subject, first: str, second: str) -> str:
 
 
 def _way(plan: SweepPlan) -> str:
-    """In which order, or from which starts, the values are computed."""
+    """The order in which, or the starts from which, the values are computed."""
     if plan.followed:
         directions = {DOWN: "followed down", UP: "followed up"}
         return " and ".join(directions[t] for t in plan.tracks)

@@ -313,7 +313,7 @@ def diodes(circuit: Circuit, *, charge: bool) -> list[str]:
 
 
 def open_loop_gain(board: Board) -> float:
-    """Of the board's op-amps, `IDEAL_GAIN` where it is infinite."""
+    """The open-loop gain of the board's op-amps, `IDEAL_GAIN` where it is infinite."""
     return 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
 
 

@@ -54,9 +54,11 @@ LEVELS = 5
 REMEDIES_OF_GATE: tuple[Remedy, ...] = ("tolerance", "start")
 """Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
-"""Of the peak: half the strobe tolerance, so that boards that differ have room too."""
+"""The bound on strobes, over the peak: half the strobe tolerance, so that boards that differ have
+room too."""
 WAVE_BOUND = 2e-3
-"""Of the peak: RMS over the last n periods of ngspice, with ideal op-amps, less exact circuit."""
+"""The bound on the wave, over the peak: RMS over the last n periods of ngspice, with ideal op-amps,
+less the exact circuit's."""
 RELTOL = 1e-5
 """ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
@@ -122,7 +124,7 @@ class GateResult:
         return tuple(reasons) or (Reason(other, shown),)
 
     def as_dict(self) -> dict[str, object]:
-        """For provenance: the settings, and what they passed."""
+        """The settings and what they passed, for provenance."""
         return {
             **self.settings.as_dict(),
             "passed": self.passed,

@@ -29,7 +29,7 @@ from designer.spice.opamp_model import (
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
 HARD = 0.25
-"""Of the supply: a differential input that drives every op-amp's output to its limit."""
+"""A differential input that drives every op-amp's output to its limit, over the supply."""
 
 
 @dataclass(frozen=True)

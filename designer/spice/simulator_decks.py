@@ -61,12 +61,12 @@ class ResponseRun:
 
     @property
     def name(self) -> str:
-        """In words for a comment."""
+        """The run in words, for a comment."""
         return f"omega {self.omega:g}" + (f", {self.expected}" if self.expected else "")
 
 
 def file_name(dialect: Dialect) -> str:
-    """Of the deck in a design folder."""
+    """The name of the deck in a design folder."""
     return f"circuit-{dialect}.cir"
 
 

@@ -20,9 +20,9 @@ from designer.base.arrays import Array
 from designer.synthesis.scale_program import LinearBound, ScaleProgram, StatedLimit
 
 FAR = 60.0
-"""Of a logarithm: further than any scale or value."""
+"""A logarithm further than any scale or value."""
 TINY = 1e-7
-"""Of a logarithm: what is kept to so much is kept."""
+"""A limit on a logarithm that is kept to so much is kept."""
 TANGENTS = 60
 """Rounds of tangents; a few do."""
 LEVELS, OUTPUTS = 0.05, 0.3

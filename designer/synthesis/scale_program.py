@@ -182,11 +182,11 @@ class ScaleProgram:
     sums: tuple[ExponentialSum, ...]
     """What is not."""
     thresholds: tuple[Affine, ...]
-    """Of each gap: the voltage [V] at which its half conducts."""
+    """The voltage [V] at which the half of each gap conducts."""
     levels: tuple[Affine, ...]
-    """Of each state: its peak [V]."""
+    """The peak [V] of each state."""
     outputs: tuple[Affine, ...]
-    """Of each half: the stage's output at the deepest contact [V]."""
+    """The stage's output at the deepest contact [V], for each half."""
 
     @classmethod
     def of(cls, order: Order, within: ConditionLimits) -> ScaleProgram:
@@ -309,20 +309,20 @@ class _Maker:
 
     @property
     def time(self) -> Affine:
-        """Of the time scale [s]."""
+        """The logarithm of the time scale [s]."""
         return self._unit(0)
 
     def volts(self, state: int) -> Affine:
-        """Of a state's volts per unit."""
+        """The logarithm of a state's volts per unit."""
         return self._unit(1 + state)
 
     def part(self, name: str) -> Affine:
-        """Of a part's value, if that is chosen at will."""
+        """The logarithm of a part's value, if that is chosen at will."""
         return self._unit(self.shared[name])
 
     def rate(self, mass: int) -> Affine:
-        """Of what a resistor from a mass's displacement into its velocity is, times the coefficient
-        that it makes (``CircuitScales.rates``)."""
+        """The logarithm of what a resistor from a mass's displacement into its velocity is, times
+        the coefficient that it makes (``CircuitScales.rates``)."""
         x, v = 2 * mass, 2 * mass + 1
         return self.time + self.volts(x) - self.volts(v) - self.part(f"C{v + 1}")
 

@@ -84,7 +84,8 @@ def sums(first: Array, second: Array) -> Array:
 
 
 def distance(table: Array, low: Array, high: Array) -> Array:
-    """From each interval [low, high] to the nearest entry of an ascending table; 0 inside."""
+    """The distance from each interval [low, high] to the nearest entry of an ascending table; 0
+    inside."""
     if len(table) == 0:
         return np.full(len(low), np.inf)
     right = np.searchsorted(table, low)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from designer.jobs.repair_job import CureResult
 
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
-"""Of upgrades; as ``repair_branch.KINDS``."""
+"""Kinds of upgrades; as ``repair_branch.KINDS``."""
 
 
 def search(

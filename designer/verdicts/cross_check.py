@@ -102,8 +102,8 @@ class CrossCheck(Ask):
     either: str = ""
     """The last two answers of an undecided one, with `OR` between them."""
     finer: int = 1
-    """By how much the gate's step was divided in the run that answers: above 1 where the answer at
-    that step was not the exact circuit's."""
+    """The number by which the gate's step was divided in the run that answers: above 1 where the
+    answer at that step was not the exact circuit's."""
 
     def agrees(self, answer: Answer) -> bool | None:
         """Whether ngspice names the response that the exact circuit names; None without an answer.
@@ -175,8 +175,8 @@ def margin_share(answer: Answer, nominal: Orbit) -> float:
 
 
 def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> list[Ask]:
-    """Of the random subset: of the first `OWN_SAMPLES` those with a period from their own orbit,
-    the first ``nominal`` from the nominal orbit, and every slow one from there."""
+    """The asks about the random subset: of the first `OWN_SAMPLES` those with a period from their
+    own orbit, the first ``nominal`` from the nominal orbit, and every slow one from there."""
     asks = []
     for a in answers:
         if not _orbits(a):

@@ -1,4 +1,4 @@
-"""A block of boards on the exact circuit: every question, from its nominal orbit."""
+"""What a block of boards answers on the exact circuit: every question, from its nominal orbit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from designer.spice.numerics_gate import GateSubject
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, rounded
 
 Case = tuple[int, Question, Excitation, Array]
-"""A board, by its place in an ensemble, what it is asked, the generator's setting, the start."""
+"""A board by its place in an ensemble, the question that it is asked, the generator's setting and
+the start."""
 
 
 def settled(
@@ -66,7 +67,8 @@ def of_boards(
     jobs: int,
     progress: Callable[[], None] = lambda: None,
 ) -> list[Answer]:
-    """``block`` of what the boards of these samples have become, by an adjustment on the board."""
+    """The answers (as of ``block``) of what the boards of these samples have become by an
+    adjustment."""
     ensemble = Ensemble(plan.modelled(boards), jobs=jobs)
     return [answer for answer, _, _ in _settled_boards(plan, ensemble, indices, jobs, progress)]
 
@@ -155,7 +157,8 @@ def waveform_error(waveform: Array, wanted: Array) -> float:
 
 
 def _nominal_displacement(plan: StudyPlan, question: Question) -> Array:
-    """Empty where the nominal circuit has no answer; then no board has a waveform error."""
+    """The nominal board's displacement; empty where it has no answer, and then no board has a
+    waveform error."""
     reduction, orbit = Ensemble(plan.nominal()).reduction(0), question.start
     try:
         flow = Flow(reduction.system(), question.excitation.drive)

@@ -46,7 +46,8 @@ T = TypeVar("T")
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
 REMAINDER = 5e-4
-"""Of the peak: a quarter of the strobe tolerance."""
+"""How near its attractor a trajectory has arrived, over the peak: a quarter of the strobe
+tolerance."""
 MOST_PERIODS = 4000
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
 out by name."""
@@ -54,8 +55,8 @@ MOST_AGAIN = 4 * MOST_PERIODS
 """Longest run that is made again, in drive periods at the step of the first; a quarter of the step
 counts four times."""
 FINER = 4
-"""By how much the step is divided in each round where ngspice disagrees. Half a step may say the
-same by the same error: next to a period doubling it takes a sixteenth to see."""
+"""The number by which the step is divided in each round where ngspice disagrees. Half a step may
+say the same by the same error: next to a period doubling it takes a sixteenth to see."""
 MOST_PATIENCE = 16
 """How many times the pool's time a run at a finer step may take."""
 SURE_ROUND = 2
@@ -96,7 +97,7 @@ class NgspiceAnswer:
     response: str
     """n-p-q, status or ``UNDECIDED``."""
     reason: str = ""
-    """Why; of an undecided one, both answers."""
+    """Why that is the answer; both answers of an undecided one."""
     remedies: str = ""
     """Remedies that the last run needed."""
     symmetric: bool = False
@@ -104,7 +105,7 @@ class NgspiceAnswer:
     either: str = ""
     """Both answers of an undecided one, if both are any."""
     finer: int = 1
-    """By how much the step of the run that answers was divided."""
+    """The number by which the step of the run that answers was divided."""
 
 
 def cross_checks(

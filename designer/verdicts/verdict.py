@@ -48,7 +48,8 @@ class Question:
 
     @property
     def stream(self) -> str:
-        """Names what is drawn for this response alone: the same wherever it stands in a plan."""
+        """The name of the stream that is drawn for this response alone: the same wherever it stands
+        in a plan."""
         return f"{self.omega:.9g}:{self.spec.expect}"
 
     @property

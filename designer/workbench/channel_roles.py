@@ -36,7 +36,7 @@ from designer.workbench.prediction import (
 from designer.workbench.record import Record, RecordedMotion
 
 BAND = 0.15
-"""Of a setting's frequency: how far from it the drive may be."""
+"""How far the drive may be from a setting's frequency, over that frequency."""
 ASKED = 3
 """Wanted responses, the nearest in frequency, whose waves channels are laid over."""
 GAIN = (0.75, 1.33)
@@ -46,14 +46,15 @@ ALIKE = 0.35
 APART = 0.02
 """Least difference of that share to the next way of saying which channel is which."""
 KNOTS = 64
-"""Of a period."""
+"""Knots of a period."""
 STEPS, STRETCH = 64, 1 << 14
 """Of the fastest that a board does: samples of its period that equations of motion are held
 against; and the most samples of a record."""
 SINE_LEFT = 0.04
 """Of the generator's amplitude: what is left of its channel where that is a sine."""
 MOST_WAYS = 6000
-"""Of giving channels to nets: of more it has to be said."""
+"""Ways of giving channels to nets; where there are more, the user has to say which net a channel
+shows."""
 FITS, LOOSE = 5.0, 10.0
 """Misfit of channels that are taken for those nets; and up to which what they leave is taken for
 the drive where they are told."""

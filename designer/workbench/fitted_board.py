@@ -30,7 +30,7 @@ from designer.workbench.observation import Observation, observe
 from designer.workbench.prediction import BoardPrediction, PredictedResponse
 
 DETERMINED = 0.5
-"""Of the standard deviation over the spread."""
+"""The widest interval of a figure that the records determine, over the interval of the spread."""
 DRAWS = 256
 """Boards of the spread that say how far a figure varies; the first is the middle one."""
 NORMAL = 1.959964
@@ -47,7 +47,7 @@ class BoardFigure:
     unit: str
     """Its unit; "" where it has none."""
     value: float
-    """On the most probable board."""
+    """The figure of the most probable board."""
     low: float
     """Lower end of the 95 % interval."""
     high: float
@@ -67,12 +67,12 @@ class BoardFigure:
 
 
 def determined_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
-    """The figures that the records tell."""
+    """The figures that the records determine."""
     return tuple(figure for figure in figures(fit) if figure.determined)
 
 
 def figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
-    """Every figure of the board, told or not: its value on the most probable board, and the
+    """Every figure of the board, determined or not: its value on the most probable board, and the
     interval by the figure's slopes there."""
     prior, circuit = fit.prior, fit.prior.circuit
     near = board_figures(circuit, prior.boards(np.vstack([fit.centre, fit.centre + _steps(fit)])))
@@ -194,13 +194,13 @@ class FittedBoard:
     figures: tuple[BoardFigure, ...] = ()
     """What the records tell of it."""
     advice: tuple[Advice, ...] = ()
-    """For each response that it was asked for."""
+    """The advice for each response that was asked for."""
     reason: str = ""
     """Why there is no fit; "" where there is one."""
 
     @property
     def misfit(self) -> float | None:
-        """Of the worst record; see ``BoardFit.misfits``."""
+        """The misfit of the worst record; see ``BoardFit.misfits``."""
         return None if self.fit is None else max(self.fit.misfits)
 
     def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:

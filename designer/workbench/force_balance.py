@@ -58,7 +58,7 @@ class Balance:
     whole: bool
     """Whether every channel is tested by the others."""
     frequency: float
-    """Of the drive [Hz]; nan where they do not tell it."""
+    """The frequency of the drive [Hz]; nan where the channels do not tell it."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class ForceBalance:
                 yield self.balance(way)
 
     def balance(self, nets: Sequence[str]) -> Balance:
-        """Of one way: the net of each channel."""
+        """The balance of one assignment. nets : the net of each channel."""
         of = {net: k for k, net in enumerate(nets)}
         generator = of.get(self._prediction.generator)
         tests: dict[str, _Test] = {}
@@ -377,7 +377,7 @@ class _LinearPart:
 
 
 def _linear(prediction: BoardPrediction) -> _LinearPart:
-    """Of the nominal board with every clearance open."""
+    """The linear equations of the nominal board with every clearance open."""
     reduction, circuit = prediction.reduction, prediction.circuit
     system = reduction.system()
     rest, n = system.mode(circuit.open), system.size

@@ -112,7 +112,7 @@ class NgspiceWave:
     waves: Array
     """(k, nets) its waves at the phases of the overlay's [V]."""
     errors: Mapping[str, float]
-    """By net, as those of the overlay."""
+    """The errors by net, as those of the overlay."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Overlay:
     predicted: Array
     """(k, nets) the orbit's waves at the same phases [V]."""
     points: int = POINTS
-    """Of both, in a drive period."""
+    """Points of both curves in a drive period."""
     ngspice: NgspiceWave | None = None
     """The same in ngspice on full op-amps; None where it was not run."""
 

@@ -35,7 +35,7 @@ nearer after one more of its periods, has arrived."""
 BESIDE = 24
 """Boards whose modes are solved together, where one of them enters these."""
 WAITS = (8, 8, 4)
-"""Of the last drive's periods, the parts after which a start may have come to its orbit."""
+"""The parts of the last drive's periods after which a start may have come to its orbit."""
 STILL = 1e-3
 """Peaks below this share of the largest count as so much."""
 STREAM = "phase:"
@@ -147,7 +147,7 @@ def _onwards(
 def _swept(
     swept: Swept | None, stages: Sequence[tuple[Drive, int]], arrivals: Sequence[Arrival | None]
 ) -> dict[int, Arrival]:
-    """Of these arrivals, by their places, those that the faster way knows after these stages."""
+    """The arrivals that the faster way knows after these stages, by their places."""
     begun = {k: arrival for k, arrival in enumerate(arrivals) if arrival is not None}
     if swept is None or not begun:
         return {}
@@ -281,7 +281,7 @@ def _arrived(
     known: Sequence[Orbit | None],
     jobs: int,
 ) -> list[Orbit | None]:
-    """Of each start the known orbit that it has come to; None where that is not plain."""
+    """The known orbit that each start has come to; None where that is not plain."""
     out: list[Orbit | None] = [None] * len(starts)
     groups: dict[tuple[int, Recipe], list[int]] = {}
     for k, orbit in enumerate(known):

@@ -112,7 +112,7 @@ class LossRegion:
     becomes: str
     """What most of its lost boards show instead."""
     share: float
-    """Of all losses, those that are most likely of this region."""
+    """Share of all losses that are most likely of this region."""
     boards: int
     """Lost boards of it that were drawn."""
     parts: tuple[str, ...]
@@ -153,7 +153,7 @@ class RareLosses:
     effective: float
     """Effective number of lost boards: the square of their weights' sum over the sum of squares."""
     largest_weight: float
-    """Of a lost board, over the mean weight of 1."""
+    """The largest weight of a lost board, over the mean weight of 1."""
     gain: float
     """Plain boards that the same interval would take, over those drawn, pilots included; nan
     without a loss."""
@@ -198,7 +198,7 @@ class _Found:
     boards: int
     """Boards that were asked."""
     plain: int
-    """Of these, plain ones of pilot rounds."""
+    """How many of these boards are plain ones of pilot rounds."""
     strays: Array
     """(N, coordinates) of those the lost ones."""
 
@@ -214,7 +214,7 @@ class _Sample:
     responses: tuple[str, ...]
 
     def joined(self, other: _Sample) -> _Sample:
-        """Both, one after the other."""
+        """Both samples, one after the other."""
         return _Sample(
             np.concatenate([self.points, other.points]),
             np.concatenate([self.component, other.component]),
@@ -535,8 +535,8 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
 
 
 def _strength(way: Array, reliability_index: float) -> float:
-    """The tilt along a way at whose mean a limit at this distance is reached; the steepest where
-    none is steep enough."""
+    """The tilt along a way at whose mean a limit of this reliability index is reached; the steepest
+    where none is steep enough."""
     low, high = 0.0, STEEPEST / float(np.abs(way).max())
     for _ in range(60):
         middle = 0.5 * (low + high)

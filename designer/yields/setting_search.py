@@ -29,9 +29,9 @@ from designer.yields.window_path import PathSetting, find_window
 HALVED = 4
 """Pairs of settings halved at once."""
 APART = 0.02
-"""Of the half-bands: settings nearer than this are one."""
+"""Settings nearer than this, over the half-bands, are one."""
 PATHS = ((0.0, True), (0.5, True), (-0.5, True), (0.5, False))
-"""Of each path, half-bands of DC offset at which it sets out, and whether it is tied."""
+"""The paths: each with the half-bands of DC offset at which it sets out, and whether it is tied."""
 SPOTS = 3
 """Settings of a path that are asked, at most: those deepest inside the window."""
 MOST_TRIES = (1 + 8 + 2 * HALVED) + len(PATHS) * SPOTS
@@ -209,7 +209,7 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
 
 
 def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
-    """Those that differ from what was tried, from as built and from each other."""
+    """The settings that differ from what was tried, from as built and from each other."""
     earlier = [AS_BUILT, *(t.setting for t in case.tries)]
     untried: list[Adjustment] = []
     for setting in settings:

@@ -56,7 +56,7 @@ LONGEST_WAIT = 4000
 ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
-"""Of the amplitude: where an amplitude ramp begins."""
+"""Share of the amplitude at which an amplitude ramp begins."""
 ABOVE = 1.1
 """Of the highest resonance inside the clearance: where the long sweep begins."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -170,7 +170,7 @@ class _Trials:
 
     @property
     def share(self) -> float:
-        """Of all starts, those that lead to the response."""
+        """Share of all starts that lead to the response."""
         starts = (*self.nominal, *self.boards.values())
         return sum(starts) / len(starts)
 
@@ -220,7 +220,7 @@ class _Bench:
     elsewhere: Callable[[bool, Sequence[_Trial]], Callable[[], list[bool]]] | None = None
 
     def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
-        """From the first ``count`` phases, without those that were tried before."""
+        """The trials from the first ``count`` phases, without those that were tried before."""
         own = self.question.start
         known = own if self.question.periodic and own.radius < 1.0 else None
         starts = [

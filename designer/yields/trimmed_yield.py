@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 HIGH, LOW = "RV901H", "RV901L"
 """The track between the wiper and its ends."""
 END = 1e-3
-"""Of the travel at either end: what stays unused."""
+"""Share of the travel that stays unused at either end."""
 SCREEN = 4.0
 """Volts on the whole screen while the stops are read, over the nominal board's stop."""
 FINER = 10.0

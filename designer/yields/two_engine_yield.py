@@ -99,9 +99,9 @@ class Stratum:
     asked: int
     """Boards in the stratum with an answer of ngspice, n_h."""
     gained: int
-    """Of ``asked``, boards that only ngspice calls ok."""
+    """How many of the boards ``asked`` only ngspice calls ok."""
     lost: int
-    """Of ``asked``, boards that only the exact circuit calls ok."""
+    """How many of the boards ``asked`` only the exact circuit calls ok."""
     could_gain: int
     """Boards in the stratum that the exact circuit does not call ok."""
     could_lose: int

@@ -73,7 +73,7 @@ class Corner:
     response: str
     """n-p-q or status of the corner's board on the exact circuit."""
     survived: int
-    """Of ``corners`` corners, those whose board shows the response."""
+    """How many of the ``corners`` corners have a board that shows the response."""
     corners: int
     """Corners that were asked."""
 
