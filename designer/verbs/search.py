@@ -33,28 +33,30 @@ def search(
         int | None, option("--samples", "N", f"Fresh boards at the end [{SEARCH_SAMPLES}].")
     ] = None,
     yield_: Annotated[
-        float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
+        float | None, option("--yield", "Y", "Repair (cure) this design folder: the yield wanted.")
     ] = None,
     ppm: Annotated[
         float | None,
-        option("--ppm", "N", "Cure this design folder: boards of a million that may be lost."),
+        option(
+            "--ppm", "N", "Repair (cure) this design folder: boards of a million that may be lost."
+        ),
     ] = None,
     budget: Annotated[
-        float | None, option("--budget", "PRICE", "The most that a cure may cost.")
+        float | None, option("--budget", "PRICE", "The most that a repair may cost.")
     ] = None,
     without: Annotated[
         Sequence[str],
         option(
             "--without",
             "KIND",
-            f"A cure without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
+            f"A repair without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
             reads=list[str],
         ),
     ] = (),
     rung: Annotated[
         StudyEngine | None,
         option(
-            "--rung", None, "Of the final study; auto: by a trade that is in the folder. [auto]"
+            "--rung", None, "Fidelity of the final study; auto: by a trade in the folder. [auto]"
         ),
     ] = None,
     seed: OwnSeed = None,
@@ -63,10 +65,10 @@ def search(
     resume: Resume = False,
     progress: Progress | None = None,
 ) -> JobOutcome | CureResult:
-    """Find the design of the highest yield; with --yield or --ppm, the cheapest repair of a folder.
+    """Find the design of the highest yield; with --yield or --ppm, the cheapest repair (cure).
 
-    A model file is searched, and written into ``out``. A design folder is repaired, as ``cure``
-    does it.
+    A model file is searched, and written into ``out``. A design folder is repaired at
+    least cost, as ``cure`` does it.
 
     Raises
     ------

@@ -96,7 +96,7 @@ def simulate(
     ] = "model",
     rung: Annotated[
         Literal["ideal", "dynamic", "full"],
-        option("--rung", None, "The op-amps' model, with --engine ngspice."),
+        option("--rung", None, "Fidelity of the op-amps' model, with --engine ngspice."),
     ] = "ideal",
     starts: Annotated[
         int,

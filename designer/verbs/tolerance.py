@@ -62,8 +62,8 @@ def tolerance(
         option(
             "--rung",
             None,
-            "exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board in ngspice "
-            "too [auto, or as the folder has].",
+            "Fidelity; exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board "
+            "in ngspice too [auto, or as the folder has].",
         ),
     ] = None,
     tuned: Annotated[
