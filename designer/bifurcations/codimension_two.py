@@ -110,11 +110,11 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
     characteristic = np.polynomial.Polynomial(np.poly(p.jacobian)[::-1])
     out: dict[Event, float] = {}
     if isinstance(p.condition, Multiplier):
-        at, beside = p.condition.value, PointKind.FOLD if kind is not PointKind.FOLD else flip
+        at, other_kind = p.condition.value, PointKind.FOLD if kind is not PointKind.FOLD else flip
         # A half-period multiplier -1 twice is 1 twice in the period.
         name = "1:1 resonance" if at > 0.0 or system.symmetric else "1:2 resonance"
         out[name, PointKind.TORUS] = float(characteristic.deriv()(at))
-        out[meeting(kind, beside), beside] = float(characteristic(-at))
+        out[meeting(kind, other_kind), other_kind] = float(characteristic(-at))
         if kind is PointKind.FOLD:
             out["cusp", None] = _second_derivative(system, p, p.condition)
     elif isinstance(p.condition, MultiplierPair):
@@ -124,15 +124,15 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
         for name, off in _resonances(total, symmetric=system.symmetric).items():
             out[name, real.get(name)] = off
         others = p.condition.others(p.multipliers)
-        for value, beside in ((1.0, PointKind.FOLD), (-1.0, flip)):
-            out[meeting(kind, beside), beside] = float(np.prod(value - others).real)
+        for value, other_kind in ((1.0, PointKind.FOLD), (-1.0, flip)):
+            out[meeting(kind, other_kind), other_kind] = float(np.prod(value - others).real)
     elif isinstance(p.condition, Grazing):
         n = system.states
         phase = float(p.z[n])
         curvature = p.condition.curvature(system.flow(p.z), p.z[:n], phase)
         out["degenerate grazing", None] = curvature
-        for value, beside in ((1.0, PointKind.FOLD), (-1.0, flip)):
-            out[meeting(kind, beside), beside] = float(characteristic(value))
+        for value, other_kind in ((1.0, PointKind.FOLD), (-1.0, flip)):
+            out[meeting(kind, other_kind), other_kind] = float(characteristic(value))
     if not isinstance(p.condition, MultiplierPair):
         out[meeting(kind, PointKind.TORUS), PointKind.TORUS] = _pair(p)
     return out

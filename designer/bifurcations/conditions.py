@@ -180,8 +180,8 @@ class MultiplierPair:
             change = image.change(direction)
             if change is None:
                 return None
-            beside = self._logarithm(image.jacobian + DIFFERENCE * change)
-            slopes.append((beside - begun) / DIFFERENCE)
+            shifted = self._logarithm(image.jacobian + DIFFERENCE * change)
+            slopes.append((shifted - begun) / DIFFERENCE)
         return np.array([slopes])
 
     def _logarithm(self, jacobian: Array) -> float:

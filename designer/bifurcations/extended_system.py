@@ -264,13 +264,13 @@ class ExtendedSystem:
             return None
         rows[n:, : total - 2] = slopes
         for i in (total - 2, total - 1):
-            beside = z.copy()
-            beside[i] += DIFFERENCE * self.scale[i]
+            shifted = z.copy()
+            shifted[i] += DIFFERENCE * self.scale[i]
             sign = 1.0
-            if not self.plane.contains(float(beside[-2]), float(beside[-1])):
+            if not self.plane.contains(float(shifted[-2]), float(shifted[-1])):
                 sign = -1.0
-                beside[i] = z[i] - DIFFERENCE * self.scale[i]
-            after = self._value(beside, condition)
+                shifted[i] = z[i] - DIFFERENCE * self.scale[i]
+            after = self._value(shifted, condition)
             if after is None:
                 return None
             rows[:, i] = (after.gap - value.gap) / (sign * DIFFERENCE)
@@ -278,9 +278,9 @@ class ExtendedSystem:
 
     def _change(self, z: Array, value: _Value, direction: Array) -> Array | None:
         """Derivative of the scaled Jacobian at z along a direction of the scaled states."""
-        beside, n = z.copy(), self.states
-        beside[:n] += DIFFERENCE * self.scale[:n] * direction
-        image = self.image(beside)
+        shifted, n = z.copy(), self.states
+        shifted[:n] += DIFFERENCE * self.scale[:n] * direction
+        image = self.image(shifted)
         return None if image is None else (image.jacobian - value.jacobian) / DIFFERENCE
 
 

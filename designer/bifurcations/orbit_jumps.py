@@ -45,10 +45,12 @@ def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]
         if steps[first].n and end - first >= LEAST_RUN:
             changes = [_change(*steps[k - 1 : k + 1]) for k in range(first + 1, end)]
             for place, change in enumerate(changes):
-                beside = max(changes[max(place - 1, 0) : place] + changes[place + 1 : place + 2])
+                neighbours = max(
+                    changes[max(place - 1, 0) : place] + changes[place + 1 : place + 2]
+                )
                 k = first + 1 + place
                 a, b = (values[k - 1], steps[k - 1]), (values[k], steps[k])
-                if change > max(SEEN, SUDDEN * beside) and goes_on(family, a, b) is False:
+                if change > max(SEEN, SUDDEN * neighbours) and goes_on(family, a, b) is False:
                     out.append(k)
         first = end
     return out

@@ -312,10 +312,10 @@ class LinearModel:
                 shares[slot][j] += base * self.ratios[j].get(q.name, 1.0) ** 2
         slope_of = {q.name: s for q, s in zip(margin.quantities, limit.slopes / limit.sigma,
                                               strict=True) if q.group == "values"}  # fmt: skip
-        for (k, j), together in self.matched.items():
+        for (k, j), covariance in self.matched.items():
             slopes = np.array([slope_of.get(name, 0.0) for name in self.parts[k].network])
             # Over what the parts are counted with as they are, one by one.
-            shares[k][j] = float(slopes @ together @ slopes - slopes @ slopes)
+            shares[k][j] = float(slopes @ covariance @ slopes - slopes @ slopes)
         # The limit's own variance is of drawn boards, on which parts that track vary together: what
         # that adds or takes stays in proportion.
         scale = 1.0 / total if total > 0.0 else 1.0

@@ -203,7 +203,7 @@ class _Search:
             plans.append(None if plan is None else (plan, None))
         trials = self._measured(plans, boards, whole, step)
         rates = tuple(m.rate for m in trials)
-        return self._told(name, Trial("as it is", Upgrades(), 0.0, rates, trials, self.target))
+        return self._reported(name, Trial("as it is", Upgrades(), 0.0, rates, trials, self.target))
 
     def _measured(
         self,
@@ -226,7 +226,7 @@ class _Search:
             for plan, trim in filter(None, plans)
         )  # fmt: skip
 
-    def _told(self, name: str, trial: Trial) -> Trial:
+    def _reported(self, name: str, trial: Trial) -> Trial:
         """The trial, once its yields are said and the best of all so far is known."""
         shares = ", ".join(_share(m) for m in trial.measured)
         self.progress.note(f"  {name}: yield of each response: {shares}")
@@ -383,7 +383,7 @@ class _Search:
             plans.append((StudyPlan(circuit, spread, seed, MOST, (way.question,)), setting))
         measured = self._measured(plans, boards, whole, step)
         trial = Trial(model.branch.name, upgrades, cost, predicted, measured, self.target)
-        return self._told(name, trial)
+        return self._reported(name, trial)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
         """Tighten the demands of ways that promised more than was measured.

@@ -129,8 +129,8 @@ def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:
     for other in rest:
         first = other if other.better_than(first) else first
     others = [f.words for f in forecasts if f is not first]
-    beside = "; ".join(others) or "no parts were found for the other stage"
-    return replace(first.synthesis, stage_reason=f"{first.words}; {beside}")
+    reasons = "; ".join(others) or "no parts were found for the other stage"
+    return replace(first.synthesis, stage_reason=f"{first.words}; {reasons}")
 
 
 def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> str:

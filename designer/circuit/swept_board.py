@@ -132,9 +132,11 @@ class BoardSubject:
         if parameter == "omega":
             return Family("omega", 0.0, GREATEST, lambda w: self._flow({"frequency": frequency(w)}))
         own = self.design.model.second_order().own_frequency
-        stand = {"frequency": frequency(own)} if self.frequency is None else {}
+        own_frequency = {"frequency": frequency(own)} if self.frequency is None else {}
         return Family(
-            parameter, *SETTINGS[parameter], lambda value: self._flow({**stand, parameter: value})
+            parameter,
+            *SETTINGS[parameter],
+            lambda value: self._flow({**own_frequency, parameter: value}),
         )
 
     def plane(self, first: str, second: str) -> FlowPlane:

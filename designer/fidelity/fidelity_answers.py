@@ -369,14 +369,14 @@ def companions(settings: SolverSettings) -> tuple[SolverSettings, SolverSettings
     return half, replace(half, method="gear")
 
 
-def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
+def passes(subject: GateSubject, own: Run, others: tuple[Run, Run]) -> bool:
     """Whether the run of a setting, which has its trace, and those of its ``companions`` agree, as
     in ``spice.numerics_gate``.
 
     Above ideal op-amps the n-p-q is the fidelity's own: whether it is the exact circuit's is what a
     trade measures. subject : at its fidelity.
     """
-    read = [run for run in (own, *beside) if isinstance(run, Read)]
+    read = [run for run in (own, *others) if isinstance(run, Read)]
     if len(read) < 3 or isinstance(own, SimulationFailed):
         return False
     exact, orbit = subject.orbit, own.orbit

@@ -181,8 +181,8 @@ def _error(question: str, of: str, row: FidelityError, truth: Truth) -> float:
     if question == RESPONSE:
         return 0.0 if row.right[of] else 1.0
     own = row.velocity if question == IMPACT else row.error
-    beside = (truth.velocity if question == IMPACT else truth.error) if of == BOARD else 0.0
-    total = own[of] + beside
+    uncertainty = (truth.velocity if question == IMPACT else truth.error) if of == BOARD else 0.0
+    total = own[of] + uncertainty
     return total if row.right[of] and total == total else math.inf
 
 

@@ -262,8 +262,8 @@ def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
 
 def _limits(values: Array) -> tuple[float, float]:
     """Of the axis of the swept parameter: its values and a little beside them."""
-    beside = 0.004 * float(values[-1] - values[0])
-    return float(values[0]) - beside, float(values[-1]) + beside
+    aside = 0.004 * float(values[-1] - values[0])
+    return float(values[0]) - aside, float(values[-1]) + aside
 
 
 def _met(step: SteadyMotion, stop: int) -> Array:

@@ -65,8 +65,8 @@ class FreeDecay:
 
     def slopes(self, prior: Prior, z: Array) -> Array:
         """(k · nets, K) change of that with each coordinate of the board."""
-        here, *beside = _resonances_of(prior, np.vstack([z, z + PROBE * np.eye(len(z))]))
-        moved = (np.array(beside) - here).reshape(len(z), -1) / PROBE
+        here, *shifted = _resonances_of(prior, np.vstack([z, z + PROBE * np.eye(len(z))]))
+        moved = (np.array(shifted) - here).reshape(len(z), -1) / PROBE
         base, columns = self.residual(here), []
         for index in np.ndindex(here.shape):
             near = here.copy()

@@ -194,11 +194,11 @@ def limits_of(signal: Array) -> tuple[float, float]:
 
 def _piled(counts: Index, total: int) -> bool:
     """Whether samples pile up at the first of some values. counts : (m,) samples at each."""
-    last, beside = int(counts[0]), counts[1 : 1 + BESIDE]
+    last, neighbours = int(counts[0]), counts[1 : 1 + BESIDE]
     return (
-        len(beside) > 0
+        len(neighbours) > 0
         and last >= max(FEWEST_CUT, CUT_SHARE * total)
-        and last > OFTEN * int(beside.max())
+        and last > OFTEN * int(neighbours.max())
     )
 
 

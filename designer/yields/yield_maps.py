@@ -298,8 +298,8 @@ def yield_map(
 def _specified(plan: StudyPlan) -> tuple[float | None, float | None]:
     """The range of temperatures [°C] of the plan's op-amp, as far as the catalogue knows."""
     figures = plan.circuit.figures
-    stands = None if figures is None else figures.temperature
-    return (None, None) if stands is None else (stands.min, stands.max)
+    rated = None if figures is None else figures.temperature
+    return (None, None) if rated is None else (rated.min, rated.max)
 
 
 class _Task(NamedTuple):
