@@ -56,7 +56,7 @@ BLOCKS = "block-*.parquet"
 WORKED_ON = (".kicad_pcb", ".kicad_sch", ".kicad_pro", ".kicad_dru")
 """Endings of files that people go on working on."""
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
-"""Of every design; ``board_files.names`` has those of its board."""
+"""The files of every design; ``board_files.names`` has those of its board."""
 
 
 class Folder:

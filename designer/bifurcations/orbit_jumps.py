@@ -24,9 +24,9 @@ SUDDEN = 3.0
 """Times the change of the steps before and after: less is no jump. Near a fold an orbit changes as
 the square root of the distance, at most 2.4 times as much in the last step as in the one before."""
 SEEN = 1e-3
-"""Of the greatest displacement: a change that is less is no jump."""
+"""A change that is less than this share of the greatest displacement is no jump."""
 SAME = 1e-6
-"""Of the peak: how near two states of one orbit lie."""
+"""How near two states of one orbit lie, over the peak."""
 
 
 def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]) -> list[int]:

@@ -76,12 +76,12 @@ class PlaneCurve:
     response: str
     """The response at the point that it was begun at, as "n-p-q"."""
     points: tuple[CurvePoint, ...]
-    """In order of arclength."""
+    """The points in order of arclength."""
     ends: tuple[str, str]
     """Why it stops at its first and at its last point: "edge of b" (a side of the window), "closes
     on itself", "no convergence", "most points", or the name of a point of codimension two."""
     codimension_two: tuple[CodimensionTwo, ...]
-    """In order of arclength."""
+    """The points in order of arclength."""
     begun: int = 0
     """Number of the point that it was begun at."""
 

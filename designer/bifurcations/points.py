@@ -34,7 +34,7 @@ ROUNDING = 1e-11
 """Of the parameter's size: no error is stated below it. Where an orbit stalled before
 ``orbit_curve.CONVERGED`` of its peak, as many times more."""
 ZERO = 1e-3
-"""Of its values on either side: a test function that is more than this at its root jumped."""
+"""A test function that is more than this at its root, over its values on either side, jumped."""
 
 
 class PointKind(StrEnum):
@@ -71,7 +71,7 @@ class Birth:
 
 
 SIDES = {1: "above", -1: "below"}
-"""Of a value of the parameter."""
+"""The words for the sides of a value of the parameter."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ class OutputStage:
     load: float | None
     """The load [ohm] that it is reached into; None: each output's own, whatever that is."""
     resistance: float
-    """By which the limit falls with the current [ohm]."""
+    """The resistance by which the limit falls with the current [ohm]."""
     source: str
     """Where the limit is from: "stated", "data sheet" or "assumed"."""
 

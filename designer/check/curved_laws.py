@@ -29,11 +29,12 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
 
 POINTS = 200
-"""Of a drive period. A wave of the drive's tenth harmonic is missed by at most 1.2 % there."""
+"""Points of a drive period. A wave of the drive's tenth harmonic is missed by at most 1.2 %
+there."""
 COARSE = 0.05
-"""Of the largest force over the motion: an error of the pieces that is told."""
+"""The error of the pieces from which on it is said, over the largest force of the motion."""
 PLACES = 400
-"""Of a motion's displacements, at which the pieces are held against the law."""
+"""The displacements of a motion at which the pieces are held against the law."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ class CurvedLaw:
 def law_misfits(
     model: MechanicalModel, flow: Flow, orbit: Orbit, units: Array
 ) -> tuple[LawMisfit, ...]:
-    """Those laws of the model that an orbit of ``flow`` draws beyond their spans, or over which
+    """The misfits of the laws that an orbit of ``flow`` draws beyond their spans, or over which
     their pieces are ``COARSE``.
 
     model : at the orbit's clearance. units : (n,) of each state of the flow per unit of the

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 
 Engine = Literal["model", "circuit", "ngspice"]
 NEAR_TWIN = 0.02
-"""Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
+"""How far the twin of a circuit's orbit may be from the mirror image, over the peak."""
 
 
 @dataclass(frozen=True)
@@ -376,7 +376,7 @@ def _apart(flow: Flow, orbits: Sequence[Orbit]) -> list[Orbit]:
 
 
 def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
-    """Those of them that are an answer."""
+    """The attractors that are an answer."""
     return [o for o in orbits if o.status in ANSWERS]
 
 
@@ -581,8 +581,8 @@ def _alike(a: Orbit, b: Orbit) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:
-    """With its exponent measured to a bound and, over 200 periods, its extremes and largest impacts
-    where the orbit is not periodic and has none."""
+    """The orbit with its exponent measured to a bound and, where it is not periodic, with its
+    extremes and largest impacts over 200 periods."""
     orbit = attractors.with_exponent(flow, orbit)
     if len(orbit.extremes) or not len(orbit.start):
         return orbit

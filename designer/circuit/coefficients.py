@@ -43,7 +43,7 @@ class Scales:
     """The moving mass's displacement at the first clearance's upper stop, or at the only one, as a
     distance from rest [V]; negative where the stop is in contact at rest."""
     threshold_lower: float = float("nan")
-    """The same of the lower stop. nan where there is none."""
+    """The threshold of the lower stop; nan where there is none."""
     middle: float = 0.0
     """Where the middle of the clearance is wanted, over half the clearance."""
 

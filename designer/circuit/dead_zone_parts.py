@@ -416,6 +416,6 @@ def _section(name: str, node: str, out: str, role: str) -> Section:
 
 
 def _diode(name: str, a: str, b: str, side: int, model: DiodeModel, rest: bool, role: str) -> Diode:
-    """From a to b in the upper half, the other way round in the lower."""
+    """A diode from a to b in the upper half, the other way round in the lower."""
     anode, cathode = (a, b) if side > 0 else (b, a)
     return Diode(name, anode, cathode, model, rest, role)

@@ -386,7 +386,7 @@ class Ensemble:
         periods: Sequence[float],
         modes: working.BoardModes,
     ) -> Iterator[SettledBoard]:
-        """Those answers in the normal form; the rules are those of ``attractors.describe``."""
+        """The answers in the normal form, by the rules of ``attractors.describe``."""
         multipliers = np.linalg.eigvals(answers.monodromy[closed]).astype(complex)
         radius = np.abs(multipliers).max(axis=1, initial=0.0)
         graze, facts = answers.graze[closed], answers.facts[closed]

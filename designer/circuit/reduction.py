@@ -36,7 +36,8 @@ class FloatingCircuit(ArithmeticError):
 EVEN = 1e-9
 """Relative: what may differ between the two stops of a board that counts as mirror symmetric."""
 WORST_CONDITION = 1e14
-"""Of the scaled nodal equations: past it a net floats, whatever the solver says."""
+"""The condition number of the scaled nodal equations past which a net floats, whatever the solver
+says."""
 
 
 class Reduction:

@@ -45,7 +45,8 @@ def output_current(s: RuleSubject) -> Iterator[Finding]:
 
 
 def fault_current(s: RuleSubject) -> Iterator[Finding]:
-    """From the generator into each input with the supply off, every output and rail at 0 V.
+    """The current from the generator into each input with the supply off, every output and rail at
+    0 V.
 
     A pair of opposed diodes to ground at the node takes the current in the input's place; the two
     share it at worst, for both drop a diode's voltage.
@@ -72,7 +73,7 @@ def power(s: RuleSubject) -> Iterator[Finding]:
 
 
 def power_stuck(s: RuleSubject) -> Iterator[Finding]:
-    """The same with an op-amp stuck at a rail."""
+    """The power with an op-amp stuck at a rail."""
     return _power(s, s.stuck)
 
 

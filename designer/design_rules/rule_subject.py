@@ -85,7 +85,7 @@ class RuleSubject:
 
     @cached_property
     def reduction(self) -> Reduction:
-        """Of the nominal board."""
+        """The reduction of the nominal board."""
         return nominal_reduction(replace(self.design, circuit=self.circuit))
 
     @cached_property
@@ -99,7 +99,7 @@ class RuleSubject:
 
     @cached_property
     def each_run(self) -> dict[str, Operating]:
-        """Of each wanted response, and of each start from rest, by its name.
+        """What is met in each wanted response, and in each start from rest, by its name.
 
         Raises
         ------
@@ -121,7 +121,8 @@ class RuleSubject:
 
     @cached_property
     def stuck(self) -> Operating:
-        """With each op-amp stuck at each rail, at the largest amplitude of the wanted responses."""
+        """What is met with each op-amp stuck at each rail, at the largest amplitude of the wanted
+        responses."""
         runs, left_out = self._runs
         if not runs:
             raise NotRun(f"no orbit of the exact circuit: {left_out}")

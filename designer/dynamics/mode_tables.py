@@ -83,7 +83,8 @@ def step_length(A: Array, omega: float) -> float:
 
 @lru_cache(maxsize=256)
 def _balanced_norm(entries: bytes, size: int) -> float:
-    """Of a state matrix, after balancing; kept, for flows along a curve differ in the drive."""
+    """The norm of a state matrix after balancing. It is kept, for flows along a curve differ in the
+    drive."""
     A = np.frombuffer(entries).reshape(size, size)
     balanced, _ = matrix_balance(A, permute=False)
     return float(np.linalg.norm(balanced, 2))

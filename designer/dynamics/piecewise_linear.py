@@ -33,7 +33,7 @@ LONGEST_WALK = 512
 """Mode changes after which the search for the mode of a state gives up."""
 
 ROUNDING = 1e-14
-"""Of the sum of a guard's terms' magnitudes: what cannot be told from zero."""
+"""What cannot be told from zero, over the sum of a guard's terms' magnitudes."""
 
 ModeKey = tuple[int, ...]
 

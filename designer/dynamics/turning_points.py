@@ -19,7 +19,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 
 RESOLUTION = 0.05
-"""Of the fastest rate that an orbit meets: interval of the grid, which leaves 1e-13 of the peak."""
+"""The interval of the grid, over the fastest rate that an orbit meets; it leaves 1e-13 of the
+peak."""
 FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
 

@@ -106,11 +106,12 @@ def stepped(call: Callable[[Callable[[], None]], Result]) -> Generator[None, Non
 COLUMNS, ROWS = 65, 49
 """Points of the finest grid, its ends included."""
 STRIDES = (8, 4, 2, 1)
-"""Of the grid's points: every eighth one first, and so on; none is computed twice."""
+"""The strides over the grid's points: every eighth one first, and so on; none is computed twice."""
 REACH = 0.2
 """How far a map reaches to each side where nobody says: of the value, within the slider's ends."""
 STEPS = 200_000
-"""Of a point that the compiled engine does not name: some 50 ms. A picture may take more."""
+"""The most steps of a point that the compiled engine does not name: some 50 ms. A picture may take
+more."""
 PIECE = 0.03
 """Seconds after which a piece ends."""
 
@@ -145,9 +146,9 @@ class MapRequest:
     place: ModelPlace
     """Where the other parameters stay."""
     x: MapSide
-    """From left to right."""
+    """The side from left to right."""
     y: MapSide
-    """From bottom to top."""
+    """The side from bottom to top."""
 
     @property
     def subject(self) -> ModelSubject:

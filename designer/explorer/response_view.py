@@ -55,7 +55,7 @@ class Detail:
 
 
 DETAIL = Detail()
-"""Of a page whose pictures come one by one."""
+"""The detail of a page whose pictures come one by one."""
 Pack = Callable[[Mapping[str, ArrayLike]], Message]
 """Makes columns of numbers ready for a page."""
 
@@ -76,7 +76,7 @@ class ShownMotion:
 
 
 def shown_motions(system: SecondOrderSystem) -> tuple[ShownMotion, ...]:
-    """Those in the clearances in their order, then the absolute ones of all masses."""
+    """The motions in the clearances in their order, then the absolute ones of all masses."""
     gaps = [
         ShownMotion(motion, k if system.clearances else None)
         for k, motion in enumerate(relative_motions(system))
@@ -185,7 +185,7 @@ def _trace(flow: Flow, orbit: Orbit, periods: int, points: int) -> tuple[Array, 
 
 
 def _impacts(flow: Flow, orbit: Orbit, shown: ShownMotion) -> Array:
-    """Those of one clearance over n periods; none of a motion without a period."""
+    """The impacts of one clearance over n periods; none of a motion without a period."""
     here = orbit.impact_clearances == shown.clearance
     places = dict(shown.motion.stops)
     sides = [places.get(int(side), np.nan) for side in orbit.impact_sides[here]]
@@ -225,7 +225,7 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
 
 
 def _impact_rows(orbit: Orbit, place: ModelPlace) -> Iterator[tuple[str, str]]:
-    """For each stop how many impacts it has in the orbit's period, and with what velocities."""
+    """How many impacts each stop has in the orbit's period, and with what velocities."""
     system = place.model.second_order()
     for k, motion in enumerate(relative_motions(system)):
         of = f" of {system.clearances[k].name}" if len(system.clearances) > 1 else ""

@@ -87,7 +87,7 @@ class Built:
         return self.candidate.circuit
 
     def reduction(self) -> Reduction:
-        """Of the nominal board, with the op-amps' finite gain and bias current."""
+        """The reduction of the nominal board, with the op-amps' finite gain and bias current."""
         return Reduction(self.circuit, nominal_board(self.circuit))
 
     def excitation(self, omega: float) -> Excitation:
@@ -145,7 +145,8 @@ def build(name: str, catalog: Catalog) -> Built:
 
 
 def built(candidate: ComparedCircuit, instead: Array | None = None) -> Built:
-    """With its scales. instead : (states,) volts per unit where the circuit has none of its own.
+    """The circuit with its scales. instead : (states,) volts per unit where the circuit has none of
+    its own.
 
     Raises
     ------

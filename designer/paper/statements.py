@@ -23,7 +23,7 @@ from designer.paper.response_order import WindowGap, equal, faults, strays
 
 AGREES, IN_PART, DISAGREES = "agrees", "in part", "disagrees"
 PITCHFORK = 1.47
-"""Of the symmetric 1-1-1, as the paper gives it."""
+"""The pitchfork of the symmetric 1-1-1, as the paper gives it."""
 SWEEP = "designer bifurcation examples/paper.toml"
 
 

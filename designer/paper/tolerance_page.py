@@ -148,7 +148,7 @@ def _limits(attribution: Mapping[str, Any] | None, rows: Sequence[YieldRow]) -> 
 
 
 def _half_width(samples: int) -> str:
-    """Of Wilson's interval at one half, in points."""
+    """The half width of Wilson's interval at one half, in points."""
     low, high = wilson(0.5 * samples, samples)
     return f"{50.0 * (high - low):.1f}"
 

@@ -51,7 +51,7 @@ from designer.plots.response_colours import BLACK, RED
 from designer.plots.si_axes import si_x, si_y
 
 QUIET = 1e-10
-"""Of the largest line or density: what lies below it is left out of the picture."""
+"""What lies below this share of the largest line or density is left out of the picture."""
 _PLAIN = str.maketrans("₀₁₂₃₄₅₆₇₈₉−", "0123456789-")
 MANY = 40
 """Points of a section above which they are drawn small."""
@@ -164,7 +164,7 @@ def _records(response: Simulated) -> tuple[Trace, ...]:
 
 
 def _spectra(response: Simulated) -> Iterator[PowerSpectrum]:
-    """Of the displacement in each clearance."""
+    """The spectra of the displacement in each clearance."""
     trace = _records(response)[0]
     periodic = response.orbit.status in (OrbitStatus.PERIODIC, OrbitStatus.GRAZING)
     for motion in response.motions:
@@ -189,7 +189,7 @@ def _title(figure: Figure, response: Simulated, text: str, units: Mapping[str, U
 
 
 DIGITS = 12
-"""Of a frequency in a file's name, at most."""
+"""The most digits of a frequency in a file's name."""
 FORMATS = ("png", "svg")
 FOLDER = "a directory that can be written"
 LEAST_PERIODS = 2

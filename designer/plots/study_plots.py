@@ -40,7 +40,8 @@ VERDICTS = {
 MARKERS = {v: "o" if v is Verdict.OK else "D" for v in Verdict}
 
 MOST_DOTS = 500
-"""Of a picture as lines and dots; more stand in it as an image, which does not grow with them."""
+"""The most dots of a picture as lines and dots; more stand in it as an image, which does not grow
+with them."""
 
 
 @styled

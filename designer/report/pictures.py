@@ -60,7 +60,7 @@ INDICES = "First-order: what a coordinate explains alone; total: with all others
 NOISE = " Thin lines: the 95 % noise of each."
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
-"""From where each side is seen."""
+"""The direction from which each side is seen."""
 Element = Callable[[Figure, str], Markup]
 DrawnOnce = Callable[[str, Callable[[], Figure], str], Markup]
 """The element of a figure that the design decides, by its name (``ReportData.once``)."""

@@ -50,7 +50,7 @@ def response_table(data: ReportData) -> Table | None:
 
 
 def _exponents(checked: CheckedResponse) -> str:
-    """Of each engine with its standard error, per unit of the model's time."""
+    """The exponent by each engine with its standard error, per unit of the model's time."""
     each = [f"{name} {v:.3g} ± {e:.1g}" for name, (v, e) in checked.exponents.items()]
     return ", ".join(each) or words.NONE
 

@@ -45,7 +45,8 @@ RESOLUTION = 0.1
 LEAST_POINTS, MOST_POINTS = 64, 16384
 """Strobes a drive period: of the first look at the modes, and at most."""
 NEAR = 0.02
-"""Of the span: a peak this near to the largest is refined too, since it may be the larger one."""
+"""A peak this near to the largest, over the span, is refined too, since it may be the larger
+one."""
 BRACKET, ROUNDS = 16, 4
 """Parts of a bracket, and how often the best one is divided again."""
 WALK = 64
@@ -182,7 +183,8 @@ class Sampled:
             needed = min(int(np.ceil(run.drive.period * fastest / resolution)), MOST_POINTS)
 
     def extremes(self) -> dict[tuple[str, str], float]:
-        """By section: -lowest and highest voltage, largest current out of and into the output."""
+        """The extremes of each section: -lowest and highest voltage, largest current out of and
+        into the output."""
         names = [
             (s.name, quantity)
             for s in self.reduction.circuit.sections

@@ -45,7 +45,7 @@ EXPANDED, NULLS = 400_000, 20_000
 """Rows of a join, of the slope's tables and of the others for one u, that are ranked by their new
 values before the rest is left out."""
 GROWTH = 3.0
-"""Of the level, where no row keeps the rules that tie two tables."""
+"""The factor on the level where no row keeps the rules that tie two tables."""
 
 
 def rows_within(

@@ -45,8 +45,8 @@ from designer.synthesis.part_checks import nearest
 from designer.synthesis.stop_halves import INPUTS
 
 HIGHEST = 0.95
-"""Of the output limit: the highest threshold. A stop that no wanted response meets has to be within
-reach of the displacement too."""
+"""The highest threshold, over the output limit. A stop that no wanted response meets has to be
+within reach of the displacement too."""
 EQUAL = 1e-9
 """Relative: values that differ by less are one."""
 STILL = 1e-6
@@ -363,7 +363,7 @@ class _Maker:
             )
 
     def _ranges(self) -> None:
-        """Of the parts that are chosen at will."""
+        """Keep the ranges of the parts that are chosen at will."""
         for name, place in self.shared.items():
             own = np.exp(self.lists[place][[0, -1]])
             for end, most in zip(own.tolist(), (False, True), strict=True):
@@ -434,7 +434,7 @@ class _Maker:
         self._keep(log, StatedLimit("load", "the stop's resistor", bounds.stop, "Ω", least=True))
 
     def _gain(self, place: DeadZonePlace) -> Affine:
-        """Of the amplifier that sums displacements in front of a stage; 1 without one."""
+        """The gain of the amplifier that sums displacements in front of a stage; 1 without one."""
         if not place.sums:
             return Affine(np.zeros(len(self.lists)))
         return self._difference(place, self.order.peaks.reach(place.index))
@@ -447,7 +447,7 @@ class _Maker:
 
     @property
     def _drop(self) -> float:
-        """Of a diode [V]."""
+        """The drop of a diode [V]."""
         assert self.order.stage.diode is not None
         return diode_model(self.order.stage.diode).drop
 
@@ -458,7 +458,7 @@ class _Maker:
         return (self.within.swing if strict else self.order.output.limit) - self._drop
 
     def _highest_end(self, clearance: Clearance) -> float:
-        """Of a gap, or of a bend, which no wanted response may reach: highest voltage [V]."""
+        """The highest voltage [V] of a gap, or of a bend, which no wanted response may reach."""
         highest = HIGHEST * self.order.output.limit
         return min(highest, self.within.swing) if clearance.bend_of else highest
 

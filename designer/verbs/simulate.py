@@ -438,7 +438,7 @@ def _response_cells_in_si(
 
 
 def _share(counted: Mapping[str, Any]) -> str:
-    """With its 95 % interval."""
+    """A share with its 95 % interval."""
     low, high = 100 * counted["low"], 100 * counted["high"]
     return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
 

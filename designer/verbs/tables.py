@@ -336,7 +336,8 @@ def _mechanism(
 
 
 def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
-    """Of a share in per cent; of all boards there are, which have none, how many they are."""
+    """The interval of a share in per cent; where all boards there are were asked, which leaves
+    none, their number."""
     if counted.get("census") and ends["low"] == ends["high"]:
         return f"all {counted['samples']}"
     return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"

@@ -99,7 +99,7 @@ class Advice:
         return "no setting and no single part helps"
 
     def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
-        """As a JSON answer has it."""
+        """The advice as a JSON answer has it."""
         to = self.excitation
         return {
             "omega": self.question.omega,

@@ -51,7 +51,7 @@ STEPS, STRETCH = 64, 1 << 14
 """Of the fastest that a board does: samples of its period that equations of motion are held
 against; and the most samples of a record."""
 SINE_LEFT = 0.04
-"""Of the generator's amplitude: what is left of its channel where that is a sine."""
+"""What is left of the generator's channel where that is a sine, over its amplitude."""
 MOST_WAYS = 6000
 """Ways of giving channels to nets; where there are more, the user has to say which net a channel
 shows."""
@@ -197,8 +197,8 @@ def _cut_as_an_output(
 def _with_generator(
     balance: ForceBalance, best: Balance, every: Sequence[Balance], generator: str
 ) -> Balance | None:
-    """The same assignment with a channel that is a sine as the generator's, if it is among every
-    one that fits."""
+    """The assignment with a channel that is a sine as the generator's, if it is among those that
+    fit."""
     for each in every:
         differing = [k for k, net in enumerate(each.nets) if net != best.nets[k]]
         if [each.nets[k] for k in differing] == [generator] and math.isfinite(
@@ -259,8 +259,8 @@ def _motion(
     generator: str,
     frequency: float,
 ) -> RecordedMotion:
-    """With the drive by the generator's channel, where there is one; else by how the record lies on
-    itself."""
+    """The motion with the drive by the generator's channel, where there is one; else by how the
+    record lies on itself."""
     channel = nets.get(generator)
     amplitude = offset = phase = math.nan
     if channel is not None and channel in shown:

@@ -62,7 +62,7 @@ class BoardFigure:
         return self.high - self.low < DETERMINED * 2.0 * NORMAL * self.sigma
 
     def as_dict(self) -> dict[str, Any]:
-        """As a JSON answer has it."""
+        """The figure as a JSON answer has it."""
         return asdict(self)
 
 
@@ -204,7 +204,7 @@ class FittedBoard:
         return None if self.fit is None else max(self.fit.misfits)
 
     def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
-        """As a JSON answer has it. The residual is that of the worst record."""
+        """The board as a JSON answer has it. The residual is that of the worst record."""
         return {
             "board": self.name,
             "files": list(self.files),

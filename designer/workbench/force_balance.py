@@ -30,17 +30,17 @@ BY_OUTPUT, BY_DISPLACEMENT = 0.01, 0.06
 """Of the power of the drive's answer: what a board of a usual spread leaves of the equations, with
 the force of the stops recorded, and with that which the nominal stops have."""
 ZONE = 0.03
-"""Of the power of a dead zone's output: what a board leaves of it by the nominal stops."""
+"""What a board leaves of a dead zone's output by the nominal stops, over its power."""
 SINE = 0.005
-"""Of the power of the generator's channel: what is no sine."""
+"""What of the generator's channel is no sine, over its power."""
 FAINT = 0.1
-"""Of a contact as deep as the clearance: a dead zone's output that is no contact."""
+"""A dead zone's output that is no contact, over that at a contact as deep as the clearance."""
 LEAST_SHARE = 1e-3
-"""Of a channel's power: what is left of it counts as at least as much."""
+"""What is left of a channel counts as at least this share of its power."""
 FREE = 0.1
-"""Of a channel: what must not be cut off to say anything of it."""
+"""The share of a channel that must not be cut off to say anything of it."""
 DIRECT = 1e-9
-"""Of the largest entry of a board's matrix: the difference that makes its modes distinct."""
+"""The difference that makes a board's modes distinct, over the largest entry of its matrix."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class Balance:
 
 @dataclass(frozen=True)
 class _Test:
-    """Of one channel: what the equations leave of what they weigh, how much of that a usual board
-    leaves, and what is left over the channel's own power."""
+    """The test of one channel: what the equations leave of what they weigh, how much of that a
+    usual board leaves, and what is left over the channel's own power."""
 
     left: float
     allowed: float
@@ -201,8 +201,8 @@ class ForceBalance:
         return self._answers[key]
 
     def _zone(self, stop: PredictedStop, of: Mapping[str, int]) -> _Test | None:
-        """Of a dead zone's output by its displacement; None where too little of both is not cut
-        off. Where only the output is, it has to be beyond."""
+        """The test of a dead zone's output by its displacement; None where too little of both is
+        not cut off. Where only the output is, it has to be beyond."""
         place = of[stop.output]
         known, sides = self._uncut(stop, of), self._sides(place, stop)
         free = sides == 0.0
@@ -336,7 +336,7 @@ class ForceBalance:
         drive: object,
         allowed: float,
     ) -> _Test:
-        """Of a state's channel by the answer to the generator."""
+        """The test of a state's channel by the answer to the generator."""
         answer = self._without_rest(self._answers[drive][:, self._states.index(net)], channel)
         rest = self._rest(forces, channel, net)
         power = max(float(rest @ rest), float(answer @ answer), 1e-300)

@@ -44,7 +44,7 @@ class NgspiceMotion:
     """How a board moves in ngspice."""
 
     orbit: Orbit
-    """As read by the board's own stops."""
+    """The orbit as read by the board's own stops."""
     signals: Mapping[str, Array]
     """(periods · points + 1,) voltage of each net [V] at equal steps, from a strobe of the
     generator to the last one of the run."""
@@ -135,7 +135,7 @@ class Overlay:
     points: int = POINTS
     """Points of both curves in a drive period."""
     ngspice: NgspiceWave | None = None
-    """The same in ngspice on full op-amps; None where it was not run."""
+    """The motion in ngspice on full op-amps; None where it was not run."""
 
     @property
     def errors(self) -> Mapping[str, float]:
@@ -172,7 +172,7 @@ class Overlay:
     def with_ngspice(
         self, motion: NgspiceMotion, prediction: BoardPrediction, *, fitted: bool
     ) -> Overlay:
-        """The same with ngspice's motion, or its mirror twin where that is nearer, in phase."""
+        """The overlay with ngspice's motion, or its mirror twin where that is nearer, in phase."""
         table = np.column_stack([motion.signals[net][:-1] for net in self.nets])
         waves = [_in_phase(self.recorded, image) for image in _images(table, prediction)]
         best = min(waves, key=lambda wave: sum(self._errors(wave).values()))

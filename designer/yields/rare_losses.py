@@ -55,17 +55,18 @@ PILOTS, PILOT = 3, 600
 ENOUGH = 50.0
 """Effective number of lost boards, at least, of an estimate that ends before its most boards."""
 SOME = 20.0
-"""The same, of an estimate that ends on one side of a bound."""
+"""Effective number of lost boards, at least, of an estimate that ends on one side of a bound."""
 FEWEST = 6
 """Lost boards of one kind that begin a region."""
 TELLING = 12.0
 """Effective number of lost boards that move a tilt."""
 EVEN = 0.4
-"""Of the boards of all regions, what is shared evenly; the rest by how much each adds."""
+"""Share of the boards of all regions that is dealt evenly; the rest goes by how much each region
+adds."""
 CLEAR = 1.5
 """Standard errors by which a coordinate's mean has to be off to move its tilt at all."""
 WIDE = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
-"""By how much more than they may be the parts of boards are off that look for further regions."""
+"""The factors on the deviations of boards that look for further regions."""
 OFTEN = 0.05
 """Share of lost boards at which they are wide enough."""
 MET, MANY = 3, 16
@@ -86,7 +87,7 @@ MOST_WALKS, MOST_REGIONS = 6, 12
 SHOWN_PARTS = 5
 """Parts of a region that are named."""
 WIDEST = 10.0
-"""By how much tolerances are widened at most, to see where the first board is lost."""
+"""The factor by which tolerances are widened at most, to see where the first board is lost."""
 STEPS = 16
 """Widths that are looked at, twice: over the whole range, then between two of them."""
 SINGLE = 8
@@ -98,9 +99,9 @@ APART = 1.4
 TAG = 0xAA5E
 """Sets these boards apart from those of a study with the same seed."""
 QUANTILE = 1.959964
-"""Of the normal distribution, for 95 %, two-sided."""
+"""The quantile of the normal distribution for 95 %, two-sided."""
 PATH = (0.3, 0.5, 0.65, 0.8, 0.9, 1.0, 1.15, 1.35, 1.7, 2.2, 3.0)
-"""Of the tilt that a linear limit foretells: where on its way the loss is looked for."""
+"""Shares of the tilt that a linear limit foretells at which the loss is looked for."""
 
 
 @dataclass(frozen=True)
@@ -722,8 +723,8 @@ def _leading(names: Sequence[str], tilt: Array) -> tuple[str, ...]:
 
 
 def _margins(drawing: _Drawing, regions: Sequence[_Region]) -> Iterator[ToleranceMargin]:
-    """Of the corners that the regions lean to, and of single parts at the ends that they lean to.
-    Tolerances are widened in proportion, every law with them."""
+    """The tolerance margins of the corners that the regions lean to, and of single parts at the
+    ends that they lean to. Tolerances are widened in proportion, every law with them."""
     if not regions:
         return
     doing("tolerance margins")

@@ -58,7 +58,7 @@ ASIDE = 0.10
 SOFT = 0.5
 """Share of the amplitude at which an amplitude ramp begins."""
 ABOVE = 1.1
-"""Of the highest resonance inside the clearance: where the long sweep begins."""
+"""Where the long sweep begins, over the highest resonance inside the clearance."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -145,7 +145,8 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
 
 
 def highest_resonance(system: PiecewiseLinearSystem) -> float:
-    """Of the free motion inside the clearance, per unit of the system's time; 0 without one."""
+    """The highest resonance of the free motion inside the clearance, per unit of the system's time;
+    0 without one."""
     poles = np.linalg.eigvals(system.mode(system.start).A).astype(complex)
     return float(np.abs(poles.imag).max()) / (2.0 * math.pi)
 
