@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,9 @@ from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.bench_plans import question
 
+EARLIER = Path(__file__).parents[1] / "jobs" / "folders" / "0.1.0" / "format-1.zip"
+"""A design folder as version 0.1.0 wrote it."""
+RECORD = r'"record": \["(\w+)"'
 ORBIT = question(1).start
 READ = Read(ORBIT, np.arange(12.0).reshape(3, 4) / 7.0, (np.array([0.1]), np.ones((1, 4))))
 GATE = GateResult(SolverSettings("trap", 1e-6), True, 1e-4 / 3.0, READ, (200, 400))
@@ -107,6 +111,27 @@ def test_only_its_own_key_opens_an_item(tmp_path: Path) -> None:
     assert kept(path).get("gates", "old") is None
     assert len(kept(path).get("gates", "new") or ()) == 2
     assert same(kept(path).get("blame", "mine"), ATTRIBUTION)
+
+
+def test_a_file_names_its_records_as_an_earlier_version_did(tmp_path: Path) -> None:
+    """Some of their classes have had other names since."""
+    with ZipFile(EARLIER) as folder:
+        content = folder.read("kept.npz")
+    path, (key, _) = tmp_path / "kept.npz", items_in(content)["blame"]
+    path.write_bytes(content)
+    kept(path).put("blame", key, kept(path).get("blame", key))
+    before, after = (
+        re.findall(RECORD, json.dumps(items_in(c)["blame"])) for c in (content, path.read_bytes())
+    )
+    assert before == after
+    assert {"Blame", "ResponseBlame"} < set(before)
+
+
+def items_in(content: bytes) -> dict[str, Any]:
+    """What a file says of each item."""
+    with np.load(io.BytesIO(content)) as archive:
+        items: dict[str, Any] = json.loads(str(archive["items"]))["items"]
+        return items
 
 
 def test_an_attribution_without_noise_counts_unless_noise_is_asked_for(
