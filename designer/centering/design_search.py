@@ -1,6 +1,6 @@
 """The design that real parts cannot spoil: parts and places with the highest predicted yield.
 
-Over all wanted responses, in this order: the smallest of their distances from being lost
+Over all wanted responses, in this order: the smallest of their reliability indices
 (``centering.scaled_sigma``), hence the smallest predicted yield; where two designs agree in it,
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the

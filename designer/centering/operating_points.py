@@ -3,8 +3,8 @@
 Every stretch of the response (``centering.response_windows``) is scanned with a few boards at one
 stretched spread; the best places are asked again with more boards and stretches, and around the
 best of them a pattern of ever smaller steps over ω and b goes on as long as something is gained.
-Distances are those of ``centering.scaled_sigma``, so borders count by how much boards move them,
-whichever mechanism makes them, other attractors among them.
+How far that is is the reliability index of ``centering.scaled_sigma``, so borders count by how much
+boards move them, whichever mechanism makes them, other attractors among them.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def best_points(
     every = [stretch.at(SHARES) for stretch in stretches]
     scanned = [p for row in itertools.zip_longest(*every) for p in row if p is not None]
     first = score(bench, spec, scanned, SCAN, SCANNED, progress)
-    # The scan's distances are coarse: among equals the middle of a wide stretch comes first.
+    # The scan's indices are coarse: among equals the middle of a wide stretch comes first.
     second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
     count, scored = len(scanned) + len(second), []
     for start in best(second, STARTS):

@@ -506,9 +506,9 @@ def _cut(program: RepairProgram, pick: Sequence[int], key: tuple[int, int], part
 
 
 def _shrink_factor(way: ResponseWay, boards: Boards, rate: float) -> float:
-    """By which factor the room of a way's demands is to shrink for the picture to promise what was
-    measured: the square of the ratio of the distances at which that share of boards is lost; 1
-    where more are ok than was promised."""
+    """The factor by which the room of a way's demands is to shrink for the picture to promise what
+    was measured: the square of the ratio of the reliability indices at which that share of boards
+    is lost; 1 where more are ok than was promised."""
     assert way.margin is not None
     form = way.margin.of(boards)
     middle = float(np.median(form))

@@ -1,14 +1,14 @@
 """The reliability index of a response by scaled-sigma sampling: boards with a stretched spread.
 
 A yield near 1 tells designs apart only with thousands of boards. So every deviation from the
-nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit
-whether they still show the response. Were the margin linear and its spread normal, the yield of
-boards stretched λ times would be Φ(d/λ), with d the distance of the nominal board from losing the
-response in standard deviations of the margin ("scaled-sigma sampling": Sun, Li, Liu, Luo and Gu,
-IEEE Trans. CAD 34, 2015). d is fitted to all λ by largest likelihood; Φ(d) is the yield that it
-predicts. Spreads are bounded and margins curved, so this ranks designs and places; yields that are
-reported are counted on boards as they are. A prediction does not wait: a board that has not
-settled after 140 drive periods counts as lost.
+nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit whether
+they still show the response. Were the margin linear and its spread normal, the yield of boards
+stretched λ times would be Φ(d/λ). There d is the reliability index: how far the nominal board is
+from losing the response, in standard deviations of the margin ("scaled-sigma sampling": Sun, Li,
+Liu, Luo and Gu, IEEE Trans. CAD 34, 2015). d is fitted to all λ by largest likelihood; Φ(d) is the
+yield that it predicts. Spreads are bounded and margins curved, so this ranks designs and places;
+yields that are reported are counted on boards as they are. A prediction does not wait: a board that
+has not settled after 140 drive periods counts as lost.
 """
 
 from __future__ import annotations

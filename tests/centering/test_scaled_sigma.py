@@ -1,5 +1,5 @@
-"""Distances: the fit against the law that it assumes, and boards against the study's own
-fidelity."""
+"""The reliability index: the fit against the law that it assumes, and boards against the exact
+circuit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_without_a_loss_it_is_finite() -> None:
 
 
 def test_the_boards_are_the_spread_s_stretched() -> None:
-    """The compiled shortcut counts what the study's fidelity, asked one by one, says."""
+    """The compiled shortcut counts what the exact circuit, asked one by one, says."""
     synthesis, response = made(), made().model_responses[0]
     bench = ScaledBoards(synthesis.design, spread(), 5, COUNT)
     place = OperatingPoint(response.omega, response.b, response.orbit.start)

@@ -755,9 +755,8 @@ def test_an_interrupted_trade_goes_on_where_it_was(
     assert set(kept) == {"rungs 1", "boards 1, 0 to 2"}
     monkeypatch.setattr("designer.fidelity.yields.tally", count)
     measured = fidelity_answers.measured
-    monkeypatch.setattr(
-        "designer.fidelity.fidelity_answers.measured", None
-    )  # to call it would fail
+    # To call it would fail.
+    monkeypatch.setattr("designer.fidelity.fidelity_answers.measured", None)
     assert entry.status(words) == 2
     assert "--resume" in capfd.readouterr().err
     # Of a damaged file the pieces that are whole are taken, and the others made again.

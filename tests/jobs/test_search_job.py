@@ -152,9 +152,8 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     found.write("search.json", dumps({"format": 1, "trade": again}))
     assert fidelity_choice.choose(found) == choice  # said once, however often it is handed on
     found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
-    assert fidelity_choice.choose(found) == fidelity_choice.FidelityChoice(
-        "auto", ""
-    )  # of another design
+    # The trade was of another design.
+    assert fidelity_choice.choose(found) == fidelity_choice.FidelityChoice("auto", "")
     with_trade(tmp_path / "found", "circuit")
     assert fidelity_choice.choose(Folder(tmp_path / "found")).rung == "auto"
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
