@@ -1,9 +1,9 @@
 """How often ngspice calls a random board what the exact circuit calls it, and why it does not.
 
 Every board of a study of ``examples/paper.toml``, under its own spread and a seed that no search
-has seen, is asked on both rungs by the code that a study uses: from the nominal design's orbit,
-with halved steps where the two differ. Each disagreement is then run once more at a much finer
-step, and listed with its margins.
+has seen, is asked at both fidelities by the code that a study uses: from the nominal design's
+orbit, with halved steps where the two differ. Each disagreement is then run once more at a much
+finer step, and listed with its margins.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from designer.model.model_file import ModelFile, read_model_file
 from designer.spice import convergence_aids, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.verdicts import exact_rung as exact
+from designer.verdicts import exact_circuit as exact
 from designer.verdicts.cross_check import SLOW, CrossCheck, StartKind
 from designer.verdicts.verdict import Answer
 from designer.yields.study import Study
@@ -92,10 +92,12 @@ class Row:
 
 
 def measure(file: ModelFile, samples: int = SAMPLES) -> tuple[list[Row], list[Difference]]:
-    """Both rungs on every board of a study of this model file."""
+    """Both fidelities on every board of a study of this model file."""
     made = synthesise(file)
     with SpicePool(cores(), timeout=SPICE_TIMEOUT) as pool:
-        study = tolerance(made, samples=samples, rung="ngspice", blamed=False, seed=SEED, pool=pool)
+        study = tolerance(
+            made, samples=samples, fidelity="ngspice", attributed=False, seed=SEED, pool=pool
+        )
         found = [d for index in study.response_indices for d in _differences(study, index, pool)]
     return [_row(study, index, found) for index in study.response_indices], found
 

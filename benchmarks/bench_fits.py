@@ -215,7 +215,7 @@ def _figure_error(figure: BoardFigure, truth: float) -> FigureError:
         high=figure.high,
         truth=truth,
         sigma=figure.sigma,
-        told=figure.told,
+        told=figure.determined,
     )
 
 

@@ -38,7 +38,7 @@ from designer.model.model_file import read_model_file
 from designer.spice import numerics_gate as gate
 from designer.spice.batch_backend import program_version
 from designer.spice.numerics_gate import WAVE_BOUND, GateResult, GateSubject
-from designer.spice.opamp_model import RUNGS
+from designer.spice.opamp_model import FIDELITIES
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
 from designer.spread.spread import Spread
@@ -56,7 +56,7 @@ SHOWN = 40
 @dataclass(frozen=True)
 class Case:
     """One response: p, drive frequency, the exact circuit's largest multiplier, gate, RMS error
-    of ``ideal`` and warm starts by rung (None where the run failed or has no period)."""
+    of ``ideal`` and warm starts by fidelity (None where the run failed or has no period)."""
 
     p: int
     omega: float
@@ -69,7 +69,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Speed:
-    """exact : seconds that the exact rung took for the same boards."""
+    """exact : seconds that the exact circuit took for the same boards."""
 
     p: int
     ours: Throughput
@@ -125,13 +125,14 @@ def measure(samples: int = SAMPLES, runs: int = RUNS, most: int = 8) -> Measured
 
 def _cases(pool: SpicePool, wanted: dict[int, tuple[float, GateSubject]]) -> list[Case]:
     gates, warms = {}, {}
-    for rung in RUNGS:
-        on_rung = [replace(s, rung=rung) for _, s in wanted.values()]
-        gates[rung] = gate.check(pool, on_rung)
-        jobs = [warm_job(s, g.settings) for s, g in zip(on_rung, gates[rung], strict=True)]
+    for fidelity in FIDELITIES:
+        at_fidelity = [replace(s, fidelity=fidelity) for _, s in wanted.values()]
+        gates[fidelity] = gate.check(pool, at_fidelity)
+        jobs = [warm_job(s, g.settings) for s, g in zip(at_fidelity, gates[fidelity], strict=True)]
         heard = dict(pool.map(jobs))
-        warms[rung] = [
-            warm(s, r) if isinstance(r := heard[i], Read) else None for i, s in enumerate(on_rung)
+        warms[fidelity] = [
+            warm(s, r) if isinstance(r := heard[i], Read) else None
+            for i, s in enumerate(at_fidelity)
         ]
     out = []
     for i, (p, (omega, s)) in enumerate(wanted.items()):
@@ -143,8 +144,8 @@ def _cases(pool: SpicePool, wanted: dict[int, tuple[float, GateSubject]]) -> lis
                 s.orbit.radius,
                 passed,
                 passed.wave,
-                {rung: warms[rung][i] for rung in RUNGS},
-                {rung: gates[rung][i].discarded for rung in RUNGS},
+                {fidelity: warms[fidelity][i] for fidelity in FIDELITIES},
+                {fidelity: gates[fidelity][i].discarded for fidelity in FIDELITIES},
             )
         )
     return out
@@ -328,17 +329,17 @@ def as_dict(m: Measured) -> dict[str, Any]:
                 "gate": c.gate.as_dict(),
                 "rms": c.rms,
                 "warm": {
-                    rung: None
+                    fidelity: None
                     if w is None
                     else {
                         "needed": w.needed,
                         "predicted": w.predicted,
                         "predicted_by_exact_multiplier": w.exact,
-                        "discarded": c.discarded[rung],
+                        "discarded": c.discarded[fidelity],
                         "response": w.response,
                         "gaps": w.gaps[: SHOWN + 1],
                     }
-                    for rung, w in c.warm.items()
+                    for fidelity, w in c.warm.items()
                 },
             }
             for c in m.cases
@@ -359,20 +360,22 @@ def as_dict(m: Measured) -> dict[str, Any]:
 
 
 def plot(m: Measured) -> Figure:
-    """Warm starts by rung above; errors, throughput, memory below."""
+    """Warm starts by fidelity above; errors, throughput, memory below."""
     figure = Figure(figsize=(11.5, 7.0), layout="constrained")
     axes = figure.subplots(2, 3)
     colours = mpl.colormaps["viridis"](np.linspace(0.0, 0.9, len(m.cases)))
-    for ax, rung in zip(axes[0], RUNGS, strict=True):
+    for ax, fidelity in zip(axes[0], FIDELITIES, strict=True):
         for c, colour in zip(m.cases, colours, strict=True):
-            w = c.warm[rung]
+            w = c.warm[fidelity]
             if w is not None:
                 shown = np.maximum(w.gaps[1 : SHOWN + 1], 1e-6)
                 ax.semilogy(
                     np.arange(1, len(shown) + 1), shown, color=colour, lw=1.2, label=f"p = {c.p}"
                 )
         ax.axhline(STROBE_TOLERANCE, color="black", lw=0.8, ls="--")
-        ax.set(title=f"{rung}: distance from the settled strobe", xlabel="period", ylim=(1e-6, 1))
+        ax.set(
+            title=f"{fidelity}: distance from the settled strobe", xlabel="period", ylim=(1e-6, 1)
+        )
         _grid(ax)
     axes[0, 0].set_ylabel("of the peak")
     axes[0, 2].legend(fontsize=7, ncols=2)

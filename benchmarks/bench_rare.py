@@ -34,7 +34,7 @@ from designer.check.synthesis_result import synthesise
 from designer.dynamics.orbit import SETTLED
 from designer.model.model_file import read_model_file
 from designer.spread.spread import Spread
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.rare_losses import rare_losses
 from designer.yields.study import plan_study
@@ -122,7 +122,7 @@ def plain_row(case: Case, first: int) -> dict[str, Any]:
     """What a block of plain boards shows."""
     began, cpu = time.perf_counter(), time.process_time()
     plan = replace(case.plan, samples=first + BLOCK)
-    answers = exact_rung.block(plan, range(first, first + BLOCK), cores())
+    answers = exact_circuit.block(plan, range(first, first + BLOCK), cores())
     lost = Counter(a.response for a in answers if a.verdict not in (Verdict.OK, Verdict.FAILED))
     return {
         "first": first,

@@ -162,11 +162,11 @@ def named_exact(
     of another net on a channel."""
     about = None if drawn.omega is None else synthesis.design.errors.scales.frequency(drawn.omega)
     channels = ", ".join(sorted(drawn.nets))
-    helped = drawn.omega is not None or drawn.told is not None
+    helped = drawn.omega is not None or drawn.channels is not None
     known = bool(drawn.clipped), drawn.clean, helped
     outcome = partial(NamedExact, model, seed, drawn.number, channels, *known, drawn.response)
     try:
-        motion = recorded_motion(drawn.record, prediction, frequency=about, told=drawn.told)
+        motion = recorded_motion(drawn.record, prediction, frequency=about, stated=drawn.channels)
         name = identify_response(motion, prediction)
     except InputError as error:
         return outcome(str(error), REFUSED, math.nan, said=False)

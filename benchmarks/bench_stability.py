@@ -111,16 +111,17 @@ def flow_table(rows: Sequence[Row]) -> list[str]:
 
 def spice_summary(rows: Sequence[Row]) -> Iterator[list[str]]:
     for axis, of in by_axis(rows).items():
-        for rung in dict.fromkeys(r for row in of for r in row.get("rungs", {})):
-            asked = [row for row in of if rung in row.get("rungs", {})]
-            fine = [row for row in asked if row["rungs"][rung]["passed"]]
-            bad = [row for row in asked if not row["rungs"][rung]["passed"]]
-            waves = [row["rungs"][rung]["rms"] for row in fine]
+        for fidelity in dict.fromkeys(r for row in of for r in row.get("rungs", {})):
+            asked = [row for row in of if fidelity in row.get("rungs", {})]
+            fine = [row for row in asked if row["rungs"][fidelity]["passed"]]
+            bad = [row for row in asked if not row["rungs"][fidelity]["passed"]]
+            waves = [row["rungs"][fidelity]["rms"] for row in fine]
             worst = max((wave for wave in waves if wave is not None), default=None)
             yield [
-                f"ngspice {rung}, {axis}",
+                f"ngspice {fidelity}, {axis}",
                 ", ".join(f"{row['value']:g}" for row in fine) or "nowhere",
-                "; ".join(f"{r['value']:g}: {r['rungs'][rung]['why']}" for r in bad) or "nothing",
+                "; ".join(f"{r['value']:g}: {r['rungs'][fidelity]['why']}" for r in bad)
+                or "nothing",
                 "–" if worst is None else f"wave right to {_up(worst)} of the peak (RMS)",
             ]
 
@@ -145,7 +146,7 @@ def spice_table(rows: Sequence[Row]) -> list[str]:
         if "refused" in row:
             body.append([f"{row['axis']} {row['value']:g}", *["–"] * 10, "refused"])
             continue
-        for rung, said in row["rungs"].items():
+        for fidelity, said in row["rungs"].items():
             equation = row["equation"]
             body.append(
                 [
@@ -153,7 +154,7 @@ def spice_table(rows: Sequence[Row]) -> list[str]:
                     _text(row["threshold"], ".3g") + " V",
                     row["model"],
                     row["circuit"],
-                    rung,
+                    fidelity,
                     said["response"],
                     "passed" if said["passed"] else "not passed",
                     _text(said["steps_a_period"], "d"),

@@ -1,4 +1,4 @@
-"""The exact rung of a tolerance study: 10 000 boards as built, both dead-zone stages, p = 1 … 8.
+"""The exact circuit of a tolerance study: 10 000 boards as built, both dead-zone stages, p = 1 … 8.
 
 Against settling each board by brute force on the general kernel and against spicelib's Monte Carlo
 run, and memory. The designs are those of ``examples/paper.toml`` and ``examples/rectifier.toml``,
@@ -35,7 +35,7 @@ from designer.dynamics.flow import Flow
 from designer.model.model_file import read_model_file
 from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.layers import LocalRunner, samples_task
 from designer.yields.study import plan_study
@@ -151,7 +151,7 @@ def measure(
     for stage, plan in plans.items():
         for number, question in enumerate(plan.questions):
             asked = replace(plan, questions=(question,))
-            exact_rung.block(asked, range(2), 1)  # compiled code, tables of the nominal board
+            exact_circuit.block(asked, range(2), 1)  # compiled code, tables of the nominal board
             began, spent = time.perf_counter(), time.process_time()
             verdicts: Counter[Verdict] = Counter()
             longest = 0

@@ -60,7 +60,7 @@ class ExactRecord:
     """The net whose channel is clipped; "" without one."""
     omega: float | None
     """What ``--omega`` says."""
-    told: Mapping[str, str] | None
+    channels: Mapping[str, str] | None
     """What ``--channels`` says."""
     clean: bool
     """Whether the scope has no noise and no errors."""
@@ -152,14 +152,14 @@ def _recorded(
         cut = np.clip(record.signals[channel], *limits)
         record = replace(record, signals={**record.signals, channel: cut})
     record = replace(record, time=record.time + rng.choice([0.0, 1.0, -20.0]) * record.duration)
-    omega, told = None, None
+    omega, channels = None, None
     if rng.uniform() < TOLD:
         omega = drive.frequency / synthesis.design.errors.scales.frequency(1.0)
         omega *= 1.0 + rng.uniform(-0.02, 0.02)
     elif rng.uniform() < TOLD and nets != (circuit.generator.net,):
-        told = {net: f"CH{k + 1}" for k, net in enumerate(nets)}
+        channels = {net: f"CH{k + 1}" for k, net in enumerate(nets)}
     return ExactRecord(
-        number, record, response, drive.frequency, nets, clipped, omega, told, clean, graze
+        number, record, response, drive.frequency, nets, clipped, omega, channels, clean, graze
     )
 
 

@@ -1,9 +1,9 @@
 """Boards whose motion ngspice knows: what the oscilloscope of ``bench_records`` and ``bench_fits``
 records.
 
-Each board is drawn from ``bench-1``, started on its own exact orbit and run on the rung ``full``
-until it has settled there. What ngspice calls the motion, by the board's own thresholds, is the
-truth; the last periods are what a scope may record.
+Each board is drawn from ``bench-1``, started on its own exact orbit and run at the fidelity
+``full`` until it has settled there. What ngspice calls the motion, by the board's own thresholds,
+is the truth; the last periods are what a scope may record.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def _decay_job(subject: GateSubject) -> SpiceJob[dict[str, Array]]:
         title="a board whose generator is off",
         stop_time=DECAY,
         initial=subject.orbit.start[: len(circuit.states)],
-        rung="full",
+        fidelity="full",
     )
     return SpiceJob(text, circuit.outputs, DECAY, _decayed)
 

@@ -49,18 +49,18 @@ def flow_picture(rows: Sequence[Row]) -> Figure:
 
 
 def spice_picture(rows: Sequence[Row]) -> Figure:
-    """Distance of ngspice from the exact circuit for each design and rung."""
+    """Distance of ngspice from the exact circuit for each design and fidelity."""
     shown = [row for row in rows if "rungs" in row]
     figure = Figure(figsize=(9.0, 5.2), layout="constrained")
     ax = figure.subplots()
     marks = {"ideal": ("o", "#1f77b4"), "dynamic": ("s", "#ff7f0e"), "full": ("^", "#2ca02c")}
-    for rung, (mark, color) in marks.items():
+    for fidelity, (mark, color) in marks.items():
         for passed in (True, False):
             points = [
                 (k, said["rms"])
                 for k, row in enumerate(shown)
                 for name, said in row["rungs"].items()
-                if name == rung and said["passed"] is passed and said["rms"]
+                if name == fidelity and said["passed"] is passed and said["rms"]
             ]
             if points:
                 ax.plot(
@@ -68,12 +68,12 @@ def spice_picture(rows: Sequence[Row]) -> Figure:
                     mark,
                     color=color,
                     mfc=color if passed else "none",
-                    label=rung if passed else f"{rung}, not to be trusted",
+                    label=fidelity if passed else f"{fidelity}, not to be trusted",
                 )
     # At the top what has no wave to compare: nothing repeats, or no run came to an end.
     for k, row in enumerate(shown):
-        for place, (rung, (mark, color)) in enumerate(marks.items()):
-            said = row["rungs"].get(rung)
+        for place, (fidelity, (mark, color)) in enumerate(marks.items()):
+            said = row["rungs"].get(fidelity)
             if said is not None and not said["rms"]:
                 look = color if said["passed"] else "none"
                 at, high = [k + 0.25 * (place - 1)], [0.97]

@@ -20,10 +20,10 @@ from designer.circuit.nominal import circuit_flow, on_circuit
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import parse_model_file
 from designer.spice import convergence_aids, equation_check, numerics_gate
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.yields.study import plan_study
 
 MODEL: dict[str, Any] = {
@@ -35,10 +35,10 @@ CIRCUIT: dict[str, Any] = {
     "opamp": "TL074C", "resistors": "E12", "capacitors": "E6", "side_conditions": ["swing", "load"],
 }  # fmt: skip
 """With every side condition synthesis takes up to a minute at the ends of the domain."""
-FULL: tuple[Rung, ...] = ("ideal", "dynamic", "full")
+FULL: tuple[Fidelity, ...] = ("ideal", "dynamic", "full")
 LEVELS = 3
-"""Step sizes that the gate may try above the rung ``ideal``, of its five: a way to the orbit may
-take 400 periods there."""
+"""Step sizes that the gate may try above the fidelity ``ideal``, of its five: a way to the orbit
+may take 400 periods there."""
 BOARDS, SEED = 20, 77
 
 
@@ -52,7 +52,7 @@ class Case:
     omega: float
     model: dict[str, Any]
     circuit: dict[str, Any]
-    rungs: tuple[Rung, ...] = ("ideal", "dynamic")
+    fidelities: tuple[Fidelity, ...] = ("ideal", "dynamic")
     spread: float | None = None
 
     @property
@@ -153,7 +153,7 @@ def synthesis_only(case: Case) -> dict[str, Any]:
 
 
 def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
-    """The design on each rung: settings that pass the gate, remedies, distance from the exact
+    """The design at each fidelity: settings that pass the gate, remedies, distance from the exact
     circuit, and whether the netlist computes the equation."""
     made, row = synthesised(case)
     if made is None:
@@ -172,12 +172,12 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     found = equation_check.check(made.design, made.model_responses, pool)
     row["equation"] = {"passed": found.passed, "worst": str(found.worst)}
     row["rungs"] = {}
-    for rung in case.rungs:
-        levels = numerics_gate.LEVELS if rung == "ideal" else LEVELS
-        subject = numerics_gate.GateSubject(reduction, excitation, orbit, rung=rung)
+    for fidelity in case.fidelities:
+        levels = numerics_gate.LEVELS if fidelity == "ideal" else LEVELS
+        subject = numerics_gate.GateSubject(reduction, excitation, orbit, fidelity=fidelity)
         (result,) = numerics_gate.check(pool, [subject], levels)
-        row["rungs"][rung] = _of_gate(result)
-        if rung == "ideal" and result.passed and case.spread is not None:
+        row["rungs"][fidelity] = _of_gate(result)
+        if fidelity == "ideal" and result.passed and case.spread is not None:
             row["boards"] = _boards(made, response, orbit, excitation, result, pool)
     return row
 
@@ -211,7 +211,7 @@ def _boards(
     plan = plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=BOARDS, seed=SEED
     )
-    drawn = exact_rung.subjects(plan, range(BOARDS), 1)
+    drawn = exact_circuit.subjects(plan, range(BOARDS), 1)
     asked = [(a, s) for a, s in drawn if s is not None and s.orbit.status is OrbitStatus.PERIODIC]
     tasks = [numerics_gate.task(replace(s), result.settings, keep=True) for _, s in asked]
     said, waves, needed = ["not asked"] * len(asked), [], set()

@@ -20,7 +20,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.folders import design_files
 from designer.folders.model_source import source
 from designer.model.find_responses import matches
-from designer.verdicts.exact_rung import block
+from designer.verdicts.exact_circuit import block
 from designer.yields.study import plan_study
 
 

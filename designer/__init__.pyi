@@ -24,15 +24,15 @@ from .folders.design_source import (
 from .jobs.bifurcation_job import (
     BifurcationResult as BifurcationResult,
 )
-from .jobs.cure_job import (
-    CureResult as CureResult,
-    cure as cure,
-)
 from .jobs.export_job import (
     ExportResult as ExportResult,
 )
 from .jobs.job_outcome import (
     JobOutcome as JobOutcome,
+)
+from .jobs.repair_job import (
+    CureResult as CureResult,
+    cure as cure,
 )
 from .model.model import (
     Dimensionless as Dimensionless,

@@ -56,7 +56,7 @@ BLOCKS = "block-*.parquet"
 WORKED_ON = (".kicad_pcb", ".kicad_sch", ".kicad_pro", ".kicad_dru")
 """Endings of files that people go on working on."""
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
-"""Of every design; ``board_files.names`` has those of its board."""
+"""The files of every design; ``board_files.names`` has those of its board."""
 
 
 class Folder:
@@ -389,13 +389,13 @@ class Folder:
                 behind |= self._models(str(stored.get("model")), asked["model"])
             if "work" in asked and "work" in differ:
                 behind |= self._works(stage, asked["work"])
-        told = differences(stored, inputs, behind)
+        differing = differences(stored, inputs, behind)
         way = (
             "the same: --overwrite makes it anew with what is here now"
             if MADE_WITH.issuperset(differ)
             else "the same; or another folder, or --overwrite to replace what manifest.json lists"
         )
-        raise InputError(self / MANIFEST, f"stages.{stage}.inputs", f"a {stage} {told}", way)
+        raise InputError(self / MANIFEST, f"stages.{stage}.inputs", f"a {stage} {differing}", way)
 
     def _models(self, made: str, asked: str) -> dict[str, tuple[Any, Any]]:
         """The model file that a stage was made with, and another text of one. made : its hash."""

@@ -116,9 +116,9 @@ def to_png(figure: Figure, dpi: float = 160.0) -> bytes:
     return stream.getvalue()
 
 
-def picture(figure: Figure, form: str, dpi: float = 160.0) -> bytes:
+def picture(figure: Figure, file_format: str, dpi: float = 160.0) -> bytes:
     """The figure as a file of the form "svg" or "png"."""
-    return to_svg(figure).encode() if form == "svg" else to_png(figure, dpi)
+    return to_svg(figure).encode() if file_format == "svg" else to_png(figure, dpi)
 
 
 def _short(attribute: re.Match[str]) -> str:

@@ -42,15 +42,15 @@ TEXT = (
 @contextmanager
 def announced(say: Callable[[str], None]) -> Iterator[None]:
     """Calls ``say`` with one line when the first kernel of a part is compiled inside."""
-    told: set[str] = set()
+    announced_parts: set[str] = set()
 
     def tell(module: str | None) -> None:
         again()
         if module is None or not module.startswith("designer."):
             return
         part = PARTS.get(module.rpartition(".")[2], MOTION)
-        if part not in told:
-            told.add(part)
+        if part not in announced_parts:
+            announced_parts.add(part)
             say(TEXT.format(part=part))
 
     with _interruptible() as again, jit.compilation_watched(tell):

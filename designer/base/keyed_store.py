@@ -26,7 +26,7 @@ from designer.base.seal import BLANK, intact, sealed
 Entry = TypeVar("Entry")
 Made = TypeVar("Made")
 Note = Callable[[str], None]
-"""Told what a user ought to know, a line at a time."""
+"""Is told what a user ought to know, a line at a time."""
 Vouch = Callable[[str, bytes], bool]
 """Whether somebody else, such as a manifest, knows that a file of this name has this content."""
 SEAL = "seal"
@@ -35,7 +35,7 @@ DAMAGED = "damaged, computed again"
 LARGEST = 200_000_000
 """Bytes of a file of entries."""
 UNSEALED = "written without a checksum, computed again"
-"""By versions of the tool that had none."""
+"""Said of an entry that a version of the tool without checksums wrote."""
 
 
 def nobody(_name: str, _content: bytes) -> bool:
@@ -72,10 +72,10 @@ class KeyedStore(Generic[Entry]):
 
     root: Path
     """The folder."""
-    form: EntryCodec[Entry]
+    codec: EntryCodec[Entry]
     """How an entry is written."""
     note: Note = quiet
-    """Told of entries that are not taken."""
+    """Is told of entries that are not taken."""
     vouch: Vouch = nobody
     """Asked about entries without a seal."""
     put: Callable[[str, bytes], None] | None = None
@@ -115,7 +115,7 @@ class KeyedStore(Generic[Entry]):
             self._damaged(name, UNSEALED if state is None else DAMAGED)
             return None
         try:
-            head, value = self.form.decode(content)
+            head, value = self.codec.decode(content)
             made = make(value) if _answers(head, key) else None
         except (*UNREADABLE, InputError) as error:
             # The work of another request has other columns, or more of them: that is no damage.
@@ -144,7 +144,7 @@ class KeyedStore(Generic[Entry]):
         ------
         InputError : it cannot be written.
         """
-        content = sealed(self.form.encode({**key, **(more or {})}, value))
+        content = sealed(self.codec.encode({**key, **(more or {})}, value))
         if self.put is not None:
             self.put(name, content)
         else:
@@ -178,7 +178,7 @@ class Lines:
     name: str
     """Under which the entries stand in the object."""
     key: str
-    """Of the request, on every line."""
+    """The request's key, on every line."""
 
     def text(self, entries: Mapping[str, Mapping[str, Any]]) -> str:
         """The file, in ASCII. entries : plain data by name."""

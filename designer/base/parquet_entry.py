@@ -23,17 +23,17 @@ from designer.base.seal import BLANK
 HEAD, SEAL = b"designer", b"designer-seal"
 """Keys of the file's metadata."""
 MOST_ROWS = 10_000
-"""Of an entry, where its form does not say."""
+"""The most rows of an entry, where its codec does not say."""
 MOST_VALUES = 4_000_000
-"""Of all columns of an entry; each takes up to 40 bytes here."""
+"""The most values of an entry, over all columns; each takes up to 40 bytes here."""
 MOST_BYTES = 64_000_000
-"""Of an entry that is unpacked, and of all its texts written out."""
+"""The most bytes of an entry that is unpacked, and of all its texts written out."""
 _WRITER = "parquet-cpp-arrow"
 Rows = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class ParquetForm:
+class ParquetCodec:
     """Rows as mappings from column names to values (``keyed_store.EntryCodec``)."""
 
     schema: pa.Schema

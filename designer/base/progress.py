@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Show = Callable[[Mapping[str, Any]], None]
 """Takes an answer while the work goes on: of a design once its parts stand, of a study once the
 yields of the exact circuit stand, where ngspice is asked after that, and once all yields stand,
-where blame or maps take time after that."""
+where attribution or maps take time after that."""
 
 
 class _Quiet:

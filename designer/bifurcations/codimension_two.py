@@ -33,7 +33,7 @@ from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.points import PointKind
 
 APART = 1e-5
-"""In scaled units: step of the difference that gives the second derivative of the map."""
+"""The step, in scaled units, of the difference that gives the second derivative of the map."""
 ORDER = (
     PointKind.GRAZING,
     PointKind.FOLD,
@@ -41,19 +41,20 @@ ORDER = (
     PointKind.PITCHFORK,
     PointKind.TORUS,
 )
-"""In which the kinds that meet are named."""
+"""The order in which the kinds that meet are named."""
 SHORT = {PointKind.DOUBLING: "flip"}
 ENDS = ("degenerate grazing", "degenerate pitchfork", "degenerate period doubling")
-"""Those at which every curve ends."""
+"""The points of codimension two at which every curve ends."""
 FALLEN = 1e-7
-"""In scaled units: an orbit no farther than this from its partner has fallen together with it."""
+"""An orbit no farther than this from its partner, in scaled units, has fallen together with it."""
 
 HALVINGS, TRIES = 34, (5, 12)
-"""Of an interval in which counts change; after so many of them the point itself is tried for."""
+"""How often an interval in which counts change is halved; after so many halvings the point itself
+is tried for."""
 CORNER = 2e-2
-"""In scaled units: farthest from a curve's last point to the grazing that stops it."""
+"""The farthest, in scaled units, from a curve's last point to the grazing that stops it."""
 BESIDE = (1e-7, 1e-9)
-"""Of the displacement's peak: distances from a stop that lead on to the touch itself."""
+"""Distances from a stop, over the displacement's peak, that lead on to the grazing itself."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class CodimensionTwo:
 
     @property
     def values(self) -> tuple[float, float]:
-        """Of both parameters."""
+        """The values of both parameters."""
         return self.point.values
 
     def as_dict(self) -> dict[str, object]:
@@ -109,11 +110,11 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
     characteristic = np.polynomial.Polynomial(np.poly(p.jacobian)[::-1])
     out: dict[Event, float] = {}
     if isinstance(p.condition, Multiplier):
-        at, beside = p.condition.value, PointKind.FOLD if kind is not PointKind.FOLD else flip
+        at, other_kind = p.condition.value, PointKind.FOLD if kind is not PointKind.FOLD else flip
         # A half-period multiplier -1 twice is 1 twice in the period.
         name = "1:1 resonance" if at > 0.0 or system.symmetric else "1:2 resonance"
         out[name, PointKind.TORUS] = float(characteristic.deriv()(at))
-        out[meeting(kind, beside), beside] = float(characteristic(-at))
+        out[meeting(kind, other_kind), other_kind] = float(characteristic(-at))
         if kind is PointKind.FOLD:
             out["cusp", None] = _second_derivative(system, p, p.condition)
     elif isinstance(p.condition, MultiplierPair):
@@ -123,15 +124,15 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
         for name, off in _resonances(total, symmetric=system.symmetric).items():
             out[name, real.get(name)] = off
         others = p.condition.others(p.multipliers)
-        for value, beside in ((1.0, PointKind.FOLD), (-1.0, flip)):
-            out[meeting(kind, beside), beside] = float(np.prod(value - others).real)
+        for value, other_kind in ((1.0, PointKind.FOLD), (-1.0, flip)):
+            out[meeting(kind, other_kind), other_kind] = float(np.prod(value - others).real)
     elif isinstance(p.condition, Grazing):
         n = system.states
         phase = float(p.z[n])
         curvature = p.condition.curvature(system.flow(p.z), p.z[:n], phase)
         out["degenerate grazing", None] = curvature
-        for value, beside in ((1.0, PointKind.FOLD), (-1.0, flip)):
-            out[meeting(kind, beside), beside] = float(characteristic(value))
+        for value, other_kind in ((1.0, PointKind.FOLD), (-1.0, flip)):
+            out[meeting(kind, other_kind), other_kind] = float(characteristic(value))
     if not isinstance(p.condition, MultiplierPair):
         out[meeting(kind, PointKind.TORUS), PointKind.TORUS] = _pair(p)
     return out
@@ -178,8 +179,8 @@ def locate(
         if root is not None
     ]
     if not np.array_equal(a.impacts, b.impacts):
-        touched = _bisected(system, a, b)
-        out += [] if touched is None else [replace(touched, position=index + touched.position)]
+        grazed = _bisected(system, a, b)
+        out += [] if grazed is None else [replace(grazed, position=index + grazed.position)]
     return sorted(out, key=lambda c: c.position)
 
 
@@ -238,20 +239,20 @@ def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Codimensi
             high, beyond = middle, point
         if halving in TRIES:
             reach = 2.0 * (high - low) * system.distance(a.z, b.z)
-            if touched := _touching(system, found, reach):
-                return CodimensionTwo(name, touched[0], low, *touched[1:])
+            if grazed := _grazing_within(system, found, reach):
+                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
     if high - low >= 1e-6:
         # No point lies between them at a corner; it is smooth from the side that is clear.
         reach = 2.0 * (high - low) * system.distance(a.z, b.z)
         for p in (found, beyond):
-            if touched := _touching(system, p, reach):
-                return CodimensionTwo(name, touched[0], low, *touched[1:])
+            if grazed := _grazing_within(system, p, reach):
+                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
         return None
     grazing, phase = next(iter(_turning(system, found)), (None, 0.0))
     return CodimensionTwo(name, found, low, grazing, np.array([phase]))
 
 
-def _touching(
+def _grazing_within(
     system: ExtendedSystem, p: CurvePoint, reach: float
 ) -> tuple[CurvePoint, Grazing, Array] | None:
     """The point no farther than ``reach`` from p at which a turning point touches its stop, with
@@ -276,10 +277,10 @@ def _from_clear_of(
     if isinstance(p.condition, Grazing):
         return None
     n = system.states
-    _, touch = system.instead(p, grazing, np.array([phase]))
-    if touch is None:
+    _, turning = system.instead(p, grazing, np.array([phase]))
+    if turning is None:
         return None
-    near, extra = replace(p, z=np.delete(touch.z, n)), touch.z[n : n + 1]
+    near, extra = replace(p, z=np.delete(turning.z, n)), turning.z[n : n + 1]
     met = []
     for clear in BESIDE:
         found = system.meet(near, replace(grazing, clear=clear), extra)
@@ -297,11 +298,11 @@ def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> Codimensi
     has a corner, for beyond it the multipliers change with the square root of the penetration."""
     if isinstance(p.condition, Grazing):
         return None
-    touched = _touching(system, p, CORNER)
-    if touched is None:
+    grazed = _grazing_within(system, p, CORNER)
+    if grazed is None:
         return None
     name = meeting(p.condition.kind, PointKind.GRAZING)
-    return CodimensionTwo(name, touched[0], float(index + 1), *touched[1:])
+    return CodimensionTwo(name, grazed[0], float(index + 1), *grazed[1:])
 
 
 def _turning(system: ExtendedSystem, p: CurvePoint) -> list[tuple[Grazing, float]]:
@@ -335,7 +336,8 @@ def _falls_together(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) ->
 
 
 def _nearest_to_partner(system: ExtendedSystem, a: WatchedPoint, b: WatchedPoint) -> Root | None:
-    """Where they are one: the curve's equations are singular there, so by the secant alone."""
+    """The point where orbit and partner are one, by the secant alone: the curve's equations are
+    singular there."""
     one, other = (float(np.linalg.norm(p.partner)) for p in (a, b))
     share = one / (one + other)
     for shift in (0.0, 1e-4, -1e-4, 1e-2, -1e-2):

@@ -7,7 +7,7 @@
 - A pair of multipliers on the unit circle: the logarithm of its product. Product and sum of the
   pair are smooth also where it becomes real.
 - Grazing: the height of one turning point over its stop and its rate are zero
-  (``bifurcations.touch``); the phase of the turning point is a further unknown.
+  (``bifurcations.grazing_contact``); the phase of the turning point is a further unknown.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Protocol
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.bifurcations.grazing_contact import GrazingContact, height, height_along
 from designer.bifurcations.points import PointKind
-from designer.bifurcations.touch import StopTouch, height, height_along
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus
 from designer.dynamics.turning_points import turning_points_of
@@ -28,13 +28,14 @@ from designer.dynamics.turning_points import turning_points_of
 Jacobian = Callable[[], Array | None]
 """Gives the (states, states) Jacobian of the map in scaled units; None where the flow fails."""
 DIFFERENCE = 3e-8
-"""In scaled units: step of the differences."""
+"""The step of the differences, in scaled units."""
 CLEAR = 3e-12
-"""Of the displacement's peak: how far short of its stop a tip is held, and how far in it a dip. So
-the multipliers along the curve are those of the side that does not change with its square root."""
+"""How far short of its stop a tip is held, and how far in it a dip, over the displacement's
+peak. So the multipliers along the curve are those of the side that does not change with its
+square root."""
 
 SAME_PHASE = 1e-3
-"""In drive periods: turning points no farther apart are one."""
+"""Turning points no farther apart than this, in drive periods, are one."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class Condition(Protocol):
         ...
 
     def renewed(self, jacobian: Array) -> Condition:
-        """The same, set up at a point of the curve with this scaled Jacobian."""
+        """The condition, set up at a point of the curve with this scaled Jacobian."""
         ...
 
     def others(self, multipliers: Complex) -> Complex:
@@ -98,7 +99,7 @@ class Multiplier:
 
     @classmethod
     def at(cls, kind: PointKind, jacobian: Array) -> Multiplier:
-        """At a located point with this scaled Jacobian."""
+        """The condition, set up at a located point with this scaled Jacobian."""
         value = 1.0 if kind is PointKind.FOLD else -1.0
         left, _, right = np.linalg.svd(jacobian - value * np.eye(len(jacobian)))
         return cls(kind, value, left[:, -1], right[-1])
@@ -134,14 +135,14 @@ class Multiplier:
         return matrix
 
     def renewed(self, jacobian: Array) -> Multiplier:
-        """With this Jacobian's null vectors, turned as those before."""
+        """The condition with this Jacobian's null vectors, turned as those before."""
         new = Multiplier.at(self.kind, jacobian)
         left = new.left if new.left @ self.left >= 0.0 else -new.left
         right = new.right if new.right @ self.right >= 0.0 else -new.right
         return replace(self, left=left, right=right)
 
     def others(self, multipliers: Complex) -> Complex:
-        """All but the one nearest to ``value``."""
+        """All multipliers but the one nearest to ``value``."""
         return np.delete(multipliers, int(np.argmin(np.abs(multipliers - self.value))))
 
 
@@ -158,7 +159,7 @@ class MultiplierPair:
 
     @classmethod
     def at(cls, jacobian: Array) -> MultiplierPair:
-        """At a located point with this scaled Jacobian."""
+        """The condition, set up at a located point with this scaled Jacobian."""
         values = np.linalg.eigvals(jacobian).astype(complex)
         complex_ones = values[np.abs(values.imag) > 1e-9 * np.abs(values)]
         nearest = complex_ones[np.argmin(np.abs(np.abs(complex_ones) - 1.0))]
@@ -179,24 +180,24 @@ class MultiplierPair:
             change = image.change(direction)
             if change is None:
                 return None
-            beside = self._logarithm(image.jacobian + DIFFERENCE * change)
-            slopes.append((beside - begun) / DIFFERENCE)
+            shifted = self._logarithm(image.jacobian + DIFFERENCE * change)
+            slopes.append((shifted - begun) / DIFFERENCE)
         return np.array([slopes])
 
     def _logarithm(self, jacobian: Array) -> float:
-        """Of the modulus of the pair's product."""
+        """The logarithm of the modulus of the pair's product."""
         values = np.linalg.eigvals(jacobian).astype(complex)
         i, j = self._places(values)
         return float(np.log(abs(values[i] * values[j])))
 
     def renewed(self, jacobian: Array) -> MultiplierPair:
-        """With this Jacobian's pair."""
+        """The condition with this Jacobian's pair."""
         values = np.linalg.eigvals(jacobian).astype(complex)
         i, j = self._places(values)
         return replace(self, total=float((values[i] + values[j]).real))
 
     def others(self, multipliers: Complex) -> Complex:
-        """All but the pair."""
+        """All multipliers but the pair."""
         return np.delete(multipliers, self._places(multipliers))
 
     def _places(self, values: Complex) -> tuple[int, int]:
@@ -212,10 +213,10 @@ class MultiplierPair:
 
 @dataclass(frozen=True)
 class Grazing:
-    """A turning point touches a stop."""
+    """The condition that a turning point grazes a stop."""
 
-    touch: StopTouch
-    """Which of them touches which stop."""
+    contact: GrazingContact
+    """Which turning point grazes which stop."""
     n: int
     """Period of the orbit, in drive periods."""
     size: float
@@ -229,30 +230,30 @@ class Grazing:
 
     def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
         """(2,) height, and its rate by the phase, over the peak."""
-        found = height(flow, x, self.n, self.touch, float(extra[0]))
+        found = height(flow, x, self.n, self.contact, float(extra[0]))
         if found is None:
             return None
-        clear = self.clear if self.touch.tip else -self.clear
+        clear = self.clear if self.contact.tip else -self.clear
         return np.array([found[0] / self.size + clear, found[1] / self.size])
 
     def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
         """(2, states + 1) of height and rate, by the linearised flow."""
-        found = height_along(flow, x, self.n, self.touch, float(extra[0]), np.diag(image.scale))
+        found = height_along(flow, x, self.n, self.contact, float(extra[0]), np.diag(image.scale))
         if found is None:
             return None
         return np.column_stack([found[:2, 1:], found[1:, 0]]) / self.size
 
     def curvature(self, flow: Flow, x: Array, phase: float) -> float:
         """Second derivative of the height by the phase, over the peak; negative at a tip."""
-        found = height(flow, x, self.n, self.touch, phase)
+        found = height(flow, x, self.n, self.contact, phase)
         return float("nan") if found is None else float(found[2]) / self.size
 
     def renewed(self, jacobian: Array) -> Grazing:
-        """The same: nothing is set up."""
+        """The condition itself: it has nothing to set up."""
         return self
 
     def others(self, multipliers: Complex) -> Complex:
-        """All."""
+        """All multipliers: grazing binds none."""
         return multipliers
 
 
@@ -267,16 +268,16 @@ class Both:
 
     @property
     def kind(self) -> PointKind:
-        """The first one's."""
+        """The kind of the first condition."""
         return self.first.kind
 
     @property
     def unknowns(self) -> int:
-        """The first one's, then the second one's."""
+        """The unknowns of the first condition, then those of the second."""
         return self.first.unknowns + self.second.unknowns
 
     def residual(self, flow: Flow, x: Array, extra: Array, jacobian: Jacobian) -> Array | None:
-        """Those of both, one after the other."""
+        """The residuals of both conditions, one after the other."""
         split = self.first.unknowns
         parts = [
             self.first.residual(flow, x, extra[:split], jacobian),
@@ -286,7 +287,8 @@ class Both:
         return np.concatenate(held) if len(held) == 2 else None
 
     def slopes(self, flow: Flow, x: Array, extra: Array, image: MapSlopes) -> Array | None:
-        """Those of both, each in the columns of the state and of its own unknowns."""
+        """The slopes of both conditions, each in the columns of the state and of its own
+        unknowns."""
         n, split = len(x), self.first.unknowns
         one = self.first.slopes(flow, x, extra[:split], image)
         other = self.second.slopes(flow, x, extra[split:], image)
@@ -298,11 +300,11 @@ class Both:
         return out
 
     def renewed(self, jacobian: Array) -> Both:
-        """Both, set up at a point."""
+        """Both conditions, set up at a point."""
         return Both(self.first.renewed(jacobian), self.second.renewed(jacobian))
 
     def others(self, multipliers: Complex) -> Complex:
-        """Those that the first does not bind."""
+        """The multipliers that the first condition does not bind."""
         return self.first.others(multipliers)
 
 
@@ -324,20 +326,22 @@ def grazings(
     for t in near:
         if symmetric and t.phase >= 0.5 * n:
             continue
-        touch = StopTouch(t.clearance, t.side, t.tip)
+        contact = GrazingContact(t.clearance, t.side, t.tip)
         if but is None or not _is_same(
-            touch, t.phase, *but, mirrored=flow.system.mirror is not None
+            contact, t.phase, *but, mirrored=flow.system.mirror is not None
         ):
-            out.append((Grazing(touch, n, float(spans[t.clearance])), t.phase))
+            out.append((Grazing(contact, n, float(spans[t.clearance])), t.phase))
     return out
 
 
-def _is_same(touch: StopTouch, phase: float, other: Grazing, at: float, *, mirrored: bool) -> bool:
+def _is_same(
+    contact: GrazingContact, phase: float, other: Grazing, at: float, *, mirrored: bool
+) -> bool:
     """Whether two turning points are one, or mirror images of each other on a symmetric orbit."""
-    if (touch.clearance, touch.tip) != (other.touch.clearance, other.touch.tip):
+    if (contact.clearance, contact.tip) != (other.contact.clearance, other.contact.tip):
         return False
     n = other.n
-    shift = 0.0 if touch.side == other.touch.side else 0.5 * n
+    shift = 0.0 if contact.side == other.contact.side else 0.5 * n
     if shift and not mirrored:
         return False
     off = (phase - at - shift) % n

@@ -25,19 +25,19 @@ from designer.bifurcations.codimension_two import CodimensionTwo
 from designer.bifurcations.conditions import Condition, Grazing, Multiplier, MultiplierPair
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.flow_family import FlowPlane
+from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, followed, system_at
 from designer.bifurcations.points import PointKind
-from designer.bifurcations.touch import StopTouch
 from designer.dynamics.counts import Counts
 
 CRITICAL = 1e-4
 """How far outside the unit circle a multiplier may lie that counts as one on it: two that are one
 at a resonance are known to the square root of their product's error."""
 DEPTHS = (1e-5, 1e-4, 1e-6)
-"""Of the displacement's peak: how far clear of its stop a turning point is, where the tangent of a
-curve that ends at grazing is taken; the differences of the derivatives do not reach the stop."""
+"""How far clear of its stop a turning point is, over the displacement's peak, where the tangent of
+a curve that ends at grazing is taken; the differences of the derivatives do not reach the stop."""
 ASIDE = 1e-4
-"""In scaled units: how far along the tangent it is seen on which side a pair is complex."""
+"""How far along the tangent, in scaled units, it is seen on which side a pair is complex."""
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,20 @@ class OtherCurve:
     symmetric: bool
     """Whether the curve's orbits are symmetric ones, found by the half-period map."""
     values: tuple[float, float]
-    """Of both parameters."""
+    """The values of both parameters."""
     state: tuple[float, ...]
     """(states,) at the strobe."""
     stable: bool
     """Whether no multiplier lies outside the unit circle, so that a stable orbit may lie near."""
-    touch: StopTouch | None = None
-    """The turning point that touches a stop, of one of the two curves; None where none does."""
+    touch: GrazingContact | None = None
+    """The turning point of one of the two curves that grazes a stop; None where none does."""
     phase: float = 0.0
-    """Of that turning point, in drive periods after the strobe."""
+    """The phase of that turning point, in drive periods after the strobe."""
     size: float = 0.0
     """Peak of the displacement in its clearance."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
+        """The curve as plain data for JSON."""
         touch = None
         if self.touch is not None:
             touch = {
@@ -103,7 +103,7 @@ def read_other_curve(
     }
     if (t := row["touch"]) is not None:
         touch = {key: t[key] for key in ("clearance", "side", "tip")}
-        fields["touch"] = checked_record(StopTouch, touch)
+        fields["touch"] = checked_record(GrazingContact, touch)
         fields |= {"phase": t["phase"], "size": t["size"]}
     return checked_record(OtherCurve, fields)
 
@@ -119,13 +119,13 @@ def other_curve(system: ExtendedSystem, c: CodimensionTwo) -> OtherCurve | None:
         c.other.kind, system.n, system.symmetric, p.values, tuple(p.z[:n].tolist()), stable
     )
     if isinstance(c.other, Grazing):
-        return _touching(plain, c.other, float(c.extra[0]))
+        return _with_grazing(plain, c.other, float(c.extra[0]))
     own = p.condition
-    return _touching(plain, own, float(p.z[n])) if isinstance(own, Grazing) else plain
+    return _with_grazing(plain, own, float(p.z[n])) if isinstance(own, Grazing) else plain
 
 
-def _touching(plain: OtherCurve, grazing: Grazing, phase: float) -> OtherCurve:
-    return replace(plain, touch=grazing.touch, phase=phase, size=grazing.size)
+def _with_grazing(plain: OtherCurve, grazing: Grazing, phase: float) -> OtherCurve:
+    return replace(plain, touch=grazing.contact, phase=phase, size=grazing.size)
 
 
 def switched(
@@ -175,7 +175,7 @@ def _is_end(name: str) -> bool:
 
 
 def _condition(start: OtherCurve, jacobian: Array, name: str, grazing: Grazing | None) -> Condition:
-    """The other curve's, at the point."""
+    """The condition of the other curve, set up at the point."""
     if start.kind is PointKind.GRAZING:
         assert grazing is not None
         return grazing

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from designer.bifurcations.windows import BranchWindow, WindowEnd
 
-TOUCH = 1e-9
-"""Of the parameter: two windows nearer than this follow upon one another."""
+ADJACENT = 1e-9
+"""Two windows that are nearer than this, over the parameter's value, follow upon one another."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Cascade:
         return " → ".join(words)
 
     def as_dict(self) -> dict[str, object]:
-        """Plain, for JSON."""
+        """The cascade as plain data for JSON."""
         return {"down": self.down, "windows": [w.as_dict() for w in self.steps]}
 
 
@@ -46,7 +46,7 @@ def cascade(windows: Sequence[BranchWindow], first: BranchWindow, *, down: bool 
     steps = [first]
     while True:
         at = (steps[-1].low if down else steps[-1].high).value
-        near = TOUCH * abs(at)
+        near = ADJACENT * abs(at)
         after = [
             w
             for w in windows

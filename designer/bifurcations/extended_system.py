@@ -27,12 +27,12 @@ NEWTON = 14
 MOST_FLOWS = 8
 """Flows that are kept."""
 FARTHEST = 1.0
-"""In scaled units: longest step of Newton's method."""
+"""The longest step of Newton's method, in scaled units."""
 SLOW = 0.3
 """An iteration that leaves more of the residual than this has the derivatives computed anew."""
 ASTRAY = 0.5
-"""Of the distance between two neighbouring points: the most that the curve between them lies off
-its interpolation."""
+"""The most that a curve lies off its interpolation, over the distance between the two neighbouring
+points."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class CurvePoint:
 
     @property
     def values(self) -> tuple[float, float]:
-        """Of both parameters."""
+        """The values of both parameters."""
         return float(self.z[-2]), float(self.z[-1])
 
     @property
@@ -65,7 +65,7 @@ class CurvePoint:
         return np.linalg.eigvals(self.jacobian).astype(complex)
 
     @property
-    def stable_beside(self) -> bool:
+    def stable_aside(self) -> bool:
         """Whether the orbit is stable on one side of the curve: all multipliers but those that the
         condition binds lie inside the unit circle."""
         others = self.condition.others(self.multipliers)
@@ -183,13 +183,14 @@ class ExtendedSystem:
     def _solve(
         self, guess: Array, border: Array, condition: Condition, along: Array
     ) -> CurvePoint | None:
-        """With border (k, unknowns), k as many rows as the equations are short of."""
+        """The point that solves the equations with a border (k, unknowns) of as many rows as they
+        are short of; None where Newton's method finds none."""
         z = centre = np.array(guess, dtype=float)
         value = self._value(z, condition)
         if value is None:
             return None
         rows = self._derivatives(z, value, condition)
-        fresh = True
+        derived = True
         for iteration in range(1, NEWTON + 1):
             if rows is None:
                 return None
@@ -209,17 +210,17 @@ class ExtendedSystem:
                 return None
             left = float(np.abs(after.gap).max())
             if left > SLOW * error:
-                if fresh and left > 0.5 * error and error < STALLED:
+                if derived and left > 0.5 * error and error < STALLED:
                     return _point(z, value, rows, condition, iteration, along, error)
                 if left < FARTHEST:
                     z, value = new, after
-                elif fresh:
+                elif derived:
                     return None
-                rows, fresh = self._derivatives(z, value, condition), True
+                rows, derived = self._derivatives(z, value, condition), True
                 continue
             change = after.gap - value.gap - rows @ step
             rows = rows + np.outer(change, step) / float(step @ step)
-            z, value, fresh = new, after, False
+            z, value, derived = new, after, False
         return None
 
     def between(self, a: CurvePoint, b: CurvePoint, share: float) -> CurvePoint | None:
@@ -263,13 +264,13 @@ class ExtendedSystem:
             return None
         rows[n:, : total - 2] = slopes
         for i in (total - 2, total - 1):
-            beside = z.copy()
-            beside[i] += DIFFERENCE * self.scale[i]
+            shifted = z.copy()
+            shifted[i] += DIFFERENCE * self.scale[i]
             sign = 1.0
-            if not self.plane.contains(float(beside[-2]), float(beside[-1])):
+            if not self.plane.contains(float(shifted[-2]), float(shifted[-1])):
                 sign = -1.0
-                beside[i] = z[i] - DIFFERENCE * self.scale[i]
-            after = self._value(beside, condition)
+                shifted[i] = z[i] - DIFFERENCE * self.scale[i]
+            after = self._value(shifted, condition)
             if after is None:
                 return None
             rows[:, i] = (after.gap - value.gap) / (sign * DIFFERENCE)
@@ -277,9 +278,9 @@ class ExtendedSystem:
 
     def _change(self, z: Array, value: _Value, direction: Array) -> Array | None:
         """Derivative of the scaled Jacobian at z along a direction of the scaled states."""
-        beside, n = z.copy(), self.states
-        beside[:n] += DIFFERENCE * self.scale[:n] * direction
-        image = self.image(beside)
+        shifted, n = z.copy(), self.states
+        shifted[:n] += DIFFERENCE * self.scale[:n] * direction
+        image = self.image(shifted)
         return None if image is None else (image.jacobian - value.jacobian) / DIFFERENCE
 
 

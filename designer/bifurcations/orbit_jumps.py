@@ -24,9 +24,9 @@ SUDDEN = 3.0
 """Times the change of the steps before and after: less is no jump. Near a fold an orbit changes as
 the square root of the distance, at most 2.4 times as much in the last step as in the one before."""
 SEEN = 1e-3
-"""Of the greatest displacement: a change that is less is no jump."""
+"""A change that is less than this share of the greatest displacement is no jump."""
 SAME = 1e-6
-"""Of the peak: how near two states of one orbit lie."""
+"""How near two states of one orbit lie, over the peak."""
 
 
 def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]) -> list[int]:
@@ -45,10 +45,12 @@ def jumps(family: Family, values: Sequence[float], steps: Sequence[SteadyMotion]
         if steps[first].n and end - first >= LEAST_RUN:
             changes = [_change(*steps[k - 1 : k + 1]) for k in range(first + 1, end)]
             for place, change in enumerate(changes):
-                beside = max(changes[max(place - 1, 0) : place] + changes[place + 1 : place + 2])
+                neighbours = max(
+                    changes[max(place - 1, 0) : place] + changes[place + 1 : place + 2]
+                )
                 k = first + 1 + place
                 a, b = (values[k - 1], steps[k - 1]), (values[k], steps[k])
-                if change > max(SEEN, SUDDEN * beside) and goes_on(family, a, b) is False:
+                if change > max(SEEN, SUDDEN * neighbours) and goes_on(family, a, b) is False:
                     out.append(k)
         first = end
     return out

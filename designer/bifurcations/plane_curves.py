@@ -33,15 +33,15 @@ FIRST, LEAST, GREATEST = 5e-3, 1e-7, 2e-2
 TURN = 0.97
 """Cosine of the most that the tangent may turn in one step."""
 OFF = 0.25
-"""Of a step: the most that a point may lie off where it was aimed at."""
+"""The most that a point may lie off where it was aimed at, over the step."""
 POINTS = 1500
 """Most points of one curve in one direction."""
 CAME_BACK = 1e-4
-"""In scaled units: a first point that lies so near the way between two others closes the curve."""
+"""A first point that lies so near the way between two others, in scaled units, closes the curve."""
 
 
 AT_ORIGIN = 1e-5
-"""In scaled units: a point of codimension two that lies so near to one that a curve was begun at,
+"""A point of codimension two that lies so near, in scaled units, to one that a curve was begun at,
 and has its name, is that one."""
 
 
@@ -76,12 +76,12 @@ class PlaneCurve:
     response: str
     """The response at the point that it was begun at, as "n-p-q"."""
     points: tuple[CurvePoint, ...]
-    """In order of arclength."""
+    """The points in order of arclength."""
     ends: tuple[str, str]
     """Why it stops at its first and at its last point: "edge of b" (a side of the window), "closes
     on itself", "no convergence", "most points", or the name of a point of codimension two."""
     codimension_two: tuple[CodimensionTwo, ...]
-    """In order of arclength."""
+    """The points in order of arclength."""
     begun: int = 0
     """Number of the point that it was begun at."""
 
@@ -92,8 +92,8 @@ class PlaneCurve:
 
     @property
     def stable(self) -> tuple[bool, ...]:
-        """For each point, whether the orbit is stable on one side of the curve."""
-        return tuple(p.stable_beside for p in self.points)
+        """Whether the orbit is stable on one side of the curve, for each point."""
+        return tuple(p.stable_aside for p in self.points)
 
 
 def continued(
@@ -228,7 +228,7 @@ def _follow(
     begun_at: str,
     progress: Callable[[], None],
 ) -> _Followed:
-    """From the origin on in the direction of its tangent."""
+    """The curve from the origin on, in the direction of its tangent."""
     points, met = [origin], list[CodimensionTwo]()
     current = watched(system, origin)
     step, end = FIRST, "most points"

@@ -34,7 +34,7 @@ ROUNDING = 1e-11
 """Of the parameter's size: no error is stated below it. Where an orbit stalled before
 ``orbit_curve.CONVERGED`` of its peak, as many times more."""
 ZERO = 1e-3
-"""Of its values on either side: a test function that is more than this at its root jumped."""
+"""A test function that is more than this at its root, over its values on either side, jumped."""
 
 
 class PointKind(StrEnum):
@@ -71,7 +71,7 @@ class Birth:
 
 
 SIDES = {1: "above", -1: "below"}
-"""Of a value of the parameter."""
+"""The words for the sides of a value of the parameter."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +159,10 @@ def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
             if located is not None:
                 points.append(located)
     points.sort(key=lambda p: p.position)
-    return [_beside(branch, point, points) for point in points]
+    return [_with_sides(branch, point, points) for point in points]
 
 
-def _beside(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bifurcation:
+def _with_sides(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bifurcation:
     """A point with the branch's responses and stability right beside it.
 
     Those are the neighbouring points' of the branch, unless something else happens before them, or
@@ -170,7 +170,7 @@ def _beside(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bif
     """
     index = int(point.position)
     ends = branch.points[index], branch.points[index + 1]
-    beside = []
+    neighbours = []
     for k, end in enumerate(ends):
         others = [
             p.position
@@ -184,8 +184,8 @@ def _beside(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bif
             share = 0.5 * (edge + point.position) - index
             solved = branch.curve.between(ends[0].solved, ends[1].solved, share)
             neighbour = None if solved is None else at(branch.curve, solved)
-        beside.append(end if neighbour is None else neighbour)
-    a, b = beside
+        neighbours.append(end if neighbour is None else neighbour)
+    a, b = neighbours
     return replace(point, before=a.response, after=b.response, stable=(a.stable, b.stable))
 
 

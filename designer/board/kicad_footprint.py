@@ -290,9 +290,9 @@ def _pad(
 ) -> Expression:
     hole = pad.drill > 0.0
     bare = not hole and pad.width == pad.height
-    form = "rect" if pad.first else "circle" if hole or bare else "roundrect"
+    shape = "rect" if pad.first else "circle" if hole or bare else "roundrect"
     if hole and pad.width != pad.height and not pad.first:
-        form = "oval"
+        shape = "oval"
     layers = ["*.Cu", "*.Mask"] if hole else ["F.Cu", "F.Mask"]
     if not hole and not bare:
         layers.append("F.Paste")
@@ -301,13 +301,13 @@ def _pad(
         "pad",
         pad.number,
         word("np_thru_hole" if not pad.plated else "thru_hole" if hole else "smd"),
-        word(form),
+        word(shape),
         at=_at(pad.x, pad.y, angle),
         size=(pad.width, pad.height),
         drill=pad.drill if hole else None,
         layers=tuple(layers),
         remove_unused_layers=False if hole and pad.plated else None,
-        roundrect_rratio=ROUND if form == "roundrect" else None,
+        roundrect_rratio=ROUND if shape == "roundrect" else None,
         solder_mask_margin=pad.margin or None,
         clearance=pad.margin or None,
         net=(nets[net], net) if nets is not None and net else None,

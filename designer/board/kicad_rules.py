@@ -108,14 +108,14 @@ def board_rules(
 
     conductors, leads = spacing(2.0 * circuit.supply)
     clearance = limit("clearance", max(conductors, MADE))
-    beside = limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"]))
+    summing_clearance = limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"]))
     pads, width = limit("pad-clearance", max(leads, MADE)), limit("supply-width")
     summing = tuple(dict.fromkeys(kicad_net(s.inverting) for s in circuit.sections))
     rails = (POSITIVE, NEGATIVE, GROUND, *circuit.supply_inputs)
     supply = tuple(kicad_net(net) for net in rails)
     return (
         rule("clearance", "clearance", clearance),
-        rule("summing-clearance", "clearance", beside, summing),
+        rule("summing-clearance", "clearance", summing_clearance, summing),
         rule("pad-clearance", "clearance", pads, (), "A.Type == 'Pad' && B.Type == 'Pad'"),
         rule("component-spacing", "courtyard_clearance", limit("component-spacing")),
         rule("summing-length", "length", limit("summing-length"), summing),

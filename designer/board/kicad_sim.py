@@ -1,6 +1,6 @@
 """What the sheet needs to be simulated: fields of the symbols, a library, directives.
 
-The models are those of the deck's rung ``ideal``. An op-amp is one subcircuit for its whole
+The models are those of the deck's fidelity ``ideal``. An op-amp is one subcircuit for its whole
 package, whose pins are those of the case.
 """
 
@@ -86,7 +86,7 @@ def models(circuit: Circuit, components: Sequence[Component], run: FirstRun) -> 
                 opamp_model.instance(
                     name,
                     (pins["+"], pins["-"], pins["OUT"]),
-                    rung="ideal",
+                    fidelity="ideal",
                     vos=0.0,
                     ib=board.bias.get(name, circuit.bias),
                     rails=board.rails.get(name, limits),

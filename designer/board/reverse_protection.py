@@ -54,9 +54,9 @@ def _drop(entry: SupplyDiodeEntry, circuit: Circuit, catalog: Catalog) -> float:
     if drop is None:
         text = format_quantity(current, "A")
         raise InputError(None, KEY, entry.name, f"a diode for the {text} that the op-amps draw")
-    across, stands = 2.0 * circuit.supply + drop, entry.reverse_voltage.nominal
-    if stands < across:
-        found = f"{entry.name}, for {stands:g} V"
+    across, reverse_voltage = 2.0 * circuit.supply + drop, entry.reverse_voltage.nominal
+    if reverse_voltage < across:
+        found = f"{entry.name}, for {reverse_voltage:g} V"
         expected = f"a diode for {across:g} V in reverse, twice the supply"
         raise InputError(None, KEY, found, expected)
     return drop

@@ -1,4 +1,5 @@
-"""The diode's curve from the figures of a data sheet: a drop for the exact rung, a card for SPICE.
+"""The diode's curve from the figures of a data sheet: a drop for the exact circuit, a card for
+SPICE.
 
     i = saturation_current · (exp(u/(emission · Vt)) - 1),  u the voltage less i · resistance
 
@@ -73,7 +74,7 @@ class DiodeModel:
 
     @property
     def drop(self) -> float:
-        """The constant forward voltage [V] of the exact rung."""
+        """The constant forward voltage [V] of the exact circuit."""
         return self.forward(WORKING_CURRENT)
 
 

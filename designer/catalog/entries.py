@@ -186,7 +186,7 @@ class OpAmp(CatalogEntry):
     phase_reversal: Annotated[bool, flag()] = False
     """Whether the output goes high when an input falls below the common-mode range."""
     spice: Annotated[VendorModel | None, vendor_model()] = None
-    """A vendor's model, used instead of ours on the finest rung."""
+    """A vendor's model, used instead of ours at the finest fidelity."""
     # What no simulation knows of stays out of repr, which is part of what a study is known by.
     input_current: Annotated[Figure | None, fields.figure("A")] = field(default=None, repr=False)
     """Absolute maximum of the current into an input [A]; None where no sheet gives it."""

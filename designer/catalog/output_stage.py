@@ -1,5 +1,5 @@
-"""How far an op-amp's output reaches, by its load: one statement for every rung, the synthesis and
-the report.
+"""How far an op-amp's output reaches, by its load: one statement for every fidelity, the synthesis
+and the report.
 
 An output at its limit is a voltage behind a resistance, both from the data sheet's swings into
 10 kΩ and into 2 kΩ. Beyond 10 kΩ no data sheet has a figure; that Ohm's law goes on is assumed.
@@ -26,7 +26,7 @@ class OutputStage:
     load: float | None
     """The load [ohm] that it is reached into; None: each output's own, whatever that is."""
     resistance: float
-    """By which the limit falls with the current [ohm]."""
+    """The resistance by which the limit falls with the current [ohm]."""
     source: str
     """Where the limit is from: "stated", "data sheet" or "assumed"."""
 

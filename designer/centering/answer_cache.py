@@ -23,9 +23,9 @@ FORMAT = 2
 
 
 class AnswerCache:
-    """Answers by key.
+    """The answers of a search by key, in a file.
 
-    path : the file that holds them; None: memory alone. whose : names the search; the file of
+    path : the file that holds them; None: memory alone. search : names the search; the file of
     another search is not read. note : called with a message where lines are damaged.
 
     Raises
@@ -33,8 +33,8 @@ class AnswerCache:
     InputError : the file cannot be read or written.
     """
 
-    def __init__(self, path: Path | None = None, whose: str = "", note: Note = quiet) -> None:
-        self._path, self._whose, self._note = path, whose, note
+    def __init__(self, path: Path | None = None, search: str = "", note: Note = quiet) -> None:
+        self._path, self._search, self._note = path, search, note
         self._known: dict[str, tuple[int, ...]] = {}
         self.wanted = 0
         """How many answers were wanted, from the file or new."""
@@ -53,7 +53,7 @@ class AnswerCache:
         these numbers, which no earlier call or run has answered. most : greatest value of each
         number of an answer; a stored one that is none, or has others, is computed again.
         """
-        keys = [_key(self._whose, one) for one in queries]
+        keys = [_key(self._search, one) for one in queries]
         new = [k for k, key in enumerate(keys) if not _may_be(self._known.get(key), most)]
         self.wanted += len(keys)
         if new:
@@ -84,7 +84,7 @@ class AnswerCache:
             write(path, self._text(list(self._known.items())))
 
     def _head(self) -> list[Any]:
-        return [{"format": FORMAT, "search": self._whose}]
+        return [{"format": FORMAT, "search": self._search}]
 
     def _text(self, answers: Iterable[tuple[str, tuple[int, ...]]]) -> str:
         lines = [self._head(), *([key, list(ok)] for key, ok in answers)]
@@ -129,6 +129,6 @@ def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
         return None
 
 
-def _key(whose: str, query: Any) -> str:
-    text = json.dumps([whose, query], sort_keys=True)
+def _key(search: str, query: Any) -> str:
+    text = json.dumps([search, query], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()[:24]

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import OperatingOrbit, ScaledBoards
-from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement, agreements
+from designer.centering.ngspice_check import BOARDS_ASKED, STRETCH, Agreement, agreements
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.verdicts.verdict import Verdict, judge
 
 BANDWIDTH = "bandwidth"
-"""Name of the rung."""
+"""Name of the fidelity that is asked."""
 
 
 class LaggingBoards:
@@ -27,15 +27,17 @@ class LaggingBoards:
     def __call__(
         self,
         bench: ScaledBoards,
-        stands: Sequence[OperatingOrbit | None],
+        operating_orbits: Sequence[OperatingOrbit | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
         """Agreement of each response with the exact circuit; see `ngspice_check.agreements`."""
-        return agreements(self._memory, bench, stands, (BANDWIDTH,), _counted, progress)
+        return agreements(self._memory, bench, operating_orbits, (BANDWIDTH,), _counted, progress)
 
 
-def _counted(bench: ScaledBoards, stand: OperatingOrbit, _: Sequence[int]) -> list[tuple[int, ...]]:
-    orbits = bench.lagging(stand, range(LISTENED), STRETCH)
-    verdicts = [judge(orbit, stand.spec, stand.orbit)[0] for orbit in orbits]
+def _counted(
+    bench: ScaledBoards, operating_orbit: OperatingOrbit, _: Sequence[int]
+) -> list[tuple[int, ...]]:
+    orbits = bench.lagging(operating_orbit, range(BOARDS_ASKED), STRETCH)
+    verdicts = [judge(orbit, operating_orbit.spec, operating_orbit.orbit)[0] for orbit in orbits]
     unanswered = sum(v in (Verdict.GRAZING, Verdict.FAILED) for v in verdicts)
     return [(len(orbits), verdicts.count(Verdict.OK), unanswered)]

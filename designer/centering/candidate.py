@@ -18,9 +18,10 @@ from designer.model.response_table import Response
 MISSING = -30.0
 """Standard deviations, further than any response that is there may stand."""
 ALIKE = 0.05
-"""Standard deviations: distances that differ by less are equal; so few boards tell no more."""
+"""Standard deviations: reliability indices that differ by less are equal; so few boards tell no
+more."""
 GAIN = 1e-3
-"""Of the product of the predicted yields: what is worth moving a lever for."""
+"""The least gain in the product of the predicted yields that is worth moving a lever for."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Candidate:
     model_responses: tuple[ModelResponse, ...]
     """The design's responses at their operating points, and what the model shows there."""
     scored: tuple[Scored, ...]
-    """For each response, its operating point with what boards showed there."""
+    """The operating point of each response, with what boards showed there."""
 
     @property
-    def distances(self) -> tuple[float, ...]:
-        return tuple(s.distance for s in self.scored)
+    def reliability_indices(self) -> tuple[float, ...]:
+        return tuple(s.reliability_index for s in self.scored)
 
     @property
     def wanted(self) -> tuple[Response, ...]:
@@ -47,10 +48,10 @@ class Candidate:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """The smallest distance; the logarithm of the product of the predicted yields, in which a
-        response that the nominal board does not show counts as one ``MISSING`` away."""
-        logs = [float(log_ndtr(max(d, MISSING))) for d in self.distances]
-        return min(self.distances), sum(logs)
+        """The smallest reliability index; the logarithm of the product of the predicted yields, in
+        which a response that the nominal board does not show counts as one ``MISSING`` away."""
+        logs = [float(log_ndtr(max(d, MISSING))) for d in self.reliability_indices]
+        return min(self.reliability_indices), sum(logs)
 
 
 @dataclass(frozen=True)
@@ -85,24 +86,24 @@ class Contribution:
     """Rank of the final design with this lever moved back; None where there is no such design."""
     by: str = "exact"
     """Who moved it: the ``exact`` circuit's boards, or op-amps that take time, ``bandwidth`` or
-    ``ngspice``, whose reason no exact distance shows."""
+    ``ngspice``, whose reason no reliability index of the exact circuit shows."""
 
 
 @dataclass(frozen=True)
-class RungOutcome:
+class FidelityOutcome:
     """How op-amps that take time agree with the exact circuit about a design."""
 
-    rung: str
+    fidelity: str
     """Who was asked: the exact circuit with ``bandwidth``, or ngspice's ``dynamic``."""
     frequency: float
     """Frequency at ω = 1 [Hz]."""
     agreements: tuple[Agreement, ...]
-    """By response, how many boards show it on both."""
+    """How many boards show each response on both."""
     adopted: bool = False
     """Whether this design was chosen."""
 
     @property
-    def stands(self) -> bool:
+    def holds(self) -> bool:
         """Whether no response is shown to be lost."""
         return not any(a.borne_out is False for a in self.agreements)
 
@@ -121,11 +122,11 @@ class SearchResult:
     """The levers that were tried, in order."""
     contributions: tuple[Contribution, ...]
     """What each lever that moved is worth."""
-    checks: tuple[RungOutcome, ...]
+    checks: tuple[FidelityOutcome, ...]
     """What op-amps that take time make of the design and slower ones, in the order in which they
     were asked; empty where ngspice was not to be asked."""
     windows: tuple[tuple[Stretch, ...], ...]
-    """By response, the stretches where it is shown."""
+    """The stretches where the model shows each response."""
     candidates: int
     """Number of designs that were made."""
     places: int

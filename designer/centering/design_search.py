@@ -1,7 +1,7 @@
 """The design that real parts cannot spoil: parts and places with the highest predicted yield.
 
-Over all wanted responses, in this order: the smallest of their distances from being lost
-(``centering.distance``), hence the smallest predicted yield; where two designs agree in it,
+Over all wanted responses, in this order: the smallest of their reliability indices
+(``centering.scaled_sigma``), hence the smallest predicted yield; where two designs agree in it,
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
 responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
@@ -28,12 +28,11 @@ from designer.centering.bandwidth_check import BANDWIDTH, LaggingBoards
 from designer.centering.candidate import (
     Candidate,
     Contribution,
-    RungOutcome,
+    FidelityOutcome,
     SearchResult,
     Step,
     better,
 )
-from designer.centering.distance import ScaledBoards
 from designer.centering.levers import (
     LEVERS,
     PLACES,
@@ -43,9 +42,10 @@ from designer.centering.levers import (
     topologies,
     variants,
 )
-from designer.centering.ngspice_check import LISTENED, RUNG, Listen
+from designer.centering.ngspice_check import BOARDS_ASKED, FIDELITY, AskAgreement
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, Stretch, open_in, stretches
+from designer.centering.scaled_sigma import ScaledBoards
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses
@@ -68,14 +68,15 @@ def search(
     jobs: int = 1,
     memory: AnswerCache | None = None,
     windows: Sequence[tuple[Stretch, ...]] | None = None,
-    listen: Listen | None = None,
+    ask_agreement: AskAgreement | None = None,
     progress: Progress | None = None,
 ) -> SearchResult:
     """Seek the design and the places of the highest predicted yield.
 
     seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
-    search of the same. windows : of ``look``, if they are known. listen : asks ngspice whether it
-    bears a design out (``ngspice_check.AgreementCheck``); the exact circuit alone decides if None.
+    search of the same. windows : of ``look``, if they are known. ask_agreement : asks ngspice
+    whether it bears a design out (``ngspice_check.AgreementCheck``); the exact circuit alone
+    decides if None.
 
     Raises
     ------
@@ -89,24 +90,24 @@ def search(
         all_windows = (
             look(modelfile, catalog, jobs, progress) if windows is None else tuple(windows)
         )
-        hunt = _DesignSearch(
+        design_search = _DesignSearch(
             modelfile,
             catalog,
             all_windows,
             seed,
             jobs,
             AnswerCache() if memory is None else memory,
-            listen,
+            ask_agreement,
             progress,
         )
         with seeking("design"):
-            return hunt.run()
+            return design_search.run()
 
 
 def look(
     modelfile: ModelFile, catalog: Catalog, jobs: int, progress: Progress
 ) -> tuple[tuple[Stretch, ...], ...]:
-    """Everything that may be refused, refused; and where the model shows each response.
+    """Refuse everything that may be refused, and say where the model shows each response.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
 
 
 class _DesignSearch:
-    """One search. ``steps`` and the counters grow while it runs."""
+    """One search of a design. ``steps`` and the counters grow while it runs."""
 
     def __init__(
         self,
@@ -155,12 +156,12 @@ class _DesignSearch:
         seed: int,
         jobs: int,
         memory: AnswerCache,
-        listen: Listen | None,
+        ask_agreement: AskAgreement | None,
         progress: Progress,
     ) -> None:
         self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
         self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
-        self.listen, self.checks = listen, list[RungOutcome]()
+        self.ask_agreement, self.checks = ask_agreement, list[FidelityOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
@@ -234,7 +235,7 @@ class _DesignSearch:
         return start, best
 
     def _placed(self, best: Candidate) -> Candidate:
-        """The same choice with every open response at its best place."""
+        """The best candidate with every open response moved to its best place."""
         spread = spread_of(self.modelfile, best.design.circuit, self.catalog)
         bench = ScaledBoards(
             best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory
@@ -270,18 +271,18 @@ class _DesignSearch:
         ngspice is asked about what the exact circuit with bandwidth bears out, until one design
         stands; where it bears none out, about the one of which it keeps the most boards.
         """
-        if self.listen is None:
+        if self.ask_agreement is None:
             return best
-        lagging: list[tuple[Candidate, RungOutcome]] = []
-        confirmed: list[tuple[Candidate, RungOutcome]] = []
+        lagging: list[tuple[Candidate, FidelityOutcome]] = []
+        confirmed: list[tuple[Candidate, FidelityOutcome]] = []
         for candidate in self._slower(best):
             lagging.append(self._asked(candidate, BANDWIDTH, LaggingBoards(self.memory)))
-            if lagging[-1][1].stands:
-                confirmed.append(self._asked(candidate, RUNG, self.listen))
-                if confirmed[-1][1].stands:
+            if lagging[-1][1].holds:
+                confirmed.append(self._asked(candidate, FIDELITY, self.ask_agreement))
+                if confirmed[-1][1].holds:
                     break
         if not confirmed:
-            confirmed.append(self._asked(_most_surviving(lagging), RUNG, self.listen))
+            confirmed.append(self._asked(_most_surviving(lagging), FIDELITY, self.ask_agreement))
         final = _most_surviving(confirmed)
         for candidate, outcome in lagging + confirmed:
             self.checks.append(replace(outcome, adopted=candidate is final))
@@ -305,7 +306,7 @@ class _DesignSearch:
                 yield candidate
 
     def _frequency(self, candidate: Candidate) -> float:
-        """[Hz] at ω = 1."""
+        """The frequency [Hz] of a candidate at ω = 1."""
         unit = self.modelfile.model.second_order().own_frequency
         return candidate.design.errors.scales.frequency(unit)
 
@@ -318,18 +319,18 @@ class _DesignSearch:
         return f"{frequency:.4g} Hz for {own:.4g} Hz of the mechanism"
 
     def _asked(
-        self, candidate: Candidate, rung: str, listen: Listen
-    ) -> tuple[Candidate, RungOutcome]:
+        self, candidate: Candidate, fidelity: str, ask_agreement: AskAgreement
+    ) -> tuple[Candidate, FidelityOutcome]:
         frequency = self._frequency(candidate)
-        engine = "exact circuit with" if rung == BANDWIDTH else "ngspice, rung"
-        title = f"{engine} {rung}, {self._time_scale(frequency)}"
+        engine = "exact circuit with" if fidelity == BANDWIDTH else "ngspice, rung"
+        title = f"{engine} {fidelity}, {self._time_scale(frequency)}"
         step = self.progress.stage(title, len(candidate.scored))
         responses, design = candidate.model_responses, candidate.design
-        bench = self._bench(candidate.choice, responses, design, LISTENED)
-        agreements = listen(bench, [s.stand for s in candidate.scored], step)
+        bench = self._bench(candidate.choice, responses, design, BOARDS_ASKED)
+        agreements = ask_agreement(bench, [s.operating_orbit for s in candidate.scored], step)
         text = ", ".join(map(str, agreements))
         self.progress.note(f"  {title}: boards that show it as well, by response: {text}")
-        return candidate, RungOutcome(rung, frequency, agreements)
+        return candidate, FidelityOutcome(fidelity, frequency, agreements)
 
     def _bench(
         self, choice: DesignChoice, responses: Sequence[ModelResponse], design: Design, boards: int
@@ -395,7 +396,7 @@ class _DesignSearch:
                 )
             )
         slowed = bool(self.checks) and not self.checks[0].adopted
-        slower_for = "ngspice" if slowed and self.checks[0].stands else BANDWIDTH
+        slower_for = "ngspice" if slowed and self.checks[0].holds else BANDWIDTH
         for lever in LEVERS:
             before, after = start.choice.get(lever), final.choice.get(lever)
             if before != after:
@@ -470,11 +471,11 @@ class _DesignSearch:
                 self.progress.best_so_far(f"{text}, with {lever} {setting}")
 
 
-def _most_surviving(asked: Sequence[tuple[Candidate, RungOutcome]]) -> Candidate:
+def _most_surviving(asked: Sequence[tuple[Candidate, FidelityOutcome]]) -> Candidate:
     """The design whose worst response most boards keep, of those that the first has answers to."""
     answered = [r for r, a in enumerate(asked[0][1].agreements) if a.borne_out is not None]
 
-    def worst(one: tuple[Candidate, RungOutcome]) -> int:
+    def worst(one: tuple[Candidate, FidelityOutcome]) -> int:
         return min((one[1].agreements[r].survivors for r in answered), default=0)
 
     return max(asked, key=worst)[0]

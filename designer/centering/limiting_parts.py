@@ -36,8 +36,8 @@ NAMES = {
     COEFFICIENTS: COEFFICIENTS,
 }
 HALF = 0.5
-"""Of the variance, or of the lost boards: from here on a cause is the one that is named."""
-TOGETHER = 4000
+"""Share of the variance, or of the lost boards, from which on a cause is named."""
+JOINT_BOARDS = 4000
 """Boards from which a covariance is taken: a share is then known to about 2 %."""
 STREAM = "limiting:"
 _DEAD_ZONE = re.compile(r"R(2\d\d|50)[AB]?")
@@ -58,7 +58,7 @@ class Limiting:
     line: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
+        """The record as plain data for JSON."""
         return dict(self.__dict__)
 
 
@@ -85,7 +85,7 @@ def joint_boards(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
     shared = spread.groups or spread.temperature is not None or spread.supply > 0.0
     if not shared and spread.measured is None:
         return None
-    return draw_many(circuit, spread, seed, range(TOGETHER), STREAM)
+    return draw_many(circuit, spread, seed, range(JOINT_BOARDS), STREAM)
 
 
 def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
@@ -108,14 +108,14 @@ def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
         for name, share in sorted(moved.items(), key=lambda item: -item[1])
         if share >= 0.05
     )
-    line = f"{mechanism}: {limit.what}, {limit.distance:.1f} σ away, moved by {causes}"
-    return Limiting(mechanism, limit.what, limit.distance, moved, line)
+    line = f"{mechanism}: {limit.what}, {limit.reliability_index:.1f} σ away, moved by {causes}"
+    return Limiting(mechanism, limit.what, limit.reliability_index, moved, line)
 
 
 def shares(
     quantities: Sequence[Quantity], limit: Limit, boards: Boards | None = None
 ) -> dict[str, float]:
-    """Of the variance of a limit, by what moves it; they sum to 1.
+    """Shares of a limit's variance, by what moves it; they sum to 1.
 
     boards : boards on which quantities vary together; None: each varies by itself. A cause's share
     is the covariance of what it adds with the whole: below 0 where it takes off what another adds.

@@ -5,7 +5,7 @@ circuit with bandwidth is asked (``bandwidth_check``), and ngspice to confirm th
 time at the dead zone: while its diodes change over, the loop is open and the output has to cross
 two diode drops, so a contact comes late by about √(2·V/(GBW·β·dv/dt)), and a late spring force is
 negative damping. In units of the model's time this falls with the root of the frequency at ω = 1,
-hence the cure is a slower time scale. Boards are those of a prediction, with the spread stretched:
+so the remedy is a slower time scale. Boards are those of a prediction, with the spread stretched:
 few of them tell what many tell as they are.
 """
 
@@ -16,16 +16,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import OperatingOrbit, ScaledBoards
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.verdicts.cross_check import survives
-from designer.verdicts.ngspice_runs import Query, run_queries, way_to_rung
+from designer.verdicts.ngspice_runs import Query, run_queries, way_to_fidelity
 
-RUNG: Rung = "dynamic"
-STRETCH, LISTENED = 2.0, 16
+FIDELITY: Fidelity = "dynamic"
+STRETCH, BOARDS_ASKED = 2.0, 16
 """Stretch of the spread, and boards of each response."""
 FEWER, LEAST = 1, 8
 """Boards of a response that ngspice may lose, and answers that it takes to say so."""
@@ -39,13 +39,13 @@ REFINEMENTS = 1
 
 @dataclass(frozen=True)
 class Agreement:
-    """How many of ``LISTENED`` boards show one response on the exact circuit and with op-amps that
-    take time: in ngspice, or on the exact circuit with bandwidth."""
+    """How many of ``BOARDS_ASKED`` boards show one response on the exact circuit and with op-amps
+    that take time: in ngspice, or on the exact circuit with bandwidth."""
 
     exact: int
     """Boards that show it on the exact circuit."""
     survivors: int
-    """Of these, boards that show it with those op-amps as well."""
+    """How many of these boards show it with those op-amps as well."""
     unanswered: int = 0
     """Boards of these without an answer: too long a way to be asked, runs that failed,
     step sizes of which one shows it, a contact that cannot be counted, a numerics gate that does
@@ -62,10 +62,11 @@ class Agreement:
         return answers - self.survivors <= FEWER if answers >= LEAST else None
 
 
-Listen = Callable[
+AskAgreement = Callable[
     [ScaledBoards, Sequence[OperatingOrbit | None], Callable[[], None]], tuple[Agreement, ...]
 ]
-"""Of the boards of a design and its responses' stands; the last is called once a response."""
+"""Asks how many boards of a design show each response with op-amps that take time. It takes the
+boards, the nominal board's orbit of each response, and what is called once a response."""
 
 
 Count = Callable[[ScaledBoards, OperatingOrbit, Sequence[int]], list[tuple[int, ...]]]
@@ -75,24 +76,24 @@ Count = Callable[[ScaledBoards, OperatingOrbit, Sequence[int]], list[tuple[int, 
 def agreements(
     memory: AnswerCache,
     bench: ScaledBoards,
-    stands: Sequence[OperatingOrbit | None],
+    operating_orbits: Sequence[OperatingOrbit | None],
     question: Sequence[object],
     count: Count,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[Agreement, ...]:
     """What boards with op-amps that take time answer for each response, once for each question.
 
-    stands : of the responses; None where the nominal board does not show one, which leaves nothing
-    to ask. question : plain data that names it, beside the boards. progress : called once a
-    response.
+    operating_orbits : of the responses; None where the nominal board does not show one, which
+    leaves nothing to ask. question : plain data that names it, beside the boards. progress : called
+    once a response.
     """
     out = []
-    for stand in stands:
+    for operating_orbit in operating_orbits:
         agreement = Agreement(0, 0)
-        if stand is not None:
-            query = [*question, bench.query(stand, range(LISTENED), (STRETCH,))]
-            made = partial(count, bench, stand)
-            (counts,) = memory.get_all([query], made, (LISTENED, LISTENED, LISTENED))
+        if operating_orbit is not None:
+            query = [*question, bench.query(operating_orbit, range(BOARDS_ASKED), (STRETCH,))]
+            made = partial(count, bench, operating_orbit)
+            (counts,) = memory.get_all([query], made, (BOARDS_ASKED, BOARDS_ASKED, BOARDS_ASKED))
             agreement = Agreement(*counts)
         out.append(agreement)
         progress()
@@ -108,28 +109,33 @@ class AgreementCheck:
     def __call__(
         self,
         bench: ScaledBoards,
-        stands: Sequence[OperatingOrbit | None],
+        operating_orbits: Sequence[OperatingOrbit | None],
         progress: Callable[[], None] = lambda: None,
     ) -> tuple[Agreement, ...]:
         """Agreement of each response with ngspice; see `agreements`."""
-        question = (RUNG, REFINEMENTS, LONGEST)
-        return agreements(self._memory, bench, stands, question, self._ask, progress)
+        question = (FIDELITY, REFINEMENTS, LONGEST)
+        return agreements(self._memory, bench, operating_orbits, question, self._ask, progress)
 
     def _ask(
-        self, bench: ScaledBoards, stand: OperatingOrbit, _: Sequence[int]
+        self, bench: ScaledBoards, operating_orbit: OperatingOrbit, _: Sequence[int]
     ) -> list[tuple[int, ...]]:
-        there = bench.subjects(stand, range(LISTENED), STRETCH)
+        there = bench.subjects(operating_orbit, range(BOARDS_ASKED), STRETCH)
         near = [s for s in map(_started, there) if s.discard <= LONGEST]
         if len(near) < LEAST:
             return [(len(there), 0, len(there))]
         (nominal,) = numerics_gate.check(
-            self._pool, [replace(bench.nominal(stand), rung=RUNG)], LEVELS
+            self._pool, [replace(bench.nominal(operating_orbit), fidelity=FIDELITY)], LEVELS
         )
         if not nominal.passed:
             return [(len(there), 0, len(there))]
         queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
         survivals = [
-            survives(stand.spec.completed(stand.orbit), h.response, h.either, symmetric=h.symmetric)
+            survives(
+                operating_orbit.spec.completed(operating_orbit.orbit),
+                h.response,
+                h.either,
+                symmetric=h.symmetric,
+            )
             for h in run_queries(self._pool, queries)
         ]
         answers = len(survivals) - survivals.count(None)
@@ -137,4 +143,4 @@ class AgreementCheck:
 
 
 def _started(subject: GateSubject) -> GateSubject:
-    return replace(subject, rung=RUNG, discard=way_to_rung(subject.orbit))
+    return replace(subject, fidelity=FIDELITY, discard=way_to_fidelity(subject.orbit))

@@ -3,8 +3,8 @@
 Every stretch of the response (``centering.response_windows``) is scanned with a few boards at one
 stretched spread; the best places are asked again with more boards and stretches, and around the
 best of them a pattern of ever smaller steps over ω and b goes on as long as something is gained.
-Distances are those of ``centering.distance``, so borders count by how much boards move them,
-whichever mechanism makes them, other attractors among them.
+How far that is is the reliability index of ``centering.scaled_sigma``, so borders count by how much
+boards move them, whichever mechanism makes them, other attractors among them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from designer.centering.distance import LADDER, OperatingOrbit, ScaledBoards, StretchCounts
 from designer.centering.response_windows import CLEARANCE_STEP, OperatingPoint, Stretch
+from designer.centering.scaled_sigma import LADDER, OperatingOrbit, ScaledBoards, StretchCounts
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
-"""Of a stretch: where it is scanned. The first of equal places is taken, so the middle is first."""
+"""Shares of a stretch at which it is scanned. The first of equal places is taken, so the middle is
+first."""
 SCAN, SOME, MANY = 8, 24, 64
 """Boards of the scan, of the second round and of the pattern."""
 SCANNED, KEPT, STARTS = (2.0,), 10, 2
@@ -36,14 +37,14 @@ class Scored:
 
     place: OperatingPoint
     """Where the response is asked for."""
-    stand: OperatingOrbit | None
+    operating_orbit: OperatingOrbit | None
     """The nominal board's orbit there; None where it does not show the response."""
     counts: StretchCounts
     """What boards showed there."""
 
     @property
-    def distance(self) -> float:
-        return self.counts.distance if self.stand is not None else -math.inf
+    def reliability_index(self) -> float:
+        return self.counts.reliability_index if self.operating_orbit is not None else -math.inf
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def best_points(
     every = [stretch.at(SHARES) for stretch in stretches]
     scanned = [p for row in itertools.zip_longest(*every) for p in row if p is not None]
     first = score(bench, spec, scanned, SCAN, SCANNED, progress)
-    # The scan's distances are coarse: among equals the middle of a wide stretch comes first.
+    # The scan's indices are coarse: among equals the middle of a wide stretch comes first.
     second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
     count, scored = len(scanned) + len(second), []
     for start in best(second, STARTS):
@@ -98,24 +99,25 @@ def score(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Scored]:
     """What the first boards show at these places, in order."""
-    stands = bench.stands([(spec, place) for place in wanted])
-    there = [s for s in stands if s is not None]
+    operating_orbits = bench.operating_orbits([(spec, place) for place in wanted])
+    there = [s for s in operating_orbits if s is not None]
     counts = iter(bench.ask(there, range(boards), ladder, progress) if there else [])
     nothing = StretchCounts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
     return [
-        Scored(place, stand, nothing if stand is None else next(counts))
-        for place, stand in zip(wanted, stands, strict=True)
+        Scored(place, operating_orbit, nothing if operating_orbit is None else next(counts))
+        for place, operating_orbit in zip(wanted, operating_orbits, strict=True)
     ]
 
 
 def best(scored: Sequence[Scored], count: int) -> list[Scored]:
-    """Those of the largest distances that the nominal board shows; the earlier of equals first."""
-    there = [s for s in scored if s.stand is not None]
-    return sorted(there, key=lambda s: -s.distance)[:count]
+    """The places with the largest reliability indices that the nominal board shows; the earlier of
+    equals first."""
+    there = [s for s in scored if s.operating_orbit is not None]
+    return sorted(there, key=lambda s: -s.reliability_index)[:count]
 
 
 def _step(stretches: Sequence[Stretch], place: OperatingPoint) -> float:
-    """Of ln ω: half the distance of the places that were scanned."""
+    """The first step in ln ω: half the distance of the places that were scanned."""
     home = next(s for s in stretches if any(p is place for p in s.places))
     return max(math.log(home.high / home.low) * 0.1, 1e-3)
 
@@ -146,8 +148,8 @@ def _pattern(
         around = [replace(centre.place, omega=omega, b=b) for omega, b in new]
         for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
             scored_at[scored.place.omega, scored.place.b] = scored
-        top = max(scored_at.values(), key=lambda s: s.distance)
-        if top.distance > centre.distance:
+        top = max(scored_at.values(), key=lambda s: s.reliability_index)
+        if top.reliability_index > centre.reliability_index:
             centre = top
         else:
             step, wide, halved = 0.5 * step, 0.5 * wide, halved + 1

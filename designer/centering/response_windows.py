@@ -26,9 +26,9 @@ from designer.model.search_table import SearchSpec
 from designer.model.swept_model import ModelSubject
 
 STEP = 0.005
-"""Of ω, between two steps of a sweep."""
+"""The difference in ω between two steps of a sweep."""
 CLEARANCE_STEP = 0.06
-"""Of b, between two clearances of a range, at most."""
+"""The largest difference in b between two clearances of a range."""
 COURSE = TransientSettings(settle=300, keep=10, patience=300)
 
 
@@ -75,7 +75,7 @@ def open_in(spec: Response) -> bool:
 
 
 def need_periods(wanted: Sequence[Response]) -> None:
-    """Refuse what neither a search nor a cure can follow.
+    """Refuse what neither a search nor a repair can follow.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def stretches(
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[tuple[Stretch, ...], ...]:
-    """For each response the stretches on which the model shows it, widest first.
+    """The stretches on which the model shows each response, the widest first.
 
     progress : called once a clearance.
 

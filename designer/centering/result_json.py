@@ -11,9 +11,9 @@ from scipy.special import ndtr
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import Candidate, Contribution, SearchResult
 from designer.centering.design_search import BOARDS
-from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
-from designer.centering.ngspice_check import RUNG, STRETCH
+from designer.centering.ngspice_check import FIDELITY, STRETCH
+from designer.centering.scaled_sigma import LADDER, STREAM
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
 from designer.verdicts.cross_check import CrossCheck
@@ -49,7 +49,7 @@ def search_json(result: SearchResult) -> dict[str, Any]:
         ],
         "contributions": [_contribution(c) for c in result.contributions],
         "bandwidth": _checks(result, BANDWIDTH, "bandwidth"),
-        "ngspice": _checks(result, RUNG, "ngspice"),
+        "ngspice": _checks(result, FIDELITY, "ngspice"),
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
             for row in result.windows
@@ -57,8 +57,8 @@ def search_json(result: SearchResult) -> dict[str, Any]:
     }
 
 
-def _checks(result: SearchResult, rung: str, survivors: str) -> dict[str, Any]:
-    """What a rung was asked about. survivors : key of the boards that it keeps."""
+def _checks(result: SearchResult, fidelity: str, survivors: str) -> dict[str, Any]:
+    """What a fidelity was asked about. survivors : key of the boards that it keeps."""
     designs = [
         {
             "frequency_hz": row.frequency,
@@ -74,9 +74,9 @@ def _checks(result: SearchResult, rung: str, survivors: str) -> dict[str, Any]:
             ],
         }
         for row in result.checks
-        if row.rung == rung
+        if row.fidelity == fidelity
     ]
-    return {"rung": rung, "stretch": STRETCH, "designs": designs}
+    return {"rung": fidelity, "stretch": STRETCH, "designs": designs}
 
 
 def confirmation_json(
@@ -85,7 +85,7 @@ def confirmation_json(
     response_of: Sequence[int],
     responses: int,
 ) -> list[dict[str, Any]]:
-    """How ngspice's rung judges boards of the study, by response.
+    """How ngspice's fidelity judges boards of the study, by response.
 
     response_of : for each question the index of its response; a response that was left out has no
     question.
@@ -139,8 +139,8 @@ def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
                 **mechanism_json(r.omega, si),
                 "b": r.b,
                 "expected": r.expected,
-                "distance": s.distance if math.isfinite(s.distance) else None,
-                "predicted_yield": s.counts.predicted if s.stand is not None else 0.0,
+                "distance": s.reliability_index if math.isfinite(s.reliability_index) else None,
+                "predicted_yield": s.counts.predicted if s.operating_orbit is not None else 0.0,
                 "ok": list(s.counts.ok),
             }
             for r, s in zip(candidate.model_responses, candidate.scored, strict=True)

@@ -31,7 +31,7 @@ from designer.model.find_responses import ModelResponse, matches
 from designer.model.model_file import ModelFile
 from designer.spread.spread import draw_many
 from designer.synthesis.part_checks import stage_refusal
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Verdict
 from designer.yields.study import plan_study
 
@@ -65,7 +65,7 @@ class StageForecast:
 
     @property
     def words(self) -> str:
-        """It in words."""
+        """The forecast in words."""
         boards = "" if self.kept is None else f"{self.kept} of {BOARDS} boards keep the responses, "
         rules = "no rule fails"
         if self.failed:
@@ -75,8 +75,8 @@ class StageForecast:
         return f"{self.kind}: {boards}{rules}, largest error {100 * error:.2g} %, {parts} parts"
 
     def better_than(self, other: StageForecast) -> bool:
-        """Whether it is to be taken: by what its boards keep, if that differs by more than chance;
-        else by the rules, the error and the number of parts."""
+        """Whether this stage is to be taken: by what its boards keep, if that differs by more than
+        chance; else by the rules, the error and the number of parts."""
         if self.kept is not None and other.kept is not None and _differ(self.kept, other.kept):
             return self.kept > other.kept
         return self._rank < other._rank
@@ -158,8 +158,8 @@ def chosen(forecasts: Sequence[StageForecast]) -> Synthesis:
     for other in rest:
         first = other if other.better_than(first) else first
     others = [f.words for f in forecasts if f is not first]
-    beside = "; ".join(others) or "no parts were found for the other stage"
-    return replace(first.synthesis, stage_reason=f"{first.words}; {beside}")
+    reasons = "; ".join(others) or "no parts were found for the other stage"
+    return replace(first.synthesis, stage_reason=f"{first.words}; {reasons}")
 
 
 def better_stage(modelfile: ModelFile, synthesis: Synthesis, jobs: int = 1) -> str:
@@ -189,7 +189,7 @@ def other_stage(modelfile: ModelFile, synthesis: Synthesis, kept: int, jobs: int
         try:
             there = with_stage(modelfile, kind), synthesis.catalog
             met = synthesis.model_responses
-            other = synthesis_result.synthesise(*there, jobs=jobs, told=False, shown=met)
+            other = synthesis_result.synthesise(*there, jobs=jobs, announced=False, shown=met)
             others = boards_that_keep(other, jobs)
         except (InputError, Unreachable):
             return ""

@@ -40,7 +40,7 @@ class CheckedResponse:
     model: ModelResponse
     """The response, and what the model shows."""
     circuit: Orbit
-    """Orbit of the exact circuit rung, in volts and seconds."""
+    """Orbit of the exact circuit, in volts and seconds."""
     excitation: Excitation
     """The generator's setting."""
     gate: GateResult | None
@@ -71,14 +71,15 @@ class CheckedResponse:
 
     @cached_property
     def model_trust(self) -> Trust:
-        """Of the model's answer. Measured when somebody asks: it takes as long as the check."""
+        """The trust in the model's answer. It is measured when somebody asks: that takes as long as
+        the check."""
         if self.design is None:
             return Trust()
         return trust.of_orbit(response_flow(self.design, self.model), self.model.orbit)
 
     @cached_property
     def circuit_trust(self) -> Trust:
-        """Of the exact circuit's answer, likewise."""
+        """The trust in the exact circuit's answer, measured likewise."""
         return Trust() if self.flow is None else trust.of_orbit(self.flow, self.circuit)
 
     @property
@@ -99,7 +100,7 @@ class CheckedResponse:
 
     @property
     def trust(self) -> dict[str, Trust]:
-        """Of each engine's answer."""
+        """The trust in each engine's answer."""
         exact = {"model": self.model_trust, "circuit": self.circuit_trust}
         return exact if self.gate is None else {**exact, "ngspice": trust.of_gate(self.gate)}
 

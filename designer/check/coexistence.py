@@ -31,9 +31,10 @@ from designer.spread import random_streams
 
 MOST_STARTS = 100_000
 NEAR = 1e-6
-"""Of the peak: strobes of one orbit, from different starts, lie nearer than this."""
+"""Strobes of one orbit, from different starts, lie nearer than this, over the peak."""
 ALIKE = 1e-3
-"""Of the peak: extremes of two orbits without an exact mirror that are alike or mirror images."""
+"""Extremes of two orbits without an exact mirror that differ by less, over the peak, are alike or
+mirror images."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Coexistence:
     """Starts that did not settle on an attractor."""
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of the contract."""
+        """The attractors by the keys of the contract."""
         return {
             "count": self.starts,
             "asked": self.wanted_starts,
@@ -120,13 +121,14 @@ def random_starts(box: Array, count: int, seed: int) -> Array:
 def of_model(
     model: MechanicalModel, omega: float, starts: int = DRAWN_STARTS, seed: int = SEED
 ) -> Coexistence:
-    """Of the model under a drive of frequency ``omega``, by the exact flow; largest share first."""
+    """The attractors of the model under a drive of frequency ``omega``, by the exact flow; the
+    largest share first."""
     flow = model_flow(model, omega)
     result = of_flow(flow, scale_of(model, omega), starts, seed)
     return replace(result, basins=tuple(sorted(result.basins, key=lambda b: -b.count)))
 
 
-def beside(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
+def coexisting_with(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
     """The attractors that coexist with a response of the model, by ``DRAWN_STARTS`` starts: the
     largest share first, then those that only the search for the response came to.
 
@@ -202,7 +204,7 @@ class _Tally:
         return len(met), unsettled
 
     def basins(self) -> tuple[Basin, ...]:
-        """In the order in which they were met."""
+        """The basins in the order in which they were met."""
         rows = zip(self._orbits, self._counts, strict=True)
         return tuple(
             Basin(

@@ -29,11 +29,12 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
 
 POINTS = 200
-"""Of a drive period. A wave of the drive's tenth harmonic is missed by at most 1.2 % there."""
+"""Points of a drive period. A wave of the drive's tenth harmonic is missed by at most 1.2 %
+there."""
 COARSE = 0.05
-"""Of the largest force over the motion: an error of the pieces that is told."""
+"""The error of the pieces from which on it is said, over the largest force of the motion."""
 PLACES = 400
-"""Of a motion's displacements, at which the pieces are held against the law."""
+"""The displacements of a motion at which the pieces are held against the law."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,9 @@ class LawMisfit:
     def _spring(self) -> bool:
         return len(self.where) == 2
 
-    def told(self, response: str, *, in_si: bool) -> str:
-        """It in words. response : what draws it so far. in_si : whether lengths are in metres."""
+    def text(self, response: str, *, in_si: bool) -> str:
+        """The misfit in words. response : what draws the law so far. in_si : whether lengths are in
+        metres."""
         reached, span = (
             value_text(x, "m") if in_si else f"{x:.4g}" for x in (self.reached, self.span)
         )
@@ -84,14 +86,14 @@ class LawMisfit:
         return f"{response} {drawn} {few}: state more {more}, or a smaller {name}"
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The misfit as plain data for JSON."""
         own = {"between": self.where} if self._spring else {"clearance": self.where[0]}
         span = {"range" if self._spring else "depth": self.span}
         return {**own, **span, "reached": self.reached, "error": self.error}
 
 
 def misfits_in(answer: Mapping[str, Any]) -> Iterator[LawMisfit]:
-    """Those that stand in the JSON object of a response."""
+    """The misfits that stand in the JSON object of a response."""
     for each in (*answer.get("beyond_range", ()), *answer.get("coarse_range", ())):
         yield LawMisfit(tuple(each["between"]), each["range"], each["reached"], each["error"])
     for each in (*answer.get("beyond_depth", ()), *answer.get("coarse_depth", ())):
@@ -135,7 +137,7 @@ class CurvedLaw:
 def law_misfits(
     model: MechanicalModel, flow: Flow, orbit: Orbit, units: Array
 ) -> tuple[LawMisfit, ...]:
-    """Those laws of the model that an orbit of ``flow`` draws beyond their spans, or over which
+    """The misfits of the laws that an orbit of ``flow`` draws beyond their spans, or over which
     their pieces are ``COARSE``.
 
     model : at the orbit's clearance. units : (n,) of each state of the flow per unit of the

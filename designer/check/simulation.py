@@ -56,7 +56,7 @@ from designer.model.relative_motion import (
 )
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit, twin_runs
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool, require_ngspice
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
 Engine = Literal["model", "circuit", "ngspice"]
 NEAR_TWIN = 0.02
-"""Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
+"""How far the twin of a circuit's orbit may be from the mirror image, over the peak."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def simulate(
     jobs: int | None = None,
     progress: Progress | None = None,
     traces: bool = False,
-    rung: Rung = "ideal",
+    fidelity: Fidelity = "ideal",
     starts: int = DRAWN_STARTS,
     seed: int = SEED,
     start: Array | None = None,
@@ -204,21 +204,21 @@ def simulate(
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
     synthesis : of this model file; where the engine needs one and None is given it is made by
     ``choose``, or as ``check.synthesis_result`` makes it. traces : keep the orbits and their mirror
-    twins as traces too. rung : the op-amps' model in ngspice. starts, seed : of the initial states
-    that are drawn to see which attractors coexist (``check.coexistence``), 0 for none; ngspice has
-    none. start : (states,) in model units, where the drive's phase is 0.
+    twins as traces too. fidelity : the op-amps' model in ngspice. starts, seed : of the initial
+    states that are drawn to see which attractors coexist (``check.coexistence``), 0 for none;
+    ngspice has none. start : (states,) in model units, where the drive's phase is 0.
 
     Raises
     ------
-    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, a
+    InputError : a fidelity for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, a
         number of starts that cannot be, or nothing to simulate.
     """
     coexistence.check(starts)
     sampling = (starts, seed)
     progress = Progress() if progress is None else progress
-    if rung != "ideal" and engine != "ngspice":
+    if fidelity != "ideal" and engine != "ngspice":
         raise InputError(
-            None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
+            None, "--rung", fidelity, "ideal, or --engine ngspice: other engines have none"
         )
     for omega in omegas:
         check_omega("--omega", omega, modelfile.model)
@@ -241,7 +241,7 @@ def simulate(
         require_ngspice(pool)
         synthesis = synthesis or _design(modelfile, choose)
         scan = _Scan(bool(omegas), start)
-        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, rung)
+        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, fidelity)
 
 
 def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | None) -> Synthesis:
@@ -252,7 +252,7 @@ def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | Non
     return choose(modelfile)
 
 
-def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
+def engine_settings(engine: Engine, fidelity: Fidelity = "ideal") -> dict[str, Any]:
     """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
     settings: dict[str, Any] = {
         "flow": "exact, by modes",
@@ -267,7 +267,7 @@ def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
     if engine == "ngspice":
         settings["strobe_tolerance"] = read_orbit.STROBE_TOLERANCE
         settings["undecided_below"] = read_orbit.ENGINE_ERROR
-        settings |= {"gate_bound": numerics_gate.BOUND, "rung": rung}
+        settings |= {"gate_bound": numerics_gate.BOUND, "rung": fidelity}
     return settings
 
 
@@ -380,7 +380,7 @@ def _apart(flow: Flow, orbits: Sequence[Orbit]) -> list[Orbit]:
 
 
 def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
-    """Those of them that are an answer."""
+    """The attractors that are an answer."""
     return [o for o in orbits if o.status in ANSWERS]
 
 
@@ -502,7 +502,7 @@ def _in_ngspice(
     pool: SpicePool,
     progress: Progress,
     traces: bool,
-    rung: Rung,
+    fidelity: Fidelity,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began, design = time.perf_counter(), synthesis.design
@@ -514,7 +514,9 @@ def _in_ngspice(
         r, _, orbits = _circuit_orbits(synthesis, spec, scan)
         drive = design.excitation(r.b, r.omega)
         settled = [o for o in orbits if len(o.start)]
-        subjects += [numerics_gate.GateSubject(reduction, drive, o, rung=rung) for o in settled]
+        subjects += [
+            numerics_gate.GateSubject(reduction, drive, o, fidelity=fidelity) for o in settled
+        ]
         rows.append((r, drive, len(settled)))
         step()
     progress.stage("ngspice, numerics gate")
@@ -584,8 +586,8 @@ def _alike(a: Orbit, b: Orbit) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:
-    """With its exponent measured to a bound and, over 200 periods, its extremes and largest impacts
-    where the orbit is not periodic and has none."""
+    """The orbit with its exponent measured to a bound and, where it is not periodic, with its
+    extremes and largest impacts over 200 periods."""
     orbit = attractors.with_exponent(flow, orbit)
     if len(orbit.extremes) or not len(orbit.start):
         return orbit

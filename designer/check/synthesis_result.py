@@ -65,14 +65,15 @@ def synthesise(
     *,
     all_found: bool = False,
     jobs: int = 1,
-    told: bool = True,
+    announced: bool = True,
     shown: tuple[ModelResponse, ...] | None = None,
 ) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
 
     all_found : whether there have to be all of them before a part is chosen; one that is not there
     has the swing of what was found instead otherwise. jobs : threads; no part depends on it.
-    told : whether who watches hears that parts stand. shown : the responses, where they are known.
+    announced : whether who watches hears that parts stand. shown : the responses, where they are
+    known.
 
     Raises
     ------
@@ -89,8 +90,8 @@ def synthesise(
         held = peaks(modelfile.model, responses)
         with seeking("parts"):
             design = parts_choice.synthesise(*choice, held, responses, jobs=jobs)
-        if told:
-            note(stands(design, time.perf_counter() - began))
+        if announced:
+            note(parts_line(design, time.perf_counter() - began))
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
 
@@ -129,7 +130,7 @@ def with_stage(modelfile: ModelFile, kind: DeadZone | None = None) -> ModelFile:
     return replace(modelfile, circuit=replace(spec, dead_zone=kind))
 
 
-def stands(design: Design, seconds: float) -> str:
+def parts_line(design: Design, seconds: float) -> str:
     """The line that says that parts are chosen. seconds : since the work on them began."""
     error, number = design.errors.max_error, len(design.circuit.values)
     worst = f"{100 * error:.3g} %" if error > EXACT else "0 to rounding"

@@ -107,7 +107,7 @@ class BoardModes:
         return np.asarray(self.modes.good.all(axis=1))
 
     def take(self, which: Index) -> BoardModes:
-        """Those of some boards, for themselves: what is added to them is not added here."""
+        """The modes of some boards, for themselves: what is added to them is not added here."""
         out = object.__new__(BoardModes)
         out._channel = self._channel
         out._boards, out.targets = self._boards.take(which), self.targets.copy()
@@ -123,7 +123,7 @@ class BoardModes:
 
     @classmethod
     def joined(cls, boards: Boards, parts: Sequence[BoardModes]) -> BoardModes:
-        """Those of all boards together; all parts have the same modes."""
+        """The modes of all boards together; all parts have the same modes."""
         out = parts[0].take(np.arange(0))
         out._boards = boards
         of_each = {
@@ -140,20 +140,26 @@ class BoardModes:
         """Solve these working modes, and those on the way into the same contacts: a board that
         enters one of them mostly enters the others."""
         ways = self._boards.circuit.ways_in
-        beside = (next((way for way in ways if key in way), frozenset()) for key in keys)
-        self.add(sorted(frozenset().union(*beside)))
+        groups = (next((way for way in ways if key in way), frozenset()) for key in keys)
+        self.add(sorted(frozenset().union(*groups)))
 
-    def alone(self, board: int, beside: BoardModes | None = None) -> dict[ModeKey, Mode]:
-        """The modes of one board in the form of the general kernel. beside : those of the
+    def alone(self, board: int, second_drive: BoardModes | None = None) -> dict[ModeKey, Mode]:
+        """The modes of one board in the form of the general kernel. second_drive : those of the
         generator's second channel."""
         own, n = self.modes, self.modes.A.shape[-1]
         out = {}
         for k, key in enumerate(self.targets.keys):
-            if not own.good[board, k] or (beside is not None and not beside.modes.good[board, k]):
+            if not own.good[board, k] or (
+                second_drive is not None and not second_drive.modes.good[board, k]
+            ):
                 continue
             count = int(own.guards[k])
             rows = own.guard[board, k, :count]
-            second = np.zeros(count) if beside is None else beside.modes.guard[board, k, :count, n]
+            second = (
+                np.zeros(count)
+                if second_drive is None
+                else second_drive.modes.guard[board, k, :count, n]
+            )
             guards = tuple(
                 Guard(
                     rows[g, :n].copy(),
@@ -171,7 +177,7 @@ class BoardModes:
                 own.d[board, k].copy(),
                 guards,
                 tuple(own.side[k].tolist()),
-                beside=None if beside is None else beside.modes.B[board, k].copy(),
+                second=None if second_drive is None else second_drive.modes.B[board, k].copy(),
             )
         return out
 

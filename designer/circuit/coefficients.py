@@ -43,7 +43,7 @@ class Scales:
     """The moving mass's displacement at the first clearance's upper stop, or at the only one, as a
     distance from rest [V]; negative where the stop is in contact at rest."""
     threshold_lower: float = float("nan")
-    """The same of the lower stop. nan where there is none."""
+    """The threshold of the lower stop; nan where there is none."""
     middle: float = 0.0
     """Where the middle of the clearance is wanted, over half the clearance."""
 
@@ -136,16 +136,16 @@ def coefficient_errors(
     if model.wired.constant.any():
         errors |= _constants(rest.d, zones, lead, model, scales)
     none = np.zeros_like(rest.B)
-    drive, beside = (
+    drive, second_drive = (
         -inputs[1::2] * scales.seconds / scales.volts[1::2] * model.mass
-        for inputs in (rest.B, none if rest.beside is None else rest.beside)
+        for inputs in (rest.B, none if rest.second is None else rest.second)
     )
     return CoefficientErrors(
         errors=errors,
         max_error=max(abs(e) for e in errors.values()),
         scales=scales,
         drive_gain=drive,
-        second_gain=beside,
+        second_gain=second_drive,
         slopes=_scale_slopes(coefficients, errors, len(wanted)),
     )
 

@@ -257,10 +257,10 @@ def _rectifier(
     """
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    beside = place.shared
+    shared = place.shared
     for side, stop in place.clearance.sides:
         half = half_names(place, side)
-        parts += _half(place, half, side, stop, resistor, rails, model, beside=beside)
+        parts += _half(place, half, side, stop, resistor, rails, model, shared=shared)
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
     # The amplifier that sums is linear, so it is none of the stop's switches.
     return [*parts, *place.summed(resistor)], _stop(place, contacts, parts)
@@ -308,9 +308,9 @@ def _half(
     rails: ReferenceRails,
     model: DiodeModel,
     *,
-    beside: bool,
+    shared: bool,
 ) -> list[Part]:
-    """The half of one stop; ``beside``: the other one is on its node."""
+    """The half of one stop; ``shared``: the other one is on its node."""
     word = "upper" if side > 0 else "lower"
     role, clamped = f"{word} half of the dead zone", half.output
     sign, preloaded = reference_sign(place, side, stop), stop.gap < 0.0
@@ -325,7 +325,7 @@ def _half(
         *resistor(half.feedback, half.node, driven, role),
         _diode(half.series, half.output, driven, acting, model, preloaded, role),
     ]
-    if beside:
+    if shared:
         clamped = half.between
         like = half.threshold if stop.gap else half.source
         parts += resistor(half.lift, clamped, half.output, f"clamp of the {role}", like=like)
@@ -416,6 +416,6 @@ def _section(name: str, node: str, out: str, role: str) -> Section:
 
 
 def _diode(name: str, a: str, b: str, side: int, model: DiodeModel, rest: bool, role: str) -> Diode:
-    """From a to b in the upper half, the other way round in the lower."""
+    """A diode from a to b in the upper half, the other way round in the lower."""
     anode, cathode = (a, b) if side > 0 else (b, a)
     return Diode(name, anode, cathode, model, rest, role)

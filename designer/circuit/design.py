@@ -138,8 +138,8 @@ class Design:
         return channel, acceleration / self.amplitude(b, omega, channel)
 
     def largest_amplitudes(self, responses: Sequence[ModelResponse]) -> list[float]:
-        """Of each of the generator's channels, over these responses; without any at the model's
-        clearance and own frequency [V peak]."""
+        """The largest amplitude [V peak] of each of the generator's channels over these responses;
+        without any, that at the model's clearance and own frequency."""
         own = self.model.second_order().own_frequency
         places = [(r.b, r.omega) for r in responses] or [(self.model.b, own)]
         return [
@@ -279,7 +279,7 @@ class GeneratorSetting:
 
     @property
     def excitation(self) -> Excitation:
-        """The same without what it is for."""
+        """The generator's setting without the response that it is for."""
         amplitude, offset = self.amplitude_v_peak, self.offset_v
         return Excitation(self.frequency_hz, amplitude, offset, self.shape, self.second)
 
@@ -289,7 +289,7 @@ def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[Genera
     out = []
     for r in responses:
         to = design.excitation(r.b, r.omega)
-        whose = r.omega, r.expected, to.frequency, to.amplitude
+        stated = r.omega, r.expected, to.frequency, to.amplitude
         base = design.base_per_volt(r.b, r.omega)
-        out.append(GeneratorSetting(*whose, shape=to.shape, second=to.second, base=base))
+        out.append(GeneratorSetting(*stated, shape=to.shape, second=to.second, base=base))
     return tuple(out)

@@ -205,14 +205,14 @@ class Ensemble:
         board: int,
         stages: Sequence[tuple[Drive, int]],
         starts: Array,
-        beside: Sequence[int] = (),
+        neighbours: Sequence[int] = (),
     ) -> tuple[Array, Mask]:
         """(E, n) the states of a board after each drive for its whole periods, phase-continuous,
         from ``starts`` (E, n) at drive phase 0, and (E,) where the compiled way knows them: there
         the board kept to its working modes, in which nothing clips that ought to be linear.
 
-        beside : boards that are asked about the same drives. Modes that this one enters are solved
-        for them too; no state depends on it.
+        neighbours : boards that are asked about the same drives. Modes that this one enters are
+        solved for them too; no state depends on it.
         """
         ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
         sines = all(drive.is_sine for drive, _ in stages)
@@ -244,11 +244,11 @@ class Ensemble:
             before = len(modes.targets.keys)
             if missing[0] >= 0:
                 target = modes.targets.beyond(int(missing[0]), int(missing[1]))
-                modes = self._further(board, [target], beside)
+                modes = self._further(board, [target], neighbours)
             elif not (codes == LEFT).any() or closely:
                 return ends, np.asarray(codes == DONE)
             else:  # all modes first: a proof step by step takes longer
-                modes = self._further(board, None, beside)
+                modes = self._further(board, None, neighbours)
                 closely = len(modes.targets.keys) == before
 
     def _modes_of(self, board: int) -> working.BoardModes:
@@ -259,7 +259,7 @@ class Ensemble:
         return modes.take(np.array([row]))
 
     def _further(
-        self, board: int, keys: Sequence[ModeKey] | None, beside: Sequence[int]
+        self, board: int, keys: Sequence[ModeKey] | None, neighbours: Sequence[int]
     ) -> working.BoardModes:
         """A board's own modes with these working modes too, all where None; and those of the boards
         beside it that have had the same ones so far: a mode of many boards takes little longer."""
@@ -268,7 +268,7 @@ class Ensemble:
             if all(key in modes.targets.numbers for key in keys or self.boards.circuit.working):
                 return modes  # nothing is left, or another thread has been here
             boards, parts = [board], [modes]
-            for other in beside:
+            for other in neighbours:
                 own = self._modes_of(other)
                 if other != board and own.targets.keys == modes.targets.keys:
                     boards.append(other)
@@ -288,7 +288,7 @@ class Ensemble:
             reduction = self.reduction(board)
             system, start = reduction.system(), reduction.state(start)
             if self._modes is not None and not (system.built or drive.is_sine):
-                system.know(self._modes.alone(board, self._beside))
+                system.know(self._modes.alone(board, self._second_channel))
             flow = Flow(system, drive, fast=self._fast)
             if within is None:
                 orbit = attractors.settle(flow, start)
@@ -386,7 +386,7 @@ class Ensemble:
         periods: Sequence[float],
         modes: working.BoardModes,
     ) -> Iterator[SettledBoard]:
-        """Those answers in the normal form; the rules are those of ``attractors.describe``."""
+        """The answers in the normal form, by the rules of ``attractors.describe``."""
         multipliers = np.linalg.eigvals(answers.monodromy[closed]).astype(complex)
         radius = np.abs(multipliers).max(axis=1, initial=0.0)
         graze, facts = answers.graze[closed], answers.facts[closed]
@@ -422,7 +422,7 @@ class Ensemble:
             yield SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
 
     @cached_property
-    def _beside(self) -> working.BoardModes | None:
+    def _second_channel(self) -> working.BoardModes | None:
         """The modes by the generator's second channel; None where there is none."""
         if self.boards.circuit.second is None:
             return None

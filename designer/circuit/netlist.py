@@ -338,7 +338,7 @@ class Circuit:
 
     @cached_property
     def dependent_capacitors(self) -> tuple[Capacitor, ...]:
-        """Those whose voltages the states decide: the dampers of stops."""
+        """The capacitors whose voltages the states decide: the dampers of stops."""
         return tuple(c for c in self.capacitors if c.name not in self.states)
 
     @cached_property
@@ -355,7 +355,7 @@ class Circuit:
 
     @property
     def supply_diodes(self) -> tuple[SupplyDiode, ...]:
-        """Those between the supply's connector and the rails; none on most boards."""
+        """The diodes between the supply's connector and the rails; none on most boards."""
         return tuple(p for p in self.fittings if isinstance(p, SupplyDiode))
 
     @property
@@ -451,7 +451,7 @@ class Circuit:
 
     @cached_property
     def ways_in(self) -> tuple[frozenset[tuple[int, ...]], ...]:
-        """Of those the ones on the way into the same contacts, for all contacts that there may be
+        """The working modes on the way into the same contacts, for all contacts that there may be
         at once."""
         return tuple(
             frozenset(self._turned(each) for each in product(*ways))
@@ -533,7 +533,7 @@ class Excitation:
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Of each channel [V peak]."""
+        """The amplitude of each channel [V peak]."""
         return (self.amplitude,) if self.second is None else (self.amplitude, self.second.amplitude)
 
     @property
@@ -560,7 +560,7 @@ class Excitation:
         return Excitation(self.frequency, own.amplitude, shape=own.shape)
 
     def louder(self, factor: float) -> Excitation:
-        """The same with the amplitudes of all channels multiplied by this."""
+        """The excitation with the amplitudes of all channels multiplied by this factor."""
         second = self.second and replace(self.second, amplitude=factor * self.second.amplitude)
         return replace(self, amplitude=factor * self.amplitude, second=second)
 
@@ -572,7 +572,7 @@ class Excitation:
     def at_start(self) -> tuple[float, float]:
         """Voltages of the generator's channels at t = 0 [V]."""
         start = np.zeros(1)
-        return float(self.drive.at(start)[0]), float(self.drive.beside_at(start)[0])
+        return float(self.drive.at(start)[0]), float(self.drive.second_at(start)[0])
 
     def as_dict(self) -> dict[str, Any]:
         """Its fields; the shape where it is no sine, the second channel where there is one."""

@@ -36,7 +36,8 @@ class FloatingCircuit(ArithmeticError):
 EVEN = 1e-9
 """Relative: what may differ between the two stops of a board that counts as mirror symmetric."""
 WORST_CONDITION = 1e14
-"""Of the scaled nodal equations: past it a net floats, whatever the solver says."""
+"""The condition number of the scaled nodal equations past which a net floats, whatever the solver
+says."""
 
 
 class Reduction:
@@ -65,8 +66,8 @@ class Reduction:
         return self._over(0)
 
     @cached_property
-    def _beside(self) -> NodalEquations | None:
-        """The same over the generator's second channel; None where there is none."""
+    def _second_channel(self) -> NodalEquations | None:
+        """The nodal equations over the generator's second channel; None where there is none."""
         return None if self.circuit.second is None else self._over(1)
 
     def _over(self, channel: int) -> NodalEquations:
@@ -116,26 +117,30 @@ class Reduction:
         return known
 
     def by_second(self, key: ModeKey) -> Solution:
-        """The same over the states, the generator's second channel in the place of the first, 1.
+        """The solution over the states, the generator's second channel in the place of the first,
+        and 1.
 
         Raises
         ------
         ValueError : there is no second channel.
         """
-        if self._beside is None:
+        if self._second_channel is None:
             raise ValueError("no second channel")
         known = self._seconds.get(key)
         if known is None:
-            known = self._seconds[key] = self._beside.solved(key, _solved)
+            known = self._seconds[key] = self._second_channel.solved(key, _solved)
         return known
 
     def voltages(self, key: ModeKey, x: Array, channels: tuple[float, float]) -> dict[str, float]:
         """Voltage of every net at a state x (n,) and voltages of the generator's channels."""
         inputs = np.concatenate([x, [channels[0], 1.0]])
         out = {net: float(row @ inputs) for net, row in self.solution(key).voltage.items()}
-        if self._beside is not None:
-            beside = self.by_second(key).voltage
-            out = {net: volts + channels[1] * float(beside[net][-2]) for net, volts in out.items()}
+        if self._second_channel is not None:
+            second_input = self.by_second(key).voltage
+            out = {
+                net: volts + channels[1] * float(second_input[net][-2])
+                for net, volts in out.items()
+            }
         return out
 
     def output(self, key: ModeKey, net: str, x: Array, u: Array) -> Array:
@@ -159,18 +164,18 @@ class Reduction:
 
     @cached_property
     def _still(self) -> Mode:
-        """With every clearance open."""
+        """The mode with every clearance open."""
         return self._mode(self.circuit.open)
 
     def _mode(self, key: ModeKey) -> Mode:
         solved, n = self.solution(key), len(self._equations.states)
         rows = self._equations.rates(key, solved)
         exits = self._equations.exits(key, solved)
-        beside, slopes = None, np.zeros(len(exits))
-        if self._beside is not None:
+        second_input, slopes = None, np.zeros(len(exits))
+        if self._second_channel is not None:
             second = self.by_second(key)
-            beside = self._beside.rates(key, second)[:, n]
-            slopes = np.array([e.row[n] for e in self._beside.exits(key, second)])
+            second_input = self._second_channel.rates(key, second)[:, n]
+            slopes = np.array([e.row[n] for e in self._second_channel.exits(key, second)])
         guards = tuple(
             Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance, own)
             for e, own in zip(exits, slopes.tolist(), strict=True)
@@ -182,7 +187,7 @@ class Reduction:
             guards=guards,
             sides=self._equations.sides(key),
             clipped=self._equations.clipped(key),
-            beside=beside,
+            second=second_input,
         )
 
     def _even(self) -> bool:

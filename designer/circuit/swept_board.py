@@ -35,9 +35,9 @@ SETTINGS = {
     "amplitude": (0.0, GREATEST),
     "offset": (-GREATEST, GREATEST),
 }
-"""Of the generator, with their ranges: Hz, V peak, V."""
+"""The generator's settings with their ranges: Hz, V peak, V."""
 UNITS = {"frequency": "Hz", "amplitude": "V", "offset": "V", "x": "V", "v": "V", "λ": "1/s"}
-"""Of a board, by parameter, and of the two axes and the exponent of a diagram."""
+"""The units of a board's parameters, and of the two axes and the exponent of a diagram."""
 
 
 class BoardSubject:
@@ -71,7 +71,7 @@ class BoardSubject:
 
     @property
     def stops(self) -> tuple[ShownStop, ...]:
-        """Those of ``shown_stops``, by the names of several clearances."""
+        """The stops of ``shown_stops``, by the names of several clearances."""
         model = self.design.model.second_order()
         shown, several = shown_stops(model) or UPPER, len(model.clearances) > 1
         return tuple(self._stop(model, k, side, several=several) for k, side in shown)
@@ -132,9 +132,11 @@ class BoardSubject:
         if parameter == "omega":
             return Family("omega", 0.0, GREATEST, lambda w: self._flow({"frequency": frequency(w)}))
         own = self.design.model.second_order().own_frequency
-        stand = {"frequency": frequency(own)} if self.frequency is None else {}
+        own_frequency = {"frequency": frequency(own)} if self.frequency is None else {}
         return Family(
-            parameter, *SETTINGS[parameter], lambda value: self._flow({**stand, parameter: value})
+            parameter,
+            *SETTINGS[parameter],
+            lambda value: self._flow({**own_frequency, parameter: value}),
         )
 
     def plane(self, first: str, second: str) -> FlowPlane:
@@ -178,8 +180,8 @@ class BoardSubject:
 
     @property
     def _ratio(self) -> float:
-        """Of the second channel's amplitude to the first one's at the model's own frequency; 0
-        without one."""
+        """The second channel's amplitude over the first one's at the model's own frequency; 0
+        without a second channel."""
         design = self.design
         first, *others = (design.amplitude(channel=k) for k in range(len(design.drive_shapes)))
         return others[0] / first if others else 0.0

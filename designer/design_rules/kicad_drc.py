@@ -120,7 +120,7 @@ def check(
     version = needed_version()
     doing("KiCad's check of the board")
     reported = _understood(tuple(rules), version, shutil.which(PROGRAM))
-    files = _beside(board, footprints, fab)
+    files = _project_files(board, footprints, fab)
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
         text = rules_text([*rules, canary()])
         answer = report(_with_canary(board), text, Path(scratch) / "board", files)
@@ -151,7 +151,7 @@ def _understood(rules: tuple[CustomRule, ...], version: str, program: str | None
     return frozenset(reported)
 
 
-def _beside(
+def _project_files(
     board: BoardFile, footprints: Sequence[FootprintShape], fab: FabLimits | None
 ) -> dict[str, str]:
     """Files that stand beside a board when it is checked, by name."""

@@ -45,7 +45,8 @@ def output_current(s: RuleSubject) -> Iterator[Finding]:
 
 
 def fault_current(s: RuleSubject) -> Iterator[Finding]:
-    """From the generator into each input with the supply off, every output and rail at 0 V.
+    """The current from the generator into each input with the supply off, every output and rail at
+    0 V.
 
     A pair of opposed diodes to ground at the node takes the current in the input's place; the two
     share it at worst, for both drop a diode's voltage.
@@ -72,7 +73,7 @@ def power(s: RuleSubject) -> Iterator[Finding]:
 
 
 def power_stuck(s: RuleSubject) -> Iterator[Finding]:
-    """The same with an op-amp stuck at a rail."""
+    """The power with an op-amp stuck at a rail."""
     return _power(s, s.stuck)
 
 
@@ -154,16 +155,16 @@ def temperature(s: RuleSubject) -> Iterator[Finding]:
     ------
     NotRun : the catalogue has no end of the range.
     """
-    stands = s.opamp.temperature
-    if stands is None or (stands.min is None and stands.max is None):
+    rated = s.opamp.temperature
+    if rated is None or (rated.min is None and rated.max is None):
         raise NotRun(f"the catalogue has no range of temperatures of {s.opamp.name}")
     low, high = s.catalog.temperatures or (ROOM, ROOM)
     for end, room in (
-        (stands.min, None if stands.min is None else low - stands.min),
-        (stands.max, None if stands.max is None else stands.max - high),
+        (rated.min, None if rated.min is None else low - rated.min),
+        (rated.max, None if rated.max is None else rated.max - high),
     ):
         if room is not None:
-            at = low if end == stands.min else high
+            at = low if end == rated.min else high
             yield Finding(room, s.opamp.name, more=f"boards at {at:g} °C, specified to {end:g} °C")
 
 

@@ -23,7 +23,7 @@ from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
-from designer.synthesis.operating_point import Operating, operating, stuck, together
+from designer.synthesis.operating_point import Operating, merged, operating, stuck
 from designer.synthesis.output_loads import Run
 from designer.synthesis.static_shifts import Shifts, forces, least_drive
 
@@ -85,7 +85,7 @@ class RuleSubject:
 
     @cached_property
     def reduction(self) -> Reduction:
-        """Of the nominal board."""
+        """The reduction of the nominal board."""
         return nominal_reduction(replace(self.design, circuit=self.circuit))
 
     @cached_property
@@ -99,7 +99,7 @@ class RuleSubject:
 
     @cached_property
     def each_run(self) -> dict[str, Operating]:
-        """Of each wanted response, and of each start from rest, by its name.
+        """What is met in each wanted response, and in each start from rest, by its name.
 
         Raises
         ------
@@ -115,13 +115,14 @@ class RuleSubject:
         ------
         NotRun : there is no orbit to go by.
         """
-        found = together(list(self.each_run.values()))
+        found = merged(list(self.each_run.values()))
         found.left_out |= self._runs[1]
         return _complete(found, "at")
 
     @cached_property
     def stuck(self) -> Operating:
-        """With each op-amp stuck at each rail, at the largest amplitude of the wanted responses."""
+        """What is met with each op-amp stuck at each rail, at the largest amplitude of the wanted
+        responses."""
         runs, left_out = self._runs
         if not runs:
             raise NotRun(f"no orbit of the exact circuit: {left_out}")

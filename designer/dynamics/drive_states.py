@@ -33,19 +33,19 @@ def with_drive_states(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseL
         A = np.zeros((n + more, n + more))
         A[:n, :n] = mode.A
         A[:n, n:] = np.outer(mode.B, drives)
-        if mode.beside is not None:
-            A[:n, n:] += np.outer(mode.beside, others)
+        if mode.second is not None:
+            A[:n, n:] += np.outer(mode.second, others)
         if mode.waves is not None:
             A[:n, n + 1 :] += drive.amplitude * mode.waves
         for i, order in enumerate((1, *orders)):
             sine = n + 2 * i
             A[sine, sine + 1], A[sine + 1, sine] = order * drive.omega, -order * drive.omega
         guards = tuple(
-            replace(g, C=np.concatenate([g.C, g.D * drives + g.beside * others]), beside=0.0)
+            replace(g, C=np.concatenate([g.C, g.D * drives + g.second * others]), second=0.0)
             for g in mode.guards
         )
         B, d = (np.concatenate([vector, np.zeros(more)]) for vector in (mode.B, mode.d))
-        return replace(mode, A=A, B=B, d=d, guards=guards, waves=None, beside=None)
+        return replace(mode, A=A, B=B, d=d, guards=guards, waves=None, second=None)
 
     names = (f"{wave} {order}" for order in orders for wave in ("sine", "cosine"))
 

@@ -172,8 +172,8 @@ class Flow:
         """Key of the mode that holds at state x (n,) and drive phase ``phase`` [rad]; as of
         ``PiecewiseLinearSystem.mode_at``."""
         angle = np.array([phase])
-        u, beside = float(self.drive.at(angle)[0]), float(self.drive.beside_at(angle)[0])
-        return self.system.mode_at(x, u, near, beside=beside)
+        u, second_drive = float(self.drive.at(angle)[0]), float(self.drive.second_at(angle)[0])
+        return self.system.mode_at(x, u, near, second_drive=second_drive)
 
     def to_strobe(self, x: Array, phase: float) -> FlowResult:
         """Start in state x (n,) at drive phase ``phase`` [rad] and run to the next strobe; by the
@@ -203,7 +203,7 @@ class Flow:
         measure: bool,
         phase: float = 0.0,
     ) -> FlowResult:
-        """The same by the general kernel, which builds modes as it meets them. phase : of the drive
+        """The run by the general kernel, which builds modes as it meets them. phase : of the drive
         at the start."""
         z, before = mode_tables.augmented_state(x, phase, self.orders), phi.copy()
         clock, budget = np.array([phase / self.drive.omega, 0.0, 0.0]), self._budget or Budget()
@@ -253,7 +253,7 @@ class Flow:
         phi: Array,
         max_events: int,
     ) -> FlowResult:
-        """The same by the fast path: no impact log, no extremes."""
+        """The run by the fast path: no impact log, no extremes."""
         keys = modal_tables.keys(self.system)
         cursor = np.array([keys.index(key), 0], dtype=np.int64)
         log = self._log(x, periods, 0)
@@ -280,7 +280,7 @@ class Flow:
         *,
         measure: bool,
     ) -> FlowResult | None:
-        """The same by the tabulated fast path; None where the run leaves the working modes."""
+        """The run by the tabulated fast path; None where it leaves the working modes."""
         try:
             cursor = np.array([modes.number(key), 0, measure, 0], dtype=np.int64)
         except ArithmeticError:

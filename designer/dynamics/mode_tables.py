@@ -28,8 +28,8 @@ def augmented(mode: Mode, drive: Drive, orders: Sequence[int] = ()) -> Array:
     M[:n, :n] = mode.A
     M[:n, n:] = np.outer(mode.B, drive_row(drive, orders))
     M[:n, n + 2] += mode.d
-    if mode.beside is not None:
-        M[:n, n:] += np.outer(mode.beside, second_row(drive, orders))
+    if mode.second is not None:
+        M[:n, n:] += np.outer(mode.second, second_row(drive, orders))
     M[n, n + 1] = drive.omega
     M[n + 1, n] = -drive.omega
     if mode.waves is not None:
@@ -83,7 +83,8 @@ def step_length(A: Array, omega: float) -> float:
 
 @lru_cache(maxsize=256)
 def _balanced_norm(entries: bytes, size: int) -> float:
-    """Of a state matrix, after balancing; kept, for flows along a curve differ in the drive."""
+    """The norm of a state matrix after balancing. It is kept, for flows along a curve differ in the
+    drive."""
     A = np.frombuffer(entries).reshape(size, size)
     balanced, _ = matrix_balance(A, permute=False)
     return float(np.linalg.norm(balanced, 2))
@@ -122,7 +123,7 @@ def fill(
         C, D, e = mode.guard_rows
         ahead = np.column_stack([C, np.outer(D, drive_row(drive, orders))])
         ahead[:, C.shape[1] + 2] += e  # as of ``augmented_row``
-        ahead[:, C.shape[1] :] += np.outer(mode.guards_beside, second_row(drive, orders))
+        ahead[:, C.shape[1] :] += np.outer(mode.second_guards, second_row(drive, orders))
         all_rows_of_terms(ahead, powers, taylors)
         chords = np.einsum("k,gkj->gj", CHORD, np.abs(taylors[:count]))
         tables.chord[i, :count] = chords * (1.0 + 1e-9)

@@ -33,7 +33,7 @@ LONGEST_WALK = 512
 """Mode changes after which the search for the mode of a state gives up."""
 
 ROUNDING = 1e-14
-"""Of the sum of a guard's terms' magnitudes: what cannot be told from zero."""
+"""What cannot be told from zero, over the sum of a guard's terms' magnitudes."""
 
 ModeKey = tuple[int, ...]
 
@@ -53,7 +53,7 @@ class Guard:
     clearance: int = -1
     """Index of the clearance whose contact begins or ends here, or -1. Such guards are scaled to
     displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop."""
-    beside: float = 0.0
+    second: float = 0.0
     """Coefficient of the second drive."""
 
 
@@ -76,7 +76,7 @@ class Mode:
     waves: Array | None = None
     """(n, 1 + 2 h) input vectors of ``PiecewiseLinearSystem.waves``, without the amplitude; None
     where the drive is a sine."""
-    beside: Array | None = None
+    second: Array | None = None
     """(n,) input vector of the second drive; None where there is none."""
 
     @cached_property
@@ -86,9 +86,9 @@ class Mode:
         return C, np.array([g.D for g in self.guards]), np.array([g.e for g in self.guards])
 
     @cached_property
-    def guards_beside(self) -> Array:
+    def second_guards(self) -> Array:
         """(guards,) coefficients of the second drive."""
-        return np.array([g.beside for g in self.guards])
+        return np.array([g.second for g in self.guards])
 
 
 @dataclass(frozen=True)
@@ -151,11 +151,11 @@ class Drive:
         """(k,) u at angles ωt (k,)."""
         return self.amplitude * wave(self.shape, angle) + self.offset
 
-    def beside_at(self, angle: Array) -> Array:
+    def second_at(self, angle: Array) -> Array:
         """(k,) the second drive at angles ωt (k,); 0 where there is none."""
         return np.zeros_like(angle) if self.second is None else self.second.at(angle)
 
-    def beside_rate_at(self, angle: Array) -> Array:
+    def second_rate_at(self, angle: Array) -> Array:
         """(k,) the second drive's rate at angles ωt (k,)."""
         if self.second is None:
             return np.zeros_like(angle)
@@ -239,9 +239,10 @@ class PiecewiseLinearSystem:
         return known
 
     def mode_at(
-        self, x: Array, u: float, near: ModeKey | None = None, *, beside: float = 0.0
+        self, x: Array, u: float, near: ModeKey | None = None, *, second_drive: float = 0.0
     ) -> ModeKey:
-        """Key of the mode that holds at state x (n,) and drive u, with the second drive ``beside``.
+        """Key of the mode that holds at state x (n,) and drive u, with the second drive
+        ``second_drive``.
 
         Walks from ``near`` (default: ``start``) across the most violated guard until none is
         violated. Where that walk meets a mode twice it goes on across the first violated guard
@@ -260,7 +261,7 @@ class PiecewiseLinearSystem:
             mode = self.mode(key)
             cycling = cycling or key in seen
             seen.add(key)
-            values = [float(g.C @ x) + g.D * u + g.e + g.beside * beside for g in mode.guards]
+            values = [float(g.C @ x) + g.D * u + g.e + g.second * second_drive for g in mode.guards]
             floors = [ROUNDING * _size(g, x, u) if cycling else 0.0 for g in mode.guards]
             violated = [i for i, value in enumerate(values) if value > floors[i]]
             if not violated:

@@ -19,7 +19,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 
 RESOLUTION = 0.05
-"""Of the fastest rate that an orbit meets: interval of the grid, which leaves 1e-13 of the peak."""
+"""The interval of the grid, over the fastest rate that an orbit meets; it leaves 1e-13 of the
+peak."""
 FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
 
@@ -90,7 +91,7 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
     """(nodes, states) x' and x'', each node in the mode that holds there at its drive phase."""
     drive, orders = flow.drive, flow.system.orders
     u, du = drive.at(angle), drive.rate_at(angle)
-    beside, moving = drive.beside_at(angle), drive.beside_rate_at(angle)
+    second_drive, moving = drive.second_at(angle), drive.second_rate_at(angle)
     waves = drive.amplitude * flow.system.waves(angle)
     turns = _turned(waves, drive.amplitude * np.sin(angle), drive.omega, orders or ())
     first, second = np.empty_like(x), np.empty_like(x)
@@ -101,7 +102,7 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
         holds = np.ones(len(left), dtype=bool)
         for guard in mode.guards:
             value = x[left] @ guard.C + guard.D * u[left] + guard.e
-            holds &= value + guard.beside * beside[left] <= 0.0
+            holds &= value + guard.second * second_drive[left] <= 0.0
         holds[0] = True  # by rounding a guard may be above zero where its mode was found
         nodes, left = left[holds], left[~holds]
         first[nodes] = x[nodes] @ mode.A.T + u[nodes, None] * mode.B + mode.d
@@ -109,9 +110,9 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
         if mode.waves is not None:
             first[nodes] += waves[nodes] @ mode.waves.T
             second[nodes] += turns[nodes] @ mode.waves.T
-        if mode.beside is not None:
-            first[nodes] += beside[nodes, None] * mode.beside
-            second[nodes] += moving[nodes, None] * mode.beside
+        if mode.second is not None:
+            first[nodes] += second_drive[nodes, None] * mode.second
+            second[nodes] += moving[nodes, None] * mode.second
         second[nodes] += first[nodes] @ mode.A.T
     return first, second
 

@@ -21,7 +21,7 @@ from designer.explorer.place import ModelPlace
 from designer.explorer.saved_model import PinnedResponse, saved_text
 from designer.explorer.wire import Message
 from designer.model.model_file import ModelFile, parse_model_file
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.yields.study import plan_study
 from designer.yields.yield_count import count
 
@@ -85,7 +85,7 @@ def board_box(
     verdicts = []
     yield {"kind": "board", "words": "", "rows": rows}
     for indices in plan.blocks(PIECE):
-        verdicts += exact_rung.block(plan, indices, 1)
+        verdicts += exact_circuit.block(plan, indices, 1)
         counted = count(verdicts)
         low, high = counted.interval
         yield {

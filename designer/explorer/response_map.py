@@ -106,11 +106,12 @@ def stepped(call: Callable[[Callable[[], None]], Result]) -> Generator[None, Non
 COLUMNS, ROWS = 65, 49
 """Points of the finest grid, its ends included."""
 STRIDES = (8, 4, 2, 1)
-"""Of the grid's points: every eighth one first, and so on; none is computed twice."""
+"""The strides over the grid's points: every eighth one first, and so on; none is computed twice."""
 REACH = 0.2
 """How far a map reaches to each side where nobody says: of the value, within the slider's ends."""
 STEPS = 200_000
-"""Of a point that the compiled engine does not name: some 50 ms. A picture may take more."""
+"""The most steps of a point that the compiled engine does not name: some 50 ms. A picture may take
+more."""
 PIECE = 0.03
 """Seconds after which a piece ends."""
 
@@ -145,9 +146,9 @@ class MapRequest:
     place: ModelPlace
     """Where the other parameters stay."""
     x: MapSide
-    """From left to right."""
+    """The side from left to right."""
     y: MapSide
-    """From bottom to top."""
+    """The side from bottom to top."""
 
     @property
     def subject(self) -> ModelSubject:
@@ -224,7 +225,7 @@ def borders(request: MapRequest) -> Iterator[Message]:
     if hindrance:
         yield _borders_message([], hindrance, done=True)
         return
-    (x, y), whose = request.at, f"Borders of {summary(orbit)}"
+    (x, y), title = request.at, f"Borders of {summary(orbit)}"
     plan = CurvePlan(request.subject, request.x.name, request.y.name, y, request.window)
     curves: list[BorderCurve] = []
 
@@ -232,8 +233,8 @@ def borders(request: MapRequest) -> Iterator[Message]:
         curves.extend(border_curves.around(plan, orbit, x, step))
 
     for points, _ in enumerate(stepped(follow)):
-        yield _borders_message(curves, f"{whose}: being followed, {points} points so far")
-    words = whose if curves else f"{whose}: none was found within the map"
+        yield _borders_message(curves, f"{title}: being followed, {points} points so far")
+    words = title if curves else f"{title}: none was found within the map"
     yield _borders_message(curves, words, done=True)
 
 

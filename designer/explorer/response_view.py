@@ -55,7 +55,7 @@ class Detail:
 
 
 DETAIL = Detail()
-"""Of a page whose pictures come one by one."""
+"""The detail of a page whose pictures come one by one."""
 Pack = Callable[[Mapping[str, ArrayLike]], Message]
 """Makes columns of numbers ready for a page."""
 
@@ -76,7 +76,7 @@ class ShownMotion:
 
 
 def shown_motions(system: SecondOrderSystem) -> tuple[ShownMotion, ...]:
-    """Those in the clearances in their order, then the absolute ones of all masses."""
+    """The motions in the clearances in their order, then the absolute ones of all masses."""
     gaps = [
         ShownMotion(motion, k if system.clearances else None)
         for k, motion in enumerate(relative_motions(system))
@@ -185,7 +185,7 @@ def _trace(flow: Flow, orbit: Orbit, periods: int, points: int) -> tuple[Array, 
 
 
 def _impacts(flow: Flow, orbit: Orbit, shown: ShownMotion) -> Array:
-    """Those of one clearance over n periods; none of a motion without a period."""
+    """The impacts of one clearance over n periods; none of a motion without a period."""
     here = orbit.impact_clearances == shown.clearance
     places = dict(shown.motion.stops)
     sides = [places.get(int(side), np.nan) for side in orbit.impact_sides[here]]
@@ -214,18 +214,18 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
     if len(orbit.extremes):
         names = state_labels(place.model.second_order())[0::2]
         for name, (low, high) in zip(names, orbit.extremes[0::2], strict=True):
-            rows.append((name, _together([low, high], "m", place, 4, " to ")))
+            rows.append((name, _in_one_unit([low, high], "m", place, 4, " to ")))
     if orbit.n:
         rows += _impact_rows(orbit, place)
     if np.isfinite(orbit.penetration):
-        rows.append(("shallowest contact", _together([orbit.penetration], "m", place, 3)))
+        rows.append(("shallowest contact", _in_one_unit([orbit.penetration], "m", place, 3)))
     if np.isfinite(orbit.miss):
-        rows.append(("nearest miss", _together([orbit.miss], "m", place, 3)))
+        rows.append(("nearest miss", _in_one_unit([orbit.miss], "m", place, 3)))
     return rows
 
 
 def _impact_rows(orbit: Orbit, place: ModelPlace) -> Iterator[tuple[str, str]]:
-    """For each stop how many impacts it has in the orbit's period, and with what velocities."""
+    """How many impacts each stop has in the orbit's period, and with what velocities."""
     system = place.model.second_order()
     for k, motion in enumerate(relative_motions(system)):
         of = f" of {system.clearances[k].name}" if len(system.clearances) > 1 else ""
@@ -241,10 +241,10 @@ def _impacts_text(rate: str, velocities: Array, place: ModelPlace) -> str:
     few = count <= LISTED
     listed, between = (velocities, ", ") if few else (velocities[[0, -1]], " to ")
     words = "1 impact" if count == 1 else f"{count} impacts"
-    return f"{words}, {rate}\u00a0=\u00a0{_together(listed, 'm/s', place, 3, between)}"
+    return f"{words}, {rate}\u00a0=\u00a0{_in_one_unit(listed, 'm/s', place, 3, between)}"
 
 
-def _together(
+def _in_one_unit(
     values: Sequence[float] | Array, unit: str, place: ModelPlace, digits: int, between: str = ""
 ) -> str:
     """Values in one unit, which suits the largest of them."""

@@ -39,7 +39,7 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, StudyPlan
 from designer.yields.study import plan_study
 from designer.yields.yield_count import Yield, all_on_one, count
@@ -69,7 +69,7 @@ class RecordedYields:
     """The yields of a file, or why there are none."""
 
     words: str
-    """On what they stand, or why there are none."""
+    """What the yields stand on, or why there are none."""
     rows: tuple[RecordedYield, ...] = ()
     """One for each wanted response, then all of them on one board."""
 
@@ -107,10 +107,10 @@ def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> Reco
 
 
 def _answers(plan: StudyPlan, options: Options, progress: Progress) -> list[Answer]:
-    """Those of every board on the exact circuit."""
+    """The answers of every board on the exact circuit."""
     step, answers = progress.stage("boards", plan.samples), []
     for indices in plan.blocks(PIECE) if plan.questions else ():
-        answers += exact_rung.block(plan, indices, options.workers)
+        answers += exact_circuit.block(plan, indices, options.workers)
         for _ in indices:
             step()
     return answers
@@ -128,7 +128,7 @@ def _words(counted: Yield) -> str:
 
 
 DETAIL = Detail(points=512, fewest=40, most=256, long=12, strobes=120)
-"""Of a recorded picture: a page of a hundred of them can still be mailed."""
+"""The detail of a recorded picture: a page of a hundred of them can still be mailed."""
 MOTIONS = 4
 """Displacements that are recorded, those in the clearances first."""
 ROOM, PER_VIEW, PER_MOTION = 1_250_000, 1_600, 5_000
@@ -281,7 +281,7 @@ def _window(
 
 
 def _distinct(windows: Sequence[RecordedWindow]) -> list[RecordedWindow]:
-    """Of windows that were located from two of their places, the first."""
+    """The first of the windows that were located from two of their places."""
     out: list[RecordedWindow] = []
     for each in windows:
         low, response = each.window.low.value, each.window.response

@@ -56,8 +56,8 @@ class WorkQueue:
         number : the ``id`` that every message then has.
         """
         with self._change:
-            for (whose, _), question in self._asked.items():
-                if whose == page:
+            for (owner, _), question in self._asked.items():
+                if owner == page:
                     question.rests_until = time.monotonic() + PAUSE
             self._asked[page, topic] = _Question(number, answer, send)
             self._change.notify()
@@ -95,10 +95,10 @@ class WorkQueue:
         with self._change:
             while self._open:
                 items, now = list(self._asked.items()), time.monotonic()
-                fresh = [item for item in items if item[1].messages is None]
-                ready = fresh or [item for item in items if item[1].rests_until <= now]
+                unasked = [item for item in items if item[1].messages is None]
+                ready = unasked or [item for item in items if item[1].rests_until <= now]
                 if ready:
-                    return ready[0] if fresh else ready[next(self._turn) % len(ready)]
+                    return ready[0] if unasked else ready[next(self._turn) % len(ready)]
                 rests = [question.rests_until - now for _, question in items]
                 self._change.wait(min(rests, default=None))
             return None

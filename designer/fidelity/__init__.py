@@ -1,2 +1,2 @@
-"""What accuracy costs: time and error of every rung on a design, and the cheapest for a
+"""What accuracy costs: time and error of every fidelity on a design, and the cheapest for a
 question."""

@@ -1,7 +1,7 @@
 """The pieces of a trade, each kept as soon as it is done: interrupted work goes on from them.
 
-Of each response one piece with every rung, and one for every ``CHUNK`` boards. They stand in one
-file of the design folder, a line each with its own seal (``base.keyed_store``), which goes when
+Of each response one piece with every fidelity, and one for every ``CHUNK`` boards. They stand in
+one file of the design folder, a line each with its own seal (``base.keyed_store``), which goes when
 the trade is finished.
 """
 
@@ -19,8 +19,8 @@ from designer.base.keyed_store import Lines, Note
 from designer.base.plain_json import plain
 from designer.base.progress import quiet
 from designer.base.record_check import checked_record
+from designer.fidelity.fidelity_errors import FidelityError, Truth
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.rung_errors import RungError, Truth
 from designer.fidelity.yields import Tally
 from designer.spice.deck import SolverSettings
 
@@ -76,10 +76,10 @@ def read_pieces(path: Path, key: str, note: Note = quiet) -> dict[str, dict[str,
 
 
 def _may_be(name: str, piece: Mapping[str, Any]) -> bool:
-    """Whether a piece is such as ``rungs`` or ``tally`` read."""
+    """Whether a piece is such as ``fidelities`` or ``tally`` read."""
     try:
         if name.startswith("rungs "):
-            rungs(piece)
+            fidelities(piece)
             return _number(piece["elapsed"]) >= 0.0
         counts = {k: v for k, v in asdict(tally(piece)).items() if isinstance(v, int)}
     except UNREADABLE:
@@ -93,10 +93,10 @@ def _lines(key: str) -> Lines:
     return Lines("pieces", key)
 
 
-def rungs_json(
-    rows: tuple[RungError, ...], truth: Truth, settings: SolverSettings | None, seconds: float
+def fidelities_json(
+    rows: tuple[FidelityError, ...], truth: Truth, settings: SolverSettings | None, seconds: float
 ) -> dict[str, Any]:
-    """A response on every rung; settings, seconds : as in ``rungs.RungAnswers``."""
+    """A response at every fidelity; settings, seconds : as in ``FidelityAnswers``."""
     return {
         "rows": [asdict(row) for row in rows],
         "truth": asdict(truth),
@@ -105,10 +105,10 @@ def rungs_json(
     }
 
 
-def rungs(
+def fidelities(
     piece: Mapping[str, Any],
-) -> tuple[tuple[RungError, ...], Truth, SolverSettings | None, float]:
-    """The inverse of ``rungs_json``; numbers that are not finite come back as nan."""
+) -> tuple[tuple[FidelityError, ...], Truth, SolverSettings | None, float]:
+    """The inverse of ``fidelities_json``; numbers that are not finite come back as nan."""
     settings = piece["settings"]
     return (
         tuple(_compared(row) for row in piece["rows"]),
@@ -123,9 +123,9 @@ def tally(piece: Mapping[str, Any]) -> Tally:
     return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
 
 
-def _compared(row: Mapping[str, Any]) -> RungError:
+def _compared(row: Mapping[str, Any]) -> FidelityError:
     return checked_record(
-        RungError,
+        FidelityError,
         {
             **row,
             "label": checked_record(ResponseLabel, row["label"]),

@@ -24,8 +24,8 @@ from designer.base.figure_style import (
 from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table, table_of
 from designer.base.plain_json import FORMAT, plain
 from designer.base.si_unit import drive_text
-from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
-from designer.fidelity.rungs import RUNGS, VENDOR
+from designer.fidelity.fidelity_answers import FIDELITIES, VENDOR
+from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, FidelityError, Truth
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
 from designer.model.model import SiScales
@@ -68,7 +68,7 @@ def trade_json(
     title: str,
     si: SiScales | None = None,
 ) -> dict[str, Any]:
-    """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``.
+    """``fidelities``, ``cheapest``, ``truths``, ``boards`` and ``left_out``.
 
     si : each row of a response also gets ``frequency_hz``, of the mechanism's force.
     """
@@ -92,8 +92,8 @@ def trade_json(
     return dict(plain(document))
 
 
-def _row(row: RungError, truth: Truth) -> dict[str, Any]:
-    """No rung has an error against itself: what its steps differ by is its convergence."""
+def _row(row: FidelityError, truth: Truth) -> dict[str, Any]:
+    """No fidelity has an error against itself: what its steps differ by is its convergence."""
 
     def against(errors: Mapping[str, float], of: str) -> float:
         return math.nan if truth.is_itself(row.rung, of) else errors[of]
@@ -172,7 +172,8 @@ def name(row: Mapping[str, Any]) -> str:
 
 
 def sheet(answer: Mapping[str, Any]) -> str:
-    """trade.md: the cheapest rung for each question, then every rung, from the JSON object."""
+    """trade.md: the cheapest fidelity for each question, then every fidelity, from the JSON
+    object."""
     head = [
         Markup(
             f"Made by `designer trade` with `--boards {_boards_asked(answer)} --seed "
@@ -217,12 +218,12 @@ def cheapest_table(answer: Mapping[str, Any]) -> Table | None:
         if c["number"] is not None and not alone:
             continue
         shown = {True: "yes", False: "no", None: NONE}[c["shown"]]
-        rung = [NONE] * 4
+        fidelity = [NONE] * 4
         if c["rung"]:
-            rung = [TITLES[c["rung"]], c["level"], _measured(c, "measured")]
-            rung.append(_measured(c, "convergence"))
+            fidelity = [TITLES[c["rung"]], c["level"], _measured(c, "measured")]
+            fidelity.append(_measured(c, "convergence"))
         seconds = _short(c["seconds"]) if c["rung"] else NONE
-        rows.append((c["question"], c["of"], *rung, shown, seconds, c["note"]))
+        rows.append((c["question"], c["of"], *fidelity, shown, seconds, c["note"]))
     columns = (
         "question", "against", "rung", "setting", "measured", "convergence", "kept", "CPU seconds",
         "note",
@@ -234,8 +235,8 @@ def _by_response(answer: Mapping[str, Any]) -> list[Block]:
     truths = answer["truths"]
     by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
     rows = [
-        (TITLES[rung], level, *(_cell(by.get((rung, level, t["number"]))) for t in truths))
-        for rung, level in dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"])
+        (TITLES[fidelity], level, *(_cell(by.get((fidelity, level, t["number"]))) for t in truths))
+        for fidelity, level in dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"])
     ]
     heads = (f"{name(t)}: {t['response']}" for t in truths)
     return [
@@ -318,7 +319,7 @@ def _percent(value: float | None) -> str:
 
 
 def _short(value: float | None) -> str:
-    """To two figures, without an exponent where it need not be."""
+    """A number to two figures, without an exponent where none is needed."""
     if value is None:
         return NONE
     return f"{float(f'{value:.2g}'):.10g}"
@@ -340,9 +341,9 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     not the board's, pale where ngspice's setting did not pass the gate. What the error is measured
     against is not shown.
 
-    key : "error", against the board, where a line joins what no other rung beats in both; or
-    "numerical_error", against the exact flow of the rung's own equations, or where there is none
-    its convergence, so that rungs do not compete.
+    key : "error", against the board, where a line joins what no other fidelity beats in both; or
+    "numerical_error", against the exact flow of the fidelity's own equations, or where there is
+    none its convergence, so that fidelities do not compete.
     """
     if key == "numerical_error":
         known = [{**row, key: row[key] or row["convergence"]} for row in answer["rungs"]]
@@ -364,7 +365,7 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
         if i + columns >= len(truths):
             axes.set_xlabel("CPU seconds of a drive period")
             axes.tick_params(labelbottom=True)  # also where the row below is not full
-    used = [r for r in RUNGS if any(row["rung"] == r for row in shown)]
+    used = [r for r in FIDELITIES if any(row["rung"] == r for row in shown)]
     handles = [_mark(*_LOOKS[r], TITLES[r]) for r in used]
     if any(not row["right"][BOARD] for row in shown):
         handles.append(_mark(MUTED, "o", "hollow: another n-p-q", mfc="white"))

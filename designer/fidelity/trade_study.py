@@ -1,9 +1,9 @@
-"""What accuracy costs on a design: every rung against the most faithful one, and the cheapest that
-answers each question.
+"""What accuracy costs on a design: every fidelity against the most faithful one, and the cheapest
+that answers each question.
 
-Two truths are asked of a response (``fidelity.rung_errors``), and of boards a third, ngspice with
-ideal op-amps. A bound counts as kept only if the error and the truth's own uncertainty, what its
-two finest steps differ by, keep it together. The board's truth is the answer where that
+Two truths are asked of a response (``fidelity.fidelity_errors``), and of boards a third, ngspice
+with ideal op-amps. A bound counts as kept only if the error and the truth's own uncertainty, what
+its two finest steps differ by, keep it together. The board's truth is the answer where that
 uncertainty keeps the bound and nothing less does. A setting of ngspice that did not pass the
 numerics gate, the truth's own too, is measured and is never named.
 """
@@ -14,9 +14,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from designer.fidelity.fidelity_answers import CIRCUIT, MODEL, RK4
+from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, FidelityError, Truth
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
-from designer.fidelity.rungs import CIRCUIT, MODEL, RK4
 from designer.fidelity.yields import BoardTrade, LeftOut
 
 IDEAL = "ideal"
@@ -30,7 +30,7 @@ RESPONSE, IMPACT, WAVE, SHARE = (
     "yield within 1 %",
 )
 QUESTIONS = (RESPONSE, IMPACT, WAVE)
-"""Of a response; ``SHARE`` is one of boards."""
+"""The questions about a response; ``SHARE`` is the one about boards."""
 NO_IMPACTS = "no impacts"
 NO_PERIOD = "no period"
 """Why questions do not arise."""
@@ -42,45 +42,47 @@ UNSURE = "the two finest steps of the board show different n-p-q, or none"
 
 @dataclass(frozen=True)
 class Cheapest:
-    """The cheapest rung that answers a question.
+    """The cheapest fidelity that answers a question.
 
-    A question that does not arise has no rung, no setting and no answer (None), and the note says
-    why.
+    A question that does not arise has no fidelity, no setting and no answer (None), and the note
+    says why.
     """
 
     question: str
-    """What is asked of a rung."""
+    """What is asked of a fidelity."""
     of: str
-    """What the rung is measured against: the board, its equations, or ideal op-amps in ngspice."""
+    """What the fidelity is measured against: the board, its equations, or ideal op-amps in
+    ngspice."""
     label: ResponseLabel | None
     """Which response; None for all responses together."""
     rung: str | None
-    """Name of the rung; None where there is none."""
+    """Name of the fidelity; None where there is none."""
     level: str | None
     """Name of the setting; None where there is none."""
     bound: float
     """Largest error that answers the question."""
     measured: float
-    """The largest error with the truth's uncertainty, of this rung; for n-p-q the number of
-    responses it has wrong; nan where there is none to measure, and of a rung that stands for what
-    it would be measured against."""
+    """The largest error with the truth's uncertainty, of this fidelity; for n-p-q the number of
+    responses it has wrong; nan where there is none to measure, and of a fidelity that stands for
+    what it would be measured against."""
     shown: bool | None
-    """Whether that keeps the bound; where not, the rung is the one that comes nearest, or none
+    """Whether that keeps the bound; where not, the fidelity is the one that comes nearest, or none
     where the truth is not sure."""
     seconds: float
     """CPU time of a drive period, summed over the responses [s]."""
     note: str = ""
     """What else there is to say."""
     convergence: float = math.nan
-    """In place of ``measured`` where a rung is compared with itself: what its steps differ by."""
+    """What the steps of a fidelity differ by; it takes the place of ``measured`` where a fidelity
+    is compared with itself."""
 
 
 @dataclass(frozen=True)
 class TradedResponse:
     """What was found of one response."""
 
-    rows: tuple[RungError, ...]
-    """Its errors by rung and setting."""
+    rows: tuple[FidelityError, ...]
+    """Its errors by fidelity and setting."""
     truth: Truth
     """What the board does."""
     boards: BoardTrade | LeftOut | None = None
@@ -94,7 +96,7 @@ class Trade:
     responses: tuple[TradedResponse, ...]
     """What was found, in the order of the model file."""
     cheapest: tuple[Cheapest, ...]
-    """The cheapest rung for each question."""
+    """The cheapest fidelity for each question."""
 
 
 def trade(responses: Sequence[TradedResponse]) -> Trade:
@@ -109,7 +111,7 @@ def trade(responses: Sequence[TradedResponse]) -> Trade:
 
 
 def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Cheapest | None:
-    """The cheapest rung and setting that keeps the bound on all of these responses; the nearest
+    """The cheapest fidelity and setting that keeps the bound on all of these responses; the nearest
     where none does. None where nothing was asked."""
     bound = {RESPONSE: 0.0, IMPACT: VELOCITY, WAVE: WAVEFORM}[question]
     label = responses[0].truth.label if len(responses) == 1 else None
@@ -127,19 +129,21 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
     finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == truth.rung][-1:]
     kinds = dict.fromkeys((row.rung, row.level) for r in asked for row in r.rows)
     best: Cheapest | None = None
-    for rung, level in kinds:
-        picked = [row for r in asked for row in r.rows if (row.rung, row.level) == (rung, level)]
-        if len(picked) < len(asked) or not _competes(rung, of, picked):
+    for fidelity, level in kinds:
+        picked = [
+            row for r in asked for row in r.rows if (row.rung, row.level) == (fidelity, level)
+        ]
+        if len(picked) < len(asked) or not _competes(fidelity, of, picked):
             continue
         errors = [_error(question, of, row, r.truth) for row, r in zip(picked, asked, strict=True)]
         measured = sum(errors) if question == RESPONSE else max(errors)
         seconds = sum(row.seconds for row in picked)
         shown = measured <= bound
-        itself = of == BOARD and [(rung, level)] == finest
+        itself = of == BOARD and [(fidelity, level)] == finest
         if itself and not shown:
             continue  # nothing is nearer than what is measured against
         note = "; ".join([ITSELF, *left_out] if itself else left_out)
-        one = Cheapest(question, of, label, rung, level, bound, measured, shown, seconds, note)
+        one = Cheapest(question, of, label, fidelity, level, bound, measured, shown, seconds, note)
         if best is None or _rank(one) < _rank(best):
             best = one
     if best is None or best.rung is None or not truth.is_itself(best.rung, of):
@@ -148,7 +152,7 @@ def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Che
 
 
 def _no_question(question: str, of: str, truth: Truth) -> str:
-    """Why it does not arise; "" where it does."""
+    """Why a question does not arise; "" where it does."""
     if question == RESPONSE or (of == BOARD and not truth.sure):
         return ""
     if not truth.periodic[of]:
@@ -157,25 +161,28 @@ def _no_question(question: str, of: str, truth: Truth) -> str:
 
 
 def _rank(one: Cheapest) -> tuple[bool, float]:
-    """Those that keep the bound by their cost, the others by how far they are off."""
+    """The order of two candidates: those that keep the bound go by their cost, the others by how
+    far they are off."""
     measure = one.seconds if one.shown else one.measured
     return (not one.shown, math.inf if math.isnan(measure) else measure)
 
 
-def _competes(rung: str, of: str, picked: Sequence[RungError]) -> bool:
-    """Not where the gate was not passed; of the model's equations, only the ways to compute it."""
+def _competes(fidelity: str, of: str, picked: Sequence[FidelityError]) -> bool:
+    """Whether a fidelity may be named: it passed the gate, and against the model's equations it
+    computes the model."""
     if of == EQUATIONS:
-        return rung in (RK4, MODEL)
+        return fidelity in (RK4, MODEL)
     return all(row.gate is not False for row in picked)
 
 
-def _error(question: str, of: str, row: RungError, truth: Truth) -> float:
-    """With the uncertainty of a truth that is sure; infinite where it cannot be said."""
+def _error(question: str, of: str, row: FidelityError, truth: Truth) -> float:
+    """The error of an answer plus the uncertainty of a truth that is sure; infinite where the truth
+    is not."""
     if question == RESPONSE:
         return 0.0 if row.right[of] else 1.0
     own = row.velocity if question == IMPACT else row.error
-    beside = (truth.velocity if question == IMPACT else truth.error) if of == BOARD else 0.0
-    total = own[of] + beside
+    uncertainty = (truth.velocity if question == IMPACT else truth.error) if of == BOARD else 0.0
+    total = own[of] + uncertainty
     return total if row.right[of] and total == total else math.inf
 
 
@@ -187,14 +194,14 @@ def _of_boards(responses: Sequence[TradedResponse]) -> list[Cheapest]:
     out = [_of_some([b]) for b in asked]
     if len(asked) > 1 or (asked and missing):
         note = f"without response {', '.join(missing)}" if missing else ""
-        out.append(_of_some(asked, note, together=True))
+        out.append(_of_some(asked, note, combined=True))
     return out
 
 
-def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = False) -> Cheapest:
+def _of_some(some: Sequence[BoardTrade], note: str = "", *, combined: bool = False) -> Cheapest:
     measured = max(b.bound for b in some)
     off = any(b.off(YIELD) for b in some)
-    rung = "ideal" if off else CIRCUIT
+    fidelity = "ideal" if off else CIRCUIT
     # ngspice is what is measured against: the circuit's difference is what there is to say.
     notes = [f"the exact circuit is off by more than {100.0 * YIELD:g} %"] if off else []
     notes += [note] if note else []
@@ -204,12 +211,12 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
     return Cheapest(
         SHARE,
         IDEAL,
-        None if together else some[0].label,
-        rung,
+        None if combined else some[0].label,
+        fidelity,
         "gate" if off else "exact",
         YIELD,
         math.nan if off else measured,
         off or measured <= YIELD,
-        sum(b.seconds[rung] for b in some),
+        sum(b.seconds[fidelity] for b in some),
         "; ".join(notes),
     )

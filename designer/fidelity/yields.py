@@ -19,11 +19,11 @@ from designer.base.proportion import mid_p
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
-from designer.fidelity import rungs
+from designer.fidelity import fidelity_answers
 from designer.fidelity.label import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.cross_check import Ask, CrossCheck, StartKind, Why
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.verdicts.verdict import Answer, StudyPlan, Verdict
@@ -70,11 +70,11 @@ class Tally:
     lagging_decided: int = 0
     """Boards that the exact circuit decided with bandwidth and without."""
     lagging_ok: int = 0
-    """Of these, boards that are ok with bandwidth."""
+    """How many of these boards are ok with bandwidth."""
     lagging_gained: int = 0
-    """Of these, boards that are ok with bandwidth alone."""
+    """How many of these boards are ok with bandwidth alone."""
     lagging_lost: int = 0
-    """Of these, boards that are ok without bandwidth alone."""
+    """How many of these boards are ok without bandwidth alone."""
     lagging_seconds: float = 0.0
     """CPU time of the exact circuit with bandwidth [s]."""
 
@@ -121,7 +121,7 @@ class BoardTrade:
     periods: float
     """Drive periods of ngspice for a board, mean."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """CPU time of a board, by rung [s]."""
+    """CPU time of a board, by fidelity [s]."""
     resolved: int = 0
     """Boards of which ngspice says something else at the gate's step than at those that agree."""
     bandwidth: BandwidthYield | None = None
@@ -195,7 +195,7 @@ def question(
     response = made.model_responses[number - 1]
     if not response.found:
         return "the model does not show it"
-    nominal = rungs.subject(made, response)
+    nominal = fidelity_answers.subject(made, response)
     if nominal.orbit.status is not OrbitStatus.PERIODIC:
         return f"the nominal circuit is {nominal.orbit.response}"
     if settings is None:
@@ -250,9 +250,9 @@ def tally(
 def _timed(plan: StudyPlan, samples: range, jobs: int) -> tuple[list[Answer], float]:
     """What the exact circuit says of these boards, and its CPU time [s]."""
     # What is compiled on the way is no cost of a board.
-    exact_rung.block(plan, samples[:1], jobs)
+    exact_circuit.block(plan, samples[:1], jobs)
     began = time.process_time()
-    answers = exact_rung.block(plan, samples, jobs)
+    answers = exact_circuit.block(plan, samples, jobs)
     return answers, time.process_time() - began
 
 

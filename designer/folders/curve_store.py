@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.parquet_entry import ParquetForm
+from designer.base.parquet_entry import ParquetCodec
 from designer.base.si_unit import Unit
 from designer.bifurcations.border_curve import BorderCurve, CurveOrigin, read_curve
 from designer.bifurcations.border_curves import BLOCKS
@@ -35,7 +35,7 @@ _OTHER = pa.struct(
 _VALUES = ("values", pa.list_(pa.float64()))
 _MEETING = pa.struct([("kind", pa.string()), _VALUES, ("other", _OTHER)])
 _ORIGIN = pa.struct([("curve", pa.int64()), ("kind", pa.string()), _VALUES])
-_FORM = ParquetForm(
+_CODEC = ParquetCodec(
     pa.schema(
         [
             ("kind", pa.string()),
@@ -71,13 +71,13 @@ class CurveBlocks:
     def read(self, block: int) -> list[BorderCurve] | None:
         """The curves of a finished block of this very work, or None."""
         return self.files.read(
-            self.name(block), _FORM, lambda rows: list(map(read_curve, rows)), block=block
+            self.name(block), _CODEC, lambda rows: list(map(read_curve, rows)), block=block
         )
 
     def write(self, block: int, curves: Sequence[BorderCurve]) -> None:
         """Keep a finished block, a row a curve."""
         rows = [curve.as_dict() for curve in curves]
-        self.files.write(self.name(block), _FORM, rows, block=block)
+        self.files.write(self.name(block), _CODEC, rows, block=block)
 
 
 def curves_csv(

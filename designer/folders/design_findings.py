@@ -110,8 +110,8 @@ def _misfits(synthesis: Synthesis) -> Iterator[str]:
         model = file.model.at(r.b)
         flow = model_flow(model, r.omega)
         for misfit in law_misfits(model, flow, r.orbit, np.ones(flow.system.size)):
-            told = misfit.told(r.orbit.response, in_si=file.si is not None)
-            yield f"At {file.drive_text(r.omega)} the response {told}."
+            text = misfit.text(r.orbit.response, in_si=file.si is not None)
+            yield f"At {file.drive_text(r.omega)} the response {text}."
 
 
 def _rules(ids: Sequence[str]) -> str:

@@ -49,7 +49,7 @@ def texts(synthesis: Synthesis, checked: CheckedResponse | None = None) -> dict[
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 
-def beside(
+def project_texts(
     folder: Folder,
     synthesis: Synthesis,
     inputs: Mapping[str, Any],

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetCodec, Rows
 from designer.base.record_check import checked_record
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares, SharePlan, Step
 from designer.dynamics.orbit import OrbitStatus
@@ -58,7 +58,7 @@ class ShareBlocks:
                 by_value.setdefault(row.pop(self.parameter), []).append(_read(row))
             return [tuple(step) for step in by_value.values()]
 
-        return self.files.read(self.name(block), self._form, steps, block=block)
+        return self.files.read(self.name(block), self._codec, steps, block=block)
 
     def write(self, block: int, values: Sequence[float], steps: Sequence[Step]) -> None:
         """Keep a finished block."""
@@ -67,11 +67,11 @@ class ShareBlocks:
             for value, step in zip(values, steps, strict=True)
             for share in step
         ]
-        self.files.write(self.name(block), self._form, rows, block=block)
+        self.files.write(self.name(block), self._codec, rows, block=block)
 
     @property
-    def _form(self) -> ParquetForm:
-        return ParquetForm(pa.schema([(self.parameter, pa.float64()), *_COLUMNS]))
+    def _codec(self) -> ParquetCodec:
+        return ParquetCodec(pa.schema([(self.parameter, pa.float64()), *_COLUMNS]))
 
 
 def _read(row: dict[str, Any]) -> AttractorShare:

@@ -1,9 +1,9 @@
-"""What a study need not do again when it gets another layer: its checks and its blame.
+"""What a study need not do again when it gets another layer: its checks and its attribution.
 
-One file in the design folder, beside the rows, and another with the parts of a blame and of maps
-that are not whole yet: each item under a name with a hash of all that
-decides it, and it counts for that hash alone. Numbers are kept to the last bit, so that a study
-made in two goes is the one made at once. A file that cannot be read, or was damaged, holds nothing
+One file in the design folder, beside the rows, and another with the parts of an attribution and of
+maps that are not whole yet: each item under a name with a hash of all that decides it, and it
+counts for that hash alone. Numbers are kept to the last bit, so that a study made in two goes is
+the one made at once. A file that cannot be read, or was damaged, holds nothing
 (``base.keyed_store``).
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,8 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spread.spread import OpAmpDrift
 from designer.verdicts.verdict import Verdict
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import Attribution, NearLimit, ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Crossing, Limit, Prediction
 from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
 from designer.yields.worst_corner import Corner, Index
@@ -47,13 +47,19 @@ _KEY = {"format": FORMAT}
 _ITEMS = "items"
 _Items = Mapping[str, tuple[str, Any]]
 _RECORDS: dict[str, type[Any]] = {
+    "Blame": Attribution,
+    "BlamedPart": PartAttribution,
+    "ResponseBlame": ResponseAttribution,
+} | {
     kind.__name__: kind
     for kind in (
-        Axis, BlamedPart, Blame, Corner, Crossing, EquationCheck, EquationFinding, GateResult,
-        Index, Limit, LossRegion, NearLimit, Normal, OpAmpDrift, Orbit, Prediction, RareLosses,
-        Read, ResponseBlame, SolverSettings, ToleranceMargin, YieldMap,
+        Axis, Corner, Crossing, EquationCheck, EquationFinding, GateResult, Index, Limit,
+        LossRegion, NearLimit, Normal, OpAmpDrift, Orbit, Prediction, RareLosses, Read,
+        SolverSettings, ToleranceMargin, YieldMap,
     )
 }  # fmt: skip
+"""The records by their names in the file, which are not to change."""
+_NAMES = {kind: name for name, kind in _RECORDS.items()}
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}
 
 
@@ -131,9 +137,9 @@ def _plain(value: Any, arrays: list[Array]) -> Any:
     """JSON data that says the same; arrays go into the list."""
     if isinstance(value, Enum):
         return {"word": [type(value).__name__, value.value]}
-    if is_dataclass(value) and _RECORDS.get(type(value).__name__) is type(value):
+    if type(value) in _NAMES:
         named = {f.name: _plain(getattr(value, f.name), arrays) for f in fields(value)}
-        return {"record": [type(value).__name__, named]}
+        return {"record": [_NAMES[type(value)], named]}
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": len(arrays) - 1}

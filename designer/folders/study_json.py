@@ -85,7 +85,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "tuned": tuned_json(study.rows_of(index, study.tuned), study.plan.census),
         "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
         "reached": _reached(study, index),
-        "blame": _blame(study, index),
+        "blame": _attribution(study, index),
         **({"rare": _rare(study, index)} if study.rare else {}),
         "trust": {
             **{engine: trust.verdict() for engine, trust in checked.trust.items()},
@@ -100,7 +100,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
 
 
 def _exponents(checked: CheckedResponse) -> dict[str, dict[str, float]]:
-    """Of each engine."""
+    """The exponent by each engine."""
     return {
         engine: {"value": value, "error": error}
         for engine, (value, error) in checked.exponents.items()
@@ -154,7 +154,7 @@ def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any
 
 
 def _reached(study: Study, index: int) -> dict[str, Any] | None:
-    """From power-up by the recipe."""
+    """What the boards of a response show from power-up by the recipe."""
     rows = study.rows_of(index, study.power_ups)
     if not rows or study.recipes is None:
         return None
@@ -166,11 +166,13 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
     }
 
 
-def _blame(study: Study, index: int) -> dict[str, Any] | None:
+def _attribution(study: Study, index: int) -> dict[str, Any] | None:
     if study.blame is None or index not in study.response_indices:
         return None
-    blame: dict[str, Any] = study.blame.as_dict()["responses"][study.response_indices.index(index)]
-    return blame
+    attribution: dict[str, Any] = study.blame.as_dict()["responses"][
+        study.response_indices.index(index)
+    ]
+    return attribution
 
 
 def _rare(study: Study, index: int) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""The stores of a study in a design folder: its folders of blocks, its blame, its maps."""
+"""The stores of a study in a design folder: its folders of blocks, its attribution, its maps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from designer.base.keyed_store import Vouch, nobody
 from designer.folders.study_cache import StudyCache
 from designer.model.model_file import ModelFile
 from designer.verdicts.verdict import StudyPlan
-from designer.yields.blame_analysis import Blame
 from designer.yields.layers import LAYERS, LayerName
+from designer.yields.loss_attribution import Attribution
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
-from designer.yields.study_identity import blame_hash, study_hash
+from designer.yields.study_identity import attribution_hash, study_hash
 from designer.yields.tolerance_study import Stores
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
@@ -33,15 +33,15 @@ MAPS = "maps.json"
 BOARDS = "boards.csv"
 """A row for each measured board."""
 PIECES = "study-pieces.npz"
-"""What is known of a blame and of maps that are not whole."""
+"""What is known of an attribution and of maps that are not whole."""
 
 
 class FolderStores(Stores):
-    """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
-    is told of blocks that are damaged or of another study. kept : where the blame is; pieces :
+    """The layers of one study in a design folder; ``guard`` is asked before each write, ``note`` is
+    told of blocks that are damaged or of another study. kept : where the attribution is; pieces :
     where what is known of one that is not whole. prefix : of the names in the folder, "" or ending
-    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``). noise : whether a
-    blame counts only if the noise of its indices is known."""
+    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``). noise : whether an
+    attribution counts only if the noise of its indices is known."""
 
     def __init__(
         self,
@@ -78,23 +78,23 @@ class FolderStores(Stores):
             )
         return self._stores[folder]
 
-    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+    def attribution(self, plan: StudyPlan, budget: int) -> Attribution | None:
         if self._cache is None:
             return None
-        result: Blame | None = self._cache.get("blame", blame_hash(plan))
+        result: Attribution | None = self._cache.get("blame", attribution_hash(plan))
         if result is None or (result.share < 1.0 and (result.budget or 0) < budget):
             return None
         if self._noise and not result.noise_known:
             return None
         return result
 
-    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+    def put_attribution(self, plan: StudyPlan, attribution: Attribution) -> None:
         if self._cache is not None:
             self._guard()
-            self._cache.put("blame", blame_hash(plan), replace(blame, seconds=0.0))
+            self._cache.put("blame", attribution_hash(plan), replace(attribution, seconds=0.0))
 
-    def blame_parts(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(blame_hash(plan))
+    def attribution_parts(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(attribution_hash(plan))
 
     def maps(self, plan: StudyPlan) -> StoredParts:
         return self._pieces_of(study_hash(plan, "maps"))

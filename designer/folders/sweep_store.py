@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from designer.base.arrays import Array
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetCodec, Rows
 from designer.base.record_check import checked_record
 from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import BLOCK, Sweep
@@ -40,9 +40,9 @@ _COLUMNS = [
 ]
 
 _MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
-"""Of systems with more clearances than one."""
+"""The column of systems with more clearances than one."""
 _FURTHER = pa.schema([*_MORE, ("further", pa.list_(pa.list_(pa.float64())))])
-"""Of sweeps that show more stops than one."""
+"""The columns of sweeps that show more stops than one."""
 
 
 def work_hash(settings: Mapping[str, Any]) -> str:
@@ -66,12 +66,12 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
         for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
     ]
     files = WorkFiles(path.parent, work_hash(sweep.plan.as_dict()), provenance)
-    files.write(path.name, _sweep_form(parameter, len(rows)), rows)
+    files.write(path.name, _sweep_codec(parameter, len(rows)), rows)
 
 
-def _sweep_form(parameter: str, most: int) -> ParquetForm:
+def _sweep_codec(parameter: str, most: int) -> ParquetCodec:
     schema = pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
-    return ParquetForm(schema, _FURTHER, most)
+    return ParquetCodec(schema, _FURTHER, most)
 
 
 def _rows(
@@ -115,9 +115,9 @@ class SweepStore:
 
     def read(self, track: str, block: int) -> list[SteadyMotion] | None:
         """The steps of a finished block of this very work, or None."""
-        form = _sweep_form(self.parameter, BLOCK)
+        codec = _sweep_codec(self.parameter, BLOCK)
         name = self.name(track, block)
-        return self.files.read(name, form, self._steps, track=track, block=block)
+        return self.files.read(name, codec, self._steps, track=track, block=block)
 
     def _steps(self, rows: Rows) -> list[SteadyMotion]:
         out = []
@@ -135,8 +135,8 @@ class SweepStore:
     ) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
         rows = _rows(self.parameter, track, values, steps)
-        form = _sweep_form(self.parameter, BLOCK)
-        self.files.write(self.name(track, block), form, rows, track=track, block=block)
+        codec = _sweep_codec(self.parameter, BLOCK)
+        self.files.write(self.name(track, block), codec, rows, track=track, block=block)
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class GridStore:
                 raise ValueError("cells of other places")
             return out
 
-        return self.files.read(self.name(self.kind, row), self._form, cells, row=row)
+        return self.files.read(self.name(self.kind, row), self._codec, cells, row=row)
 
     def write(self, row: int, cells: list[MapCell]) -> None:
         """Keep a finished row."""
@@ -183,10 +183,10 @@ class GridStore:
         for cell in cells:
             coordinates = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
             rows.append({**coordinates, **_columns(cell)})
-        self.files.write(self.name(self.kind, row), self._form, rows, row=row)
+        self.files.write(self.name(self.kind, row), self._codec, rows, row=row)
 
     @property
-    def _form(self) -> ParquetForm:
+    def _codec(self) -> ParquetCodec:
         schema = pa.schema(
             [
                 ("i", pa.int64()),
@@ -197,4 +197,4 @@ class GridStore:
                 ("strobe", pa.list_(pa.float64())),
             ]
         )
-        return ParquetForm(schema, _MORE, len(self.xs))
+        return ParquetCodec(schema, _MORE, len(self.xs))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody
-from designer.base.parquet_entry import ParquetForm, Rows
+from designer.base.parquet_entry import ParquetCodec, Rows
 from designer.base.progress import quiet
 
 FORMAT = 1
@@ -30,20 +30,20 @@ class WorkFiles:
     provenance: Mapping[str, Any]
     """Versions, seed and settings, which go into every file."""
     note: Note = quiet
-    """Told of entries that are not taken."""
+    """Is told of entries that are not taken."""
     vouch: Vouch = nobody
     """Asked about entries without a seal."""
     noted: set[str] = field(default_factory=set)
     """Names of blocks that ``note`` was told of."""
 
     def read(
-        self, name: str, form: ParquetForm, make: Callable[[Rows], Made], **place: str | int
+        self, name: str, codec: ParquetCodec, make: Callable[[Rows], Made], **place: str | int
     ) -> Made | None:
         """What ``make`` makes of the rows of a finished block of this very work (as of
         ``KeyedStore.read_as``), or None. place : of the block in the work."""
-        return self._store(form).read_as(name, self._key(place), make)
+        return self._store(codec).read_as(name, self._key(place), make)
 
-    def write(self, name: str, form: ParquetForm, rows: Rows, **place: str | int) -> None:
+    def write(self, name: str, codec: ParquetCodec, rows: Rows, **place: str | int) -> None:
         """Keep a finished block.
 
         Raises
@@ -51,10 +51,10 @@ class WorkFiles:
         InputError : it cannot be written.
         """
         more = {"provenance": self.provenance}
-        self._store(form).write(name, self._key(place), rows, more)
+        self._store(codec).write(name, self._key(place), rows, more)
 
-    def _store(self, form: ParquetForm) -> KeyedStore[Rows]:
-        return KeyedStore(self.root, form, self.note, self.vouch, noted=self.noted)
+    def _store(self, codec: ParquetCodec) -> KeyedStore[Rows]:
+        return KeyedStore(self.root, codec, self.note, self.vouch, noted=self.noted)
 
     def _key(self, place: Mapping[str, str | int]) -> dict[str, Any]:
         return {"format": FORMAT, "work": self.work, **place}

@@ -18,10 +18,10 @@ from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST, StageName
 from designer.base.schema import literal
 from designer.jobs.options import Options
-from designer.jobs.study_layers import blame_budget, blamed
+from designer.jobs.study_layers import attributed, attribution_budget
 from designer.model.model_file import ModelFile
 
-RUNG = "rung"
+FIDELITY = "rung"
 """Input of a study's stage: "bandwidth", or not there."""
 
 
@@ -38,15 +38,15 @@ KINDS: Mapping[str, tuple[Any, str]] = {
     "layers": _WORDS,
     "without": _WORDS,
     "truth": (str, "a word"),
-    RUNG: (str, "a word"),
+    FIDELITY: (str, "a word"),
 }
-"""Of what kind each of these inputs is, and that in words."""
+"""The kind of each of these inputs, and the kind in words."""
 
 
-def rung_input(options: Options) -> dict[str, str]:
-    """The rung among a study's inputs. Which engine is asked about the same boards beside the exact
-    circuit is a layer; op-amps that lag make another study."""
-    return {RUNG: options.rung} if options.rung == "bandwidth" else {}
+def fidelity_input(options: Options) -> dict[str, str]:
+    """The fidelity among a study's inputs. Which engine is asked about the same boards beside the
+    exact circuit is a layer; op-amps that lag make another study."""
+    return {FIDELITY: options.rung} if options.rung == "bandwidth" else {}
 
 
 def stage_numbers(
@@ -103,7 +103,7 @@ def of_study(
     if not goes_on(model, out, options.resume):
         return options
     limits = () if options.overwrite else ("until",)
-    names = ("samples", "seed", "layers", RUNG)
+    names = ("samples", "seed", "layers", FIDELITY)
     return _with(options, stage_numbers(Folder(out), "study", names, limits), words)
 
 
@@ -119,7 +119,9 @@ def of_measured(path: Path, options: Options, words: Mapping[str, Any]) -> Optio
     """The options with the numbers of the study of built boards in a design folder."""
     if not is_design_folder(path):
         return options
-    return _with(options, stage_numbers(Folder(path), "measured", ("seed", "layers", RUNG)), words)
+    return _with(
+        options, stage_numbers(Folder(path), "measured", ("seed", "layers", FIDELITY)), words
+    )
 
 
 def of_search(out: Path, options: Options, words: Mapping[str, Any]) -> Options:
@@ -138,8 +140,8 @@ def _with(options: Options, numbers: dict[str, Any], words: Mapping[str, Any]) -
     """The options with these numbers of the folder, where ``words`` states none."""
     layers = numbers.pop("layers", None)
     if layers is not None:
-        numbers |= {"blame": blamed(layers), "blame_budget": blame_budget(layers)}
-        if "ngspice" not in layers and RUNG not in numbers:
+        numbers |= {"blame": attributed(layers), "blame_budget": attribution_budget(layers)}
+        if "ngspice" not in layers and FIDELITY not in numbers:
             numbers["rung"] = "exact"
     options = replace(options, **{k: v for k, v in numbers.items() if words.get(k, k) is None})
     return options if options.blame else replace(options, blame_budget=None)

@@ -42,8 +42,8 @@ class JobOutcome:
     place: Place = RANDOM
     """Where in the folder the study is."""
     shown: bool = False
-    """Whether what stands in the answer beside blame and maps was shown before they were worked
-    out."""
+    """Whether what stands in the answer beside attribution and maps was shown before they were
+    worked out."""
 
     @cached_property
     def synthesis(self) -> Synthesis:

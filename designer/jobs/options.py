@@ -47,11 +47,11 @@ class Options:
     cluster: str | None = None
     """Address of a Dask scheduler, or None."""
     blame: bool = True
-    """Whether the blame is worked out."""
+    """Whether the attribution is worked out."""
     blame_budget: int | None = None
-    """Steps of the blame; None for ``blame_extent.BUDGET``."""
-    blame_anew: bool = False
-    """Whether a stored blame without noise is made anew: ``--blame`` was said."""
+    """Steps of the attribution; None for ``loss_replay.BUDGET``."""
+    attribution_anew: bool = False
+    """Whether a stored attribution without noise is made anew: ``--blame`` was said."""
     measured: Path | None = None
     """File of a list of boards that are studied instead of random ones."""
     yield_: float | None = None

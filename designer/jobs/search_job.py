@@ -16,7 +16,7 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.limiting_parts import limitings
-from designer.centering.ngspice_check import LEVELS, RUNG
+from designer.centering.ngspice_check import FIDELITY, LEVELS
 from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
@@ -24,10 +24,10 @@ from designer.folders.design_source import grade_inputs
 from designer.folders.model_source import design_inputs_of
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
-from designer.jobs import rung_choice
+from designer.jobs import fidelity_choice
+from designer.jobs.fidelity_choice import LEAST, SEARCH
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
-from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.search_stage import searched_into
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import RANDOM, SPICE_TIMEOUT, StudyHelp, study_of
@@ -36,7 +36,7 @@ from designer.spice.batch_backend import program_version
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts import ngspice_runs
 from designer.verdicts.cross_check import Ask, StartKind, Why
-from designer.verdicts.rung_gate import gated
+from designer.verdicts.fidelity_gate import gated
 from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import LocalRunner
 from designer.yields.tolerance_study import check
@@ -64,8 +64,10 @@ def search_into(
     if stage is None or not stage.complete:
         program_version()
     final = searched_into(modelfile, out, options, progress)
-    rung = rung_choice.for_search(Folder(out), options, progress)
-    study = run_into(final, out, replace(options, rung=rung), progress, lambda _: command(options))
+    fidelity = fidelity_choice.for_search(Folder(out), options, progress)
+    study = run_into(
+        final, out, replace(options, rung=fidelity), progress, lambda _: command(options)
+    )
     confirmed = _confirmed(final, out, options, progress)
     folder = Folder(out)
     answer = RANDOM.answer(folder)
@@ -96,7 +98,7 @@ def _confirmed(
         **design_inputs_of(folder),
         "seed": options.seed,
         "samples": options.samples,
-        "rung": RUNG,
+        "rung": FIDELITY,
         "boards": LEAST,
         **grade_inputs(modelfile, catalog),
     }
@@ -130,18 +132,18 @@ def _confirm(
     limits = limitings(study.plan, study.answers, jobs=jobs, progress=step)
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
         require_ngspice(pool)
-        progress.stage(f"ngspice, rung {RUNG}, numerics gate")
-        plan, gates = gated(study.plan, pool, RUNG, LEVELS)
+        progress.stage(f"ngspice, rung {FIDELITY}, numerics gate")
+        plan, gates = gated(study.plan, pool, FIDELITY, LEVELS)
         asks = to_confirm(study.answers)
         asks = [a for a in asks if plan.questions[a.question].settings is not None]
-        step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
-        cross_checks = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
+        step = progress.stage(f"ngspice, rung {FIDELITY}, {len(asks)} boards", len(asks))
+        cross_checks = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, fidelity=FIDELITY)
     answers = {(a.sample, a.question): a for a in study.answers}
     rows = confirmation_json(cross_checks, answers, study.response_indices, len(study.checked))
     for index, limit, gate in zip(study.response_indices, limits, gates, strict=True):
         rows[index]["limited_by"] = limit.as_dict()
         rows[index]["gate"] = gate.as_dict()
-    return {"rung": RUNG, "responses": rows}
+    return {"rung": FIDELITY, "responses": rows}
 
 
 def to_confirm(answers: Iterable[Answer]) -> list[Ask]:

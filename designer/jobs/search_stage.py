@@ -28,9 +28,9 @@ from designer.folders.design_files import waveform_names
 from designer.folders.design_source import design_inputs, design_stage
 from designer.folders.model_source import model_file
 from designer.folders.origin import provenance
-from designer.jobs import rung_choice
+from designer.jobs import fidelity_choice
+from designer.jobs.fidelity_choice import SEARCH
 from designer.jobs.options import Options
-from designer.jobs.rung_choice import SEARCH
 from designer.jobs.stage_runner import write_design
 from designer.jobs.study_stage import SPICE_TIMEOUT
 from designer.model.model_file import ModelFile
@@ -98,7 +98,7 @@ def searched_into(
             jobs=options.workers,
             memory=memory,
             windows=windows,
-            listen=AgreementCheck(pool, memory),
+            ask_agreement=AgreementCheck(pool, memory),
             progress=progress,
         )
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)
@@ -116,7 +116,8 @@ def searched_into(
 
 
 def _trade_of(folder: Folder, modelfile: ModelFile, *, resumes: bool) -> dict[str, Any] | None:
-    """What a trade says that stood here when the search began, as ``rung_choice.RungChoice``."""
+    """What a trade says that stood here when the search began, as
+    ``fidelity_choice.FidelityChoice``."""
     if resumes:
         assert folder.manifest is not None
         trade: object = folder.manifest.stages["search"].resume_data.get("trade")
@@ -124,5 +125,5 @@ def _trade_of(folder: Folder, modelfile: ModelFile, *, resumes: bool) -> dict[st
             field = "stages.search.kept.trade"
             raise InputError(folder / MANIFEST, field, trade, "the choice of a trade")
         return trade
-    choice = rung_choice.before_search(folder, modelfile.sha256)
+    choice = fidelity_choice.before_search(folder, modelfile.sha256)
     return None if choice is None else asdict(choice)

@@ -156,7 +156,7 @@ def write_design(
         files = design_files.texts(synthesis)
         drawing = other(board_files.drawing, synthesis)
     inputs = stages["design"][0]
-    project = kicad_files.beside(folder, synthesis, inputs, options.overwrite, progress)
+    project = kicad_files.project_texts(folder, synthesis, inputs, options.overwrite, progress)
     folder.begin(stages, design_files.design_provenance(synthesis))
     design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.

@@ -20,7 +20,7 @@ from designer.folders import design_files, kicad_files
 from designer.folders.design_source import bills_are_of_old, design_inputs
 from designer.folders.json_answers import run_json
 from designer.folders.model_source import source
-from designer.jobs import folder_numbers, rung_choice, usual_times
+from designer.jobs import fidelity_choice, folder_numbers, usual_times
 from designer.jobs.board_routing import route_own_board
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.open_design import design_file
@@ -139,13 +139,13 @@ def run_into(
     """
     options.check()
     need_responses(modelfile)
-    options = rung_choice.with_rung(Folder(out), options, progress)
+    options = fidelity_choice.with_fidelity(Folder(out), options, progress)
     runner = StageRunner(modelfile, out, options, progress, shown=shown)
     folder = runner.folder
     # A study is of the boards as they are bought now, whatever the design's own inputs say.
     design_now = design_inputs(modelfile, runner.catalog)
     numbers = {"seed": options.seed, "samples": options.samples, "until": options.until}
-    inputs = {**design_now, **numbers, **folder_numbers.rung_input(options)}
+    inputs = {**design_now, **numbers, **folder_numbers.fidelity_input(options)}
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
     labels = () if modelfile.measured is None else modelfile.measured.labels
@@ -209,10 +209,10 @@ def measured_into(
         spread_of(
             synthesis.modelfile, synthesis.design.circuit, runner.catalog
         )  # refuses what is not theirs
-    options = rung_choice.with_rung(folder, options, progress)
+    options = fidelity_choice.with_fidelity(folder, options, progress)
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
-    inputs = {**runner.design_inputs, **numbers, **folder_numbers.rung_input(options)}
+    inputs = {**runner.design_inputs, **numbers, **folder_numbers.fidelity_input(options)}
     options = merged(folder, inputs, options, BUILT.stage, BUILT.prefix)
     stages = BUILT.stages(inputs, options, len(modelfile.responses), census=True)
     list_file = BUILT.prefix + MEASURED

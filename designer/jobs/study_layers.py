@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from designer.base.blame_noise import lacks_noise
+from designer.base.attribution_noise import lacks_noise
 from designer.base.defaults import OVERS
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.manifest import StageName
@@ -16,9 +16,10 @@ from designer.jobs.options import Options
 
 MAP = "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
-WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
+WITHOUT_ATTRIBUTION, ATTRIBUTION_BUDGET = "without blame", "blame budget "
 NOISE = "noise of the blame"
-"""Of a blame that an earlier version had stored without it."""
+"""The layer that makes anew the noise of an attribution which an earlier version stored without
+it."""
 
 
 def layers_of(options: Options) -> list[str]:
@@ -32,22 +33,24 @@ def layers_of(options: Options) -> list[str]:
         "trimmed": options.trimmed,
         "reached": options.reached,
         "rare": options.rare,
-        WITHOUT_BLAME: not options.blame,
-        NOISE: options.blame and options.blame_anew,
-        f"{BLAME_BUDGET}{budget}": budget is not None,
+        WITHOUT_ATTRIBUTION: not options.blame,
+        NOISE: options.blame and options.attribution_anew,
+        f"{ATTRIBUTION_BUDGET}{budget}": budget is not None,
         **{f"{MAP}{over}": True for over in options.map_},
     }
     return sorted(name for name, wanted in names.items() if wanted)
 
 
-def blamed(layers: Iterable[str]) -> bool:
-    """Whether a study of these layers has a blame."""
-    return WITHOUT_BLAME not in layers
+def attributed(layers: Iterable[str]) -> bool:
+    """Whether a study of these layers has an attribution."""
+    return WITHOUT_ATTRIBUTION not in layers
 
 
-def blame_budget(layers: Iterable[str]) -> int | None:
+def attribution_budget(layers: Iterable[str]) -> int | None:
     """The largest budget among these layers; None where none is stated."""
-    budgets = [int(n.removeprefix(BLAME_BUDGET)) for n in layers if n.startswith(BLAME_BUDGET)]
+    budgets = [
+        int(n.removeprefix(ATTRIBUTION_BUDGET)) for n in layers if n.startswith(ATTRIBUTION_BUDGET)
+    ]
     return max(budgets, default=None)
 
 
@@ -64,27 +67,27 @@ def merged(
     stage = folder.manifest.stages.get(name) if folder.manifest else None
     stored = {} if stage is None else stage.inputs
     if {k: v for k, v in stored.items() if k != "layers"} != dict(inputs):
-        return replace(options, blame_anew=False)
+        return replace(options, attribution_anew=False)
     complete = stage is not None and stage.complete
-    if options.blame_anew:
+    if options.attribution_anew:
         lacking = complete and lacks_noise(folder.json(prefix + TOLERANCE))
-        options = replace(options, blame_anew=lacking)
+        options = replace(options, attribution_anew=lacking)
     names = {*stored.get("layers", ()), *layers_of(options)}
-    rung = options.rung
-    if "ngspice" in names and rung != "bandwidth":
-        rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    has_blame = complete and blamed(stored["layers"])
-    with_blame = options.blame or has_blame
+    fidelity = options.rung
+    if "ngspice" in names and fidelity != "bandwidth":
+        fidelity = "ngspice" if ALL_IN_NGSPICE in names else "auto"
+    has_attribution = complete and attributed(stored["layers"])
+    with_attribution = options.blame or has_attribution
     return replace(
         options,
-        rung=rung,
+        rung=fidelity,
         tuned="tuned" in names,
         reached="reached" in names,
         rare="rare" in names,
         map_=tuple(over for over in OVERS if f"{MAP}{over}" in names),
-        blame=with_blame,
-        blame_anew=NOISE in names,
-        blame_budget=blame_budget(names) if with_blame else None,
+        blame=with_attribution,
+        attribution_anew=NOISE in names,
+        blame_budget=attribution_budget(names) if with_attribution else None,
     )
 
 

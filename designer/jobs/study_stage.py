@@ -36,9 +36,9 @@ from designer.spice import equation_check
 from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
-from designer.yields.blame_analysis import BlameStage
-from designer.yields.blame_replay import BUDGET
 from designer.yields.layers import LocalRunner, Runner
+from designer.yields.loss_attribution import AttributionStage
+from designer.yields.loss_replay import BUDGET
 from designer.yields.study import RunResult, Study
 from designer.yields.study_identity import RULES, checks_hash
 from designer.yields.tolerance_study import Stores, check, tolerance
@@ -86,7 +86,7 @@ class Place:
 
 
 RANDOM, BUILT = Place(), Place("measured", "measured/")
-"""Of the study of random boards, and of that of the boards in a list."""
+"""The places of the study of random boards and of that of the boards in a list."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class StudyStage:
     command: str
     """The command line that its report states."""
     progress: Progress
-    """Told how far the work is."""
+    """Is told how far the work is."""
     shown: Show
     """Shows the yields while the work goes on."""
     early: bool = False
@@ -172,7 +172,7 @@ class StudyStage:
             place.cache(folder, self.progress.note, PIECES),
             place.prefix,
             folder.vouches,
-            noise=options.blame_anew,
+            noise=options.attribution_anew,
         )
 
         def result_of(study: Study) -> RunResult:
@@ -211,7 +211,7 @@ class StudyStage:
         self._write(result)
         assert folder.manifest is not None
         folder.manifest.provenance = result.provenance
-        if study.blame_status.stage is not BlameStage.PART:
+        if study.blame_status.stage is not AttributionStage.PART:
             (folder / (place.prefix + PIECES)).unlink(missing_ok=True)
         folder.finish(place.stage, stores.names)
         return result
@@ -256,11 +256,11 @@ def study_of(
         synthesis,
         samples=options.samples,
         until=options.until,
-        rung=options.rung,
+        fidelity=options.rung,
         tuned=options.tuned,
         reached=options.reached,
-        blamed=options.blame,
-        blame_budget=BUDGET if options.blame_budget is None else options.blame_budget,
+        attributed=options.blame,
+        attribution_budget=BUDGET if options.blame_budget is None else options.blame_budget,
         maps=options.map_,
         rare=options.rare,
         seed=options.seed,
@@ -290,8 +290,8 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
         raise InputError(path, f"stages.{place.stage}", MISSING, expected)
     samples = folder.json(place.prefix + TOLERANCE)["samples"]
     stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
-    rung = stage.inputs.get("rung", "exact")
-    options = Options(stage.inputs["seed"], samples=samples, rung=rung, blame=False)
+    fidelity = stage.inputs.get("rung", "exact")
+    options = Options(stage.inputs["seed"], samples=samples, rung=fidelity, blame=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
     return study_of(synthesis, options, help_, check(synthesis, None), stores)
 
@@ -388,6 +388,6 @@ def satisfied(answer: Mapping[str, Any]) -> bool:
 
 
 def _trusted(trust: Mapping[str, Any]) -> bool:
-    """Of the engines' answers, where each has one (null: it has none); a yield says only how far
-    it is known. Older folders say nothing."""
+    """Whether the engines' answers can be trusted, where each has one (null: it has none); a yield
+    says only how far it is known. Older folders say nothing."""
     return all(engine["trusted"] is True for name, engine in trust.items() if name != "yield")

@@ -56,7 +56,7 @@ def synthesise_into(
         folder.finish("comparison")
     answer = design_answer(folder)
     if compare:
-        answer = _beside(answer, folder.json(COMPARISON))
+        answer = _with_comparison(answer, folder.json(COMPARISON))
     return JobOutcome(answer, _all_shown(answer), out, synthesis is None, synthesis)
 
 
@@ -69,7 +69,7 @@ def synthesise_in_memory(
     synthesis = replace(synthesis, better_stage=better)
     answer = plain(design_files.answer(synthesis))
     if compare:
-        answer = _beside(answer, plain(_comparison(synthesis, progress)))
+        answer = _with_comparison(answer, plain(_comparison(synthesis, progress)))
     return JobOutcome(answer, _all_shown(answer), made=synthesis)
 
 
@@ -93,7 +93,7 @@ def _draw(folder: Folder, document: Mapping[str, Any]) -> None:
     folder.write(png, figure_style.to_png(figure))
 
 
-def _beside(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:
+def _with_comparison(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:
     """What ``synthesise --compare`` prints: the design's object, and the comparison in it.
 
     The time is None where the file has none: no hash guards the object ``cost``.

@@ -1,4 +1,4 @@
-"""A design's rungs measured, and the stage ``trade`` of its folder."""
+"""A design's fidelities measured, and the stage ``trade`` of its folder."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
-from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
+from designer.fidelity import fidelity_answers as trade_fidelities, pieces as trade_pieces, yields
 from designer.fidelity.cpu_clock import SpiceClock
+from designer.fidelity.fidelity_answers import LEVELS, ROUNDS, TOP, Truths
+from designer.fidelity.fidelity_errors import compare
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
-from designer.fidelity.rung_errors import compare
-from designer.fidelity.rungs import LEVELS, ROUNDS, TOP, Truths
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.folders.design_source import grade_inputs
 from designer.folders.origin import provenance
 from designer.folders.report_sections import renew_report
+from designer.jobs.fidelity_choice import TRADE
 from designer.jobs.options import Options
-from designer.jobs.rung_choice import TRADE
 from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, need_responses
@@ -64,7 +64,7 @@ def measure(
     jobs: int,
     progress: Progress,
 ) -> Trade:
-    """Every rung on every response of a design, and the boards.
+    """Every fidelity on every response of a design, and the boards.
 
     pieces : the pieces that are stored already for this very design, extent and seed.
 
@@ -76,12 +76,12 @@ def measure(
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)
         clock = SpiceClock(timed)
-        rungs = []
+        fidelities = []
         for number, r in enumerate(synthesis.model_responses, start=1):
 
-            def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
+            def fidelity(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
                 progress.stage(f"response {number} of {count}, every rung")
-                measured = trade_rungs.measured(
+                measured = trade_fidelities.measured(
                     synthesis,
                     r,
                     pool,
@@ -91,11 +91,13 @@ def measure(
                     truth=extent.truth,
                 )
                 rows, truth = compare(ResponseLabel.of(number, r), measured.answers, extent.truth)
-                return trade_pieces.rungs_json(rows, truth, measured.settings, measured.seconds)
+                return trade_pieces.fidelities_json(
+                    rows, truth, measured.settings, measured.seconds
+                )
 
-            rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))
+            fidelities.append(trade_pieces.fidelities(pieces.piece(f"rungs {number}", fidelity)))
         responses = []
-        for number, (rows, truth, settings, seconds) in enumerate(rungs, start=1):
+        for number, (rows, truth, settings, seconds) in enumerate(fidelities, start=1):
             boards: BoardTrade | LeftOut | None = None
             if extent.boards:
                 plan = yields.question(

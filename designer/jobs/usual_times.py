@@ -20,17 +20,17 @@ SEARCHED: Final[Mapping[str, float]] = {
     "what each lever is worth": 30.0,
     "the design that was found": 8.0,
 }
-"""Of the search for the design of the highest yield."""
+"""The times of the search for the design of the highest yield."""
 CHOSEN: Final[Mapping[str, float]] = {"responses of the model, parts": 12.0}
-"""Of the choice of parts by the match."""
+"""The times of the choice of parts by the match."""
 OTHER_STAGE: Final[Mapping[str, float]] = {"the other stage of the clearance": 4.0}
-"""Of a look at the stage that the file does not state."""
+"""The times of a look at the stage that the file does not state."""
 FILES: Final[Mapping[str, float]] = {"files of the design": 5.0, "KiCad project": 4.0}
-"""Of the files of a design that are known as soon as its parts are chosen."""
+"""The times of the files of a design that are known as soon as its parts are chosen."""
 LAST: Final[Mapping[str, float]] = {"start recipes": 6.0}
-"""Of the others."""
+"""The times of the other files."""
 WRITTEN: Final[Mapping[str, float]] = {**FILES, **LAST}
-"""Of the files of a design."""
+"""The times of all files of a design."""
 
 
 STUDIED: Final[Mapping[str, float]] = {
@@ -39,9 +39,9 @@ STUDIED: Final[Mapping[str, float]] = {
     "report": 20.0,
     "blame": 10.0,
 }
-"""Of a study of 200 boards."""
+"""The times of a study of 200 boards."""
 RUN: Final[Mapping[str, float]] = {"routing": 12.0, "ngspice, equation check": 9.0, **STUDIED}
-"""Of what ``run`` does once there is a design."""
+"""The times of what ``run`` does once there is a design."""
 SEARCH: Final[Mapping[str, float]] = {
     **SEARCHED,
     **WRITTEN,
@@ -50,19 +50,19 @@ SEARCH: Final[Mapping[str, float]] = {
     "what limits each response": 8.0,
     "ngspice, rung dynamic, numerics": 48.0,
 }
-"""Of the search, the study and the confirmation of a design."""
-CURED: Final[Mapping[str, float]] = {
+"""The times of the search, the study and the confirmation of a design."""
+REPAIRED: Final[Mapping[str, float]] = {
     "the design as it is": 10.0,
     "linear picture": 60.0,
     "round": 60.0,
     "cured design": 1.0,
     **WRITTEN,
 }
-"""Of the search for a cure."""
+"""The times of the search for a repair."""
 
 
 def of_design(modelfile: ModelFile) -> dict[str, float]:
-    """Of the design of this model file, made and written."""
+    """The times of the design of this model file, made and written."""
     if modelfile.circuit.objective == "yield":
         return {**SEARCHED, **WRITTEN}
     other = OTHER_STAGE if modelfile.circuit.dead_zone is not None else {}

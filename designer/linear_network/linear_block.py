@@ -150,8 +150,8 @@ def _grouped(numbers: Array) -> tuple[Array, Index, Index]:
     """(distinct numbers ascending, where each begins in the order, the order)."""
     order = np.argsort(numbers, kind="stable").astype(np.int64)
     ordered = numbers[order]
-    fresh = np.diff(ordered, prepend=-np.inf) > SAME
-    begins = np.flatnonzero(fresh).astype(np.int64)
+    is_first = np.diff(ordered, prepend=-np.inf) > SAME
+    begins = np.flatnonzero(is_first).astype(np.int64)
     return ordered[begins], np.append(begins, len(order)).astype(np.int64), order
 
 

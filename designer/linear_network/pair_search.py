@@ -179,8 +179,8 @@ def kinds_of(rules: Rules, parts: Index) -> Index:
     code = np.where(parts < 0, -1, parts + np.where(np.arange(14) < 10, 0, many)[None, :])
     free = np.concatenate([rules.free_r, rules.free_c, [True]])
     ordered = np.sort(np.where(free[code], -1, code), axis=1)
-    fresh = np.diff(ordered, axis=1, prepend=-1) > 0
-    return np.asarray(fresh.sum(axis=1))
+    is_first = np.diff(ordered, axis=1, prepend=-1) > 0
+    return np.asarray(is_first.sum(axis=1))
 
 
 def _nominal(values: Values, rules: Rules, parts: Index) -> Array:

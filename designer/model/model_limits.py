@@ -56,8 +56,8 @@ class ModelLimit:
     def refusal(self, number: int, accepted: str) -> str:
         """What a file of this format is told. accepted : in the place of what was found."""
         where = "" if len(self.formats) > 1 else f" in format {number}"
-        told = f"not modelled{where}: {self.feature}; nearest: {self.nearest} ({WHERE})"
-        return f"{accepted}; {told}"
+        text = f"not modelled{where}: {self.feature}; nearest: {self.nearest} ({WHERE})"
+        return f"{accepted}; {text}"
 
 
 def _is_negative(value: object) -> bool:

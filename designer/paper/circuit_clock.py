@@ -31,7 +31,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.verdicts.exact_rung import waveform_error
+from designer.verdicts.exact_circuit import waveform_error
 
 PERIODS = 20
 """Drive periods after which errors are taken, and of every run of ngspice."""
@@ -149,7 +149,7 @@ def _circuits(pool: SpicePool, one: Built, settled: SettledResponse) -> list[_En
     runs = (
         ("ngspice, ideal op-amps", subject, passed.settings),
         ("ngspice, ideal op-amps, coarse", subject, rough),
-        ("ngspice, full op-amps", replace(subject, rung="full"), passed.settings),
+        ("ngspice, full op-amps", replace(subject, fidelity="full"), passed.settings),
     )
     for name, who, settings in runs:
         long = replace(who, discard=PERIODS - 4 * orbit.n)

@@ -49,7 +49,7 @@ class NgspiceResponse:
 def stage_curve(pool: SpicePool, circuit: Circuit, reach: float, points: int) -> Array:
     """(k, 2) v1 and the nonlinear stage's output [V], by ``.dc`` over ± reach.
 
-    The stage is cut out of the circuit and fed by a source; op-amps of the rung ``ideal``.
+    The stage is cut out of the circuit and fed by a source; op-amps of the fidelity ``ideal``.
 
     Raises
     ------

@@ -29,7 +29,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, parse_model_file
-from designer.verdicts.exact_rung import images, waveform_error
+from designer.verdicts.exact_circuit import images, waveform_error
 
 OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.215}
 """Drive frequency at which 1-p-p is asked for, by p."""
@@ -87,7 +87,7 @@ class Built:
         return self.candidate.circuit
 
     def reduction(self) -> Reduction:
-        """Of the nominal board, with the op-amps' finite gain and bias current."""
+        """The reduction of the nominal board, with the op-amps' finite gain and bias current."""
         return Reduction(self.circuit, nominal_board(self.circuit))
 
     def excitation(self, omega: float) -> Excitation:
@@ -145,7 +145,8 @@ def build(name: str, catalog: Catalog) -> Built:
 
 
 def built(candidate: ComparedCircuit, instead: Array | None = None) -> Built:
-    """With its scales. instead : (states,) volts per unit where the circuit has none of its own.
+    """The circuit with its scales. instead : (states,) volts per unit where the circuit has none of
+    its own.
 
     Raises
     ------

@@ -38,8 +38,8 @@ def write_files(
     text = json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False)
     write(out / name, f"{text}\n")
     for title, figure in figures.items():
-        for form in forms:
-            write(out / f"{title}.{form}", picture(figure, form, dpi))
+        for file_format in forms:
+            write(out / f"{title}.{file_format}", picture(figure, file_format, dpi))
     write(out / README, markdown(page))
 
 

@@ -2,8 +2,8 @@
 
 For the paper's circuit as printed, corrected, and with the rectifier stage on the op-amps' full
 range: resistors of 5 %, 1 % and 0.1 %, capacitors of 5 % and 1 %, offsets on and off; each 1-p-p
-response as built, tuned (within the bands, and by the bench procedure) and reached; and the blame
-in the case of 1 % parts with offsets. Every case is on disk as soon as it is done.
+response as built, tuned (within the bands, and by the bench procedure) and reached; and the
+attribution in the case of 1 % parts with offsets. Every case is on disk as soon as it is done.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from designer.paper.circuits import OMEGA, model_file
 from designer.paper.report_files import README, write_files
 from designer.paper.tolerance_cases import TITLES, SpreadCase, YieldRow, cases
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Verdict
-from designer.yields.blame_analysis import blame
+from designer.yields.loss_attribution import attribute
 from designer.yields.power_up import power_up_block
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.study_identity import study_hash
@@ -115,7 +115,7 @@ def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[s
     began, plan = time.perf_counter(), case.plan
     number = len(plan.questions)
     step = progress.stage(f"{case.name}: as built", plan.samples * number)
-    answers = exact_rung.block(plan, range(plan.samples), jobs, step)
+    answers = exact_circuit.block(plan, range(plan.samples), jobs, step)
     some = [a for a in answers if a.sample < short]
     step = progress.stage(f"{case.name}: tuned", short * number)
     tuned = tuned_block(plan, range(short), some, Bands(), jobs, step)
@@ -129,10 +129,10 @@ def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[s
         "reached": Counter((r.question, r.verdict) for r in reached),
     }
     rows = [_row(case, p, kind, judged[kind]) for kind in KINDS for p in OMEGA]
-    blamed = None
+    attributed = None
     if case.reference:
         step = progress.stage("blame")
-        blamed = blame(plan, answers, jobs=jobs, progress=step).as_dict()
+        attributed = attribute(plan, answers, jobs=jobs, progress=step).as_dict()
     return {
         "format": FORMAT,
         "circuit": case.circuit,
@@ -140,7 +140,7 @@ def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[s
         "missing": {f"1-{p}-{p}": instead for p, instead in case.missing.items()},
         "recipes": {f"1-{p}-{p}": r.text for p, r in zip(case.asked, recipes, strict=True)},
         "rows": [asdict(row) for row in rows],
-        "blame": blamed,
+        "blame": attributed,
         "cost": {"seconds": time.perf_counter() - began},
     }
 

@@ -34,7 +34,7 @@ from designer.paper.report_files import README, make_report
 from designer.plots import curve_plots
 
 OMEGA = (0.15, 1.8)
-"""Of ω: where borders are followed."""
+"""The range of ω in which borders are followed."""
 SECOND = {"b": (0.15, 0.35), "k0": (0.85, 0.99)}
 """Second parameters, with where borders are followed over them."""
 INSIDE = (1.55, 0.85, 0.54, 0.41, 0.337, 0.284, 0.24, 0.215)
@@ -54,7 +54,7 @@ class ResponseBorders:
 
     @property
     def name(self) -> str:
-        """Of the files: "borders-b"."""
+        """The name of the files: "borders-b"."""
         return f"borders-{self.plan.second}"
 
     def figure(self) -> Figure:
@@ -101,8 +101,8 @@ def report(*, out: Path, jobs: int, progress: Progress) -> Mapping[str, Response
     borders_of = {name: response_borders(windows, name, jobs, progress) for name in SECOND}
     for borders in borders_of.values():
         figure = borders.figure()
-        for form in ("png", "svg"):
-            write(out / f"{borders.name}.{form}", picture(figure, form, 160.0))
+        for file_format in ("png", "svg"):
+            write(out / f"{borders.name}.{file_format}", picture(figure, file_format, 160.0))
         write(out / f"{borders.name}.csv", borders.table())
     if (out / README).is_file():
         write(out / README, _with_pictures((out / README).read_text("utf-8"), borders_of.values()))

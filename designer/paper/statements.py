@@ -23,7 +23,7 @@ from designer.paper.response_order import WindowGap, equal, faults, strays
 
 AGREES, IN_PART, DISAGREES = "agrees", "in part", "disagrees"
 PITCHFORK = 1.47
-"""Of the symmetric 1-1-1, as the paper gives it."""
+"""The pitchfork of the symmetric 1-1-1, as the paper gives it."""
 SWEEP = "designer bifurcation examples/paper.toml"
 
 
@@ -76,7 +76,7 @@ def statements(
     out = [_pitchfork(symmetric), _first_end(survey, windows, twins)]
     out += [_doublings(windows), _second(windows), _twins(windows), _order(windows, gaps)]
     out.append(_chattering(survey, windows, chatter))
-    return [*out, _each(windows), _touches(survey)]
+    return [*out, _each(windows), _grazings(survey)]
 
 
 def _pitchfork(symmetric: BranchWindow) -> Statement:
@@ -95,13 +95,13 @@ def _pitchfork(symmetric: BranchWindow) -> Statement:
 
 def _first_end(survey: Survey, windows: Sequence[BranchWindow], twins: BranchWindow) -> Statement:
     way = cascade(windows, twins)
-    touch = _grazing(survey, twins)
+    grazing = _grazing(survey, twins)
     grazed = ""
-    if touch is not None:
-        state = "stable" if touch.stable[0] and touch.stable[1] else "unstable"
+    if grazing is not None:
+        state = "stable" if grazing.stable[0] and grazing.stable[1] else "unstable"
         grazed = (
             ". The 1-1-1AS orbit itself first touches the stop once more at "
-            f"ω = {touch.value:.5f}, {state} by then"
+            f"ω = {grazing.value:.5f}, {state} by then"
         )
     return Statement(
         "Sec. 4: grazing turns 1-1-1AS into 1-1-2, whose period doublings lead to chaos",
@@ -120,13 +120,13 @@ def _grazing(survey: Survey, twins: BranchWindow) -> Bifurcation | None:
     before, after = end.stable
     if before == after:  # the counts change there: the window lies at the higher values
         before = survey.branches[twins.branch].points[int(end.position)].value > end.value
-    touches = [
+    grazings = [
         p
         for p in survey.on(twins.branch)
         if p.kind is PointKind.GRAZING
         and (p.position > end.position if before else p.position < end.position)
     ]
-    return min(touches, key=lambda p: abs(p.position - end.position), default=None)
+    return min(grazings, key=lambda p: abs(p.position - end.position), default=None)
 
 
 def _doublings(windows: Sequence[BranchWindow]) -> Statement:
@@ -251,7 +251,7 @@ def _each(windows: Sequence[BranchWindow]) -> Statement:
     )
 
 
-def _touches(survey: Survey) -> Statement:
+def _grazings(survey: Survey) -> Statement:
     """Where 1-p-p becomes 1-(p+1)-p, by grazing, as an attractor."""
     seen = []
     for point in survey.points:

@@ -25,7 +25,7 @@ from designer.yields.yield_count import Yield
 RESISTORS = (0.05, 0.01, 0.001)
 CAPACITORS = (0.05, 0.01)
 REFERENCE = (0.01, 0.01, True)
-"""Grades and offsets of the case whose blame is worked out."""
+"""Grades and offsets of the case whose attribution is worked out."""
 TITLES = {
     PRINTED: "paper, as printed",
     CORRECTED: "paper, corrected",
@@ -60,7 +60,7 @@ class SpreadCase:
 
     @property
     def reference(self) -> bool:
-        """Whether it is the case whose blame is worked out."""
+        """Whether it is the case whose attribution is worked out."""
         return (self.resistor, self.capacitor, self.offsets) == REFERENCE
 
 

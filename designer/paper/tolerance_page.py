@@ -70,10 +70,10 @@ def _panel(
 
 
 def tolerance_page(
-    rows: Sequence[YieldRow], blame: Mapping[str, Any], *, samples: int, short: int, seed: int
+    rows: Sequence[YieldRow], attribution: Mapping[str, Any], *, samples: int, short: int, seed: int
 ) -> Page:
-    """``README.md``. blame : of the reference cases, by circuit, as JSON has it. short : boards
-    that were tuned and powered up."""
+    """``README.md``. attribution : of the reference cases, by circuit, as JSON has it. short :
+    boards that were tuned and powered up."""
     head: list[Block] = [
         Markup(
             f"Made by `designer reproduce tolerance --samples {samples} --seed {seed}`. The data "
@@ -98,7 +98,7 @@ def tolerance_page(
     for circuit, title in TITLES.items():
         mine = [r for r in rows if r.circuit == circuit]
         if mine:
-            blocks = [_table(mine), *_limits(blame.get(circuit), mine)]
+            blocks = [_table(mine), *_limits(attribution.get(circuit), mine)]
             sections.append(PageSection(title.capitalize(), blocks))
     return Page("Tolerance of the paper's circuit", head, sections)
 
@@ -127,18 +127,18 @@ def _cell(row: YieldRow | None) -> str:
     return text + (f" ({row.failed} failed)" if row.failed else "")
 
 
-def _limits(blame: Mapping[str, Any] | None, rows: Sequence[YieldRow]) -> list[Block]:
+def _limits(attribution: Mapping[str, Any] | None, rows: Sequence[YieldRow]) -> list[Block]:
     """What limits each response in the reference case."""
-    if blame is None:
+    if attribution is None:
         return []
     asked = [e for e in RESPONSES if any(r.expect == e and r.there for r in rows)]
     lines = []
-    for blamed in blame["responses"]:
-        p = blamed["prediction"]
+    for attributed in attribution["responses"]:
+        p = attributed["prediction"]
         decided = p["ok"] + p["lost"]
-        groups = [s for s in blamed["subjects"] if s["kind"] == "group"][:GROUPS_SHOWN]
+        groups = [s for s in attributed["subjects"] if s["kind"] == "group"][:GROUPS_SHOWN]
         avoided = ", ".join(f"{s['name']} {s['avoided']} of {s['replayed']}" for s in groups)
-        line = f"**{asked[blamed['question']]}**: {blamed['limited_by']}."
+        line = f"**{asked[attributed['question']]}**: {attributed['limited_by']}."
         line += f" Losses avoided if exact: {avoided}." if avoided else ""
         line += f" The margin foretells {p['right']} of {decided} verdicts." if decided else ""
         lines.append(Markup(line))
@@ -148,7 +148,7 @@ def _limits(blame: Mapping[str, Any] | None, rows: Sequence[YieldRow]) -> list[B
 
 
 def _half_width(samples: int) -> str:
-    """Of Wilson's interval at one half, in points."""
+    """The half width of Wilson's interval at one half, in points."""
     low, high = wilson(0.5 * samples, samples)
     return f"{50.0 * (high - low):.1f}"
 

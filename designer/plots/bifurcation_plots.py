@@ -158,9 +158,9 @@ def _text(share: AttractorShare | None) -> str:
 
 
 WIDE = 0.012
-"""Of the sweep: narrower windows get no label."""
+"""Windows narrower than this share of the sweep get no label."""
 NARROW = 0.004
-"""Of the sweep: narrower windows get no border, which would hide them."""
+"""Windows narrower than this share of the sweep get no border, which would hide them."""
 SECOND_AXIS = 0.42
 """How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
 Coloured = tuple[str, Array, list[SteadyMotion]]
@@ -175,7 +175,7 @@ STRIPS = {DOWN: "↓", UP: "↑"}
 
 
 def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Bifurcation]:
-    """Those of stable orbits between two values."""
+    """The marks of stable orbits between two values."""
     return [p for p in points if (p.stable[0] or p.stable[1]) and low <= p.value <= high]
 
 
@@ -261,9 +261,9 @@ def _swept_axis(lowest: Axes, plan: SweepPlan) -> None:
 
 
 def _limits(values: Array) -> tuple[float, float]:
-    """Of the axis of the swept parameter: its values and a little beside them."""
-    beside = 0.004 * float(values[-1] - values[0])
-    return float(values[0]) - beside, float(values[-1]) + beside
+    """The limits of the axis of the swept parameter: its values and a little beside them."""
+    aside = 0.004 * float(values[-1] - values[0])
+    return float(values[0]) - aside, float(values[-1]) + aside
 
 
 def _met(step: SteadyMotion, stop: int) -> Array:

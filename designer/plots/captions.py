@@ -66,10 +66,10 @@ def missing(end: SweptEnd, parameter: str, unit: str = "") -> str:
 
     parameter : how it is written. unit : of it.
     """
-    whose = label(end.window.response, end.window.symmetric)
+    owner = label(end.window.response, end.window.symmetric)
     which, way = ("upper", "up") if end.side > 0 else ("lower", "down")
     place = f"{parameter} = {end.value:.9g}{' ' + unit if unit else ''}"
-    return f"{which} end of {whose} {end.kind}, known {way} to {place}: {end.reason}"
+    return f"{which} end of {owner} {end.kind}, known {way} to {place}: {end.reason}"
 
 
 def family(response: str) -> str:
@@ -161,7 +161,7 @@ def _text(point: Bifurcation, before: str, after: str) -> str:
 
 
 def _of_branch(point: Bifurcation) -> TrackChange:
-    """By the branch alone, from its stable side where it has one."""
+    """The caption by the branch alone, from its stable side where it has one."""
     before, after = point.before, point.after
     if point.stable[1] and not point.stable[0]:
         before, after = after, before

@@ -16,7 +16,7 @@ NAMES = {
     PointKind.GRAZING: "grazing",
     PointKind.TORUS: "torus bifurcation",
 }
-"""Of the kinds, in a sentence."""
+"""The names of the kinds in a sentence."""
 
 
 def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
@@ -26,10 +26,10 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     parameter : how it is written; "" leaves out where the point lies. unit : of it.
     """
     place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
-    whose = f" of {label(point.response, point.symmetric)}"
+    owner = f" of {label(point.response, point.symmetric)}"
     if point.kind is PointKind.GRAZING:
-        whose = f" at {point.stops}" if point.stops else ""
-    return f"{NAMES[point.kind]}{whose}{place}: {_change(point)}"
+        owner = f" at {point.stops}" if point.stops else ""
+    return f"{NAMES[point.kind]}{owner}{place}: {_change(point)}"
 
 
 def label(response: str, symmetric: bool | None) -> str:
@@ -63,7 +63,7 @@ def _change(point: Bifurcation) -> str:
 
 
 def _stability(point: Bifurcation) -> str:
-    """Of the branch on both sides."""
+    """The stability of the branch on both sides."""
     sides = point.stable_sides
     assert sides is not None
     if sides[1] is sides[-1]:

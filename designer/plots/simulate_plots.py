@@ -51,7 +51,7 @@ from designer.plots.response_colours import BLACK, RED
 from designer.plots.si_axes import si_x, si_y
 
 QUIET = 1e-10
-"""Of the largest line or density: what lies below it is left out of the picture."""
+"""What lies below this share of the largest line or density is left out of the picture."""
 _PLAIN = str.maketrans("₀₁₂₃₄₅₆₇₈₉−", "0123456789-")
 MANY = 40
 """Points of a section above which they are drawn small."""
@@ -164,7 +164,7 @@ def _records(response: Simulated) -> tuple[Trace, ...]:
 
 
 def _spectra(response: Simulated) -> Iterator[PowerSpectrum]:
-    """Of the displacement in each clearance."""
+    """The spectra of the displacement in each clearance."""
     trace = _records(response)[0]
     periodic = response.orbit.status in (OrbitStatus.PERIODIC, OrbitStatus.GRAZING)
     for motion in response.motions:
@@ -189,7 +189,7 @@ def _title(figure: Figure, response: Simulated, text: str, units: Mapping[str, U
 
 
 DIGITS = 12
-"""Of a frequency in a file's name, at most."""
+"""The most digits of a frequency in a file's name."""
 FORMATS = ("png", "svg")
 FOLDER = "a directory that can be written"
 LEAST_PERIODS = 2
@@ -258,10 +258,10 @@ def write(
     for stem, response in zip(stems, simulated, strict=True):
         for kind, draw in KINDS.items() if response.traces else ():
             figure = draw(response, units)
-            for form in FORMATS:
-                names.append(_file(stem, kind, form))
+            for file_format in FORMATS:
+                names.append(_file(stem, kind, file_format))
                 with appearing(folder / names[-1], "--plots", FOLDER) as partial:
-                    partial.write_bytes(picture(figure, form, 200.0))
+                    partial.write_bytes(picture(figure, file_format, 200.0))
         for kind, table in TABLES.items() if response.traces else ():
             names.append(_file(stem, kind, "csv"))
             with appearing(folder / names[-1], "--plots", FOLDER) as partial:
@@ -375,8 +375,8 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 )
 
 
-def _file(stem: str, kind: str, form: str) -> str:
-    return f"{stem}-{kind}.{form}"
+def _file(stem: str, kind: str, file_format: str) -> str:
+    return f"{stem}-{kind}.{file_format}"
 
 
 def _traced_orbits(response: Simulated) -> list[Orbit]:

@@ -40,7 +40,8 @@ VERDICTS = {
 MARKERS = {v: "o" if v is Verdict.OK else "D" for v in Verdict}
 
 MOST_DOTS = 500
-"""Of a picture as lines and dots; more stand in it as an image, which does not grow with them."""
+"""The most dots of a picture as lines and dots; more stand in it as an image, which does not grow
+with them."""
 
 
 @styled
@@ -170,12 +171,12 @@ def coefficient_chart(errors: Mapping[str, float]) -> Figure:
             axes.text(edge, i, "not known", va="center", color=MUTED, size=8)
         elif value <= 100.0 * EXACT:
             axes.plot([edge], [i], "o", mfc="white", mec=VERDICTS[Verdict.OK], ms=5.5)
-            _beside(axes, edge, i, "exact")
+            _write_beside(axes, edge, i, "exact")
         else:
             axes.plot([low, value], [i, i], color=GRID, lw=2.5, solid_capstyle="butt")
             axes.plot([value], [i], "o", color=VERDICTS[Verdict.OK], ms=5.5)
             sign = "+" if errors[name] > 0 else "−"
-            _beside(axes, value, i, f"{sign}{value:.2g} %")
+            _write_beside(axes, value, i, f"{sign}{value:.2g} %")
     plain_numbers(axes.xaxis)
     if real:
         axes.set_xlabel(f"|ln(realised/wanted)| [%]; exact: up to {100 * EXACT:g} %")
@@ -254,7 +255,7 @@ def _verdict_key(
         figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
 
 
-def _beside(axes: Axes, x: float, row: int, text: str) -> None:
+def _write_beside(axes: Axes, x: float, row: int, text: str) -> None:
     """A text to the right of a dot."""
     axes.annotate(text, (x, row), (7, 0), textcoords="offset points", va="center", size=8)
 

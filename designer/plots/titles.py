@@ -37,17 +37,17 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
     name : the model's title, or "". width : characters of a line.
     """
-    whose = plan.subject.name
+    owner = plan.subject.name
     if isinstance(plan, SweepPlan):
         over = parameter_name(plan.subject, plan.parameter)
-        heading = f"bifurcation diagram of the {whose} over {over}, {_way(plan)}"
+        heading = f"bifurcation diagram of the {owner} over {over}, {_way(plan)}"
         changed: Mapping[str, float | None] = {plan.parameter: None}
     elif isinstance(plan, MapPlan):
         over = _both(plan.subject, plan.x, plan.y)
-        heading = f"responses n-p-q of the {whose} over {over}, from rest"
+        heading = f"responses n-p-q of the {owner} over {over}, from rest"
         changed = {plan.x: None, plan.y: None}
     else:
-        heading = f"basins of attraction of the {whose}, by the initial "
+        heading = f"basins of attraction of the {owner}, by the initial "
         heading += f"{_both(plan.subject, plan.x, plan.y)}, other states 0"
         changed = plan.changes
     lines = [name, heading, "held: " + ", ".join(_fixed(plan.subject, changed))]
@@ -57,7 +57,7 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
 
 def curves_title(name: str, plan: CurvePlan, width: int = 100) -> str:
-    """The same of bifurcation curves over two parameters."""
+    """The title of bifurcation curves over two parameters."""
     over = _both(plan.subject, plan.first, plan.second)
     heading = f"bifurcation curves of the {plan.subject.name} over {over}"
     held = _fixed(plan.subject, {plan.first: None, plan.second: None})
@@ -72,7 +72,7 @@ def _both(subject: Subject, first: str, second: str) -> str:
 
 
 def _way(plan: SweepPlan) -> str:
-    """In which order, or from which starts, the values are computed."""
+    """The order in which, or the starts from which, the values are computed."""
     if plan.followed:
         directions = {DOWN: "followed down", UP: "followed up"}
         return " and ".join(directions[t] for t in plan.tracks)

@@ -32,7 +32,7 @@ from designer.report import words
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
 from designer.workbench.prediction import BoardPrediction, PredictedStop
-from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.loss_attribution import ResponseAttribution
 from designer.yields.study import RunResult, Study
 from designer.yields.yield_count import Yield
 
@@ -71,7 +71,7 @@ class ReportData:
         return self.drawn[name]
 
     def of_study(self, result: RunResult) -> ReportData:
-        """The same report of a study that went on; what the design decides is taken over."""
+        """The data of a study that went on; what the design decides is taken over."""
         later = replace(self, result=result)
         alike = zip(result.checked, self.checked, strict=False)
         if len(result.checked) != len(self.checked) or any(a is not b for a, b in alike):
@@ -114,7 +114,7 @@ class ReportData:
 
     @cached_property
     def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out of the study."""
+        """The yield of each response; None where it was left out of the study."""
         return self.study.yields
 
     @property
@@ -127,7 +127,7 @@ class ReportData:
 
     @cached_property
     def traces(self) -> tuple[Mapping[str, Trace], ...]:
-        """For each response: its orbit by engine, in model units (``checked_design.traces``)."""
+        """The orbit of each response by engine, in model units (``checked_design.traces``)."""
         return tuple(traces(self.design, c) for c in self.checked)
 
     def motions(self, response: int) -> tuple[RelativeMotion, ...]:
@@ -215,8 +215,8 @@ class ReportData:
         indices = self.study.response_indices
         return indices.index(response) if response in indices else None
 
-    def blame_of(self, response: int) -> ResponseBlame | None:
-        """The blame of a response."""
-        blame, question = self.study.blame, self.question_of(response)
-        rows = () if blame is None else blame.responses
+    def attribution_of(self, response: int) -> ResponseAttribution | None:
+        """The attribution of a response."""
+        attribution, question = self.study.blame, self.question_of(response)
+        rows = () if attribution is None else attribution.responses
         return next((b for b in rows if b.question == question), None)

@@ -44,7 +44,7 @@ from designer.report.data import ReportData
 from designer.report.four_answers import answers
 from designer.report.spread_words import words_of
 from designer.spread.part_grades import better_grades_text
-from designer.yields.blame_analysis import Blame
+from designer.yields.loss_attribution import Attribution
 
 FORMAT = 1
 MADE = "What was it made with?"
@@ -117,7 +117,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
             _rare(data, pictures),
             *_maps(data, pictures),
         ),
-        _blame(data, pictures),
+        _attribution(data, pictures),
         _question(
             "What was chosen, and how good is it?",
             lines.chosen(data),
@@ -384,33 +384,33 @@ def _study_note(data: ReportData) -> str:
     if data.plan.census:
         limits = "These are all the boards there are, so their shares have no interval."
     varies = words_of(data.plan.spread, data.design.circuit, bandwidth=data.plan.bandwidth)
-    blame = data.study.blame_status.sentence
+    attribution = data.study.blame_status.sentence
     engine = "the exact circuit"
     if data.plan.bandwidth:
         engine += " with op-amps that lag by their gain-bandwidth, as ngspice's do here"
     return (
         f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: {varies}. "
         "Boards run as built: the generator stays at the settings above. Verdicts are those of "
-        f"{engine}. {limits}" + (f" {blame}" if blame else "")
+        f"{engine}. {limits}" + (f" {attribution}" if attribution else "")
     )
 
 
-def _blame(data: ReportData, pictures: Pictures) -> PageSection:
-    limits, blame = tolerance_tables.limits(data), data.study.blame
+def _attribution(data: ReportData, pictures: Pictures) -> PageSection:
+    limits, attribution = tolerance_tables.limits(data), data.study.blame
     indices = tolerance_tables.indices(data)
-    if limits is None or blame is None:
+    if limits is None or attribution is None:
         return PageSection("", [])
-    lost = any(b.lost for b in blame.responses)
+    lost = any(b.lost for b in attribution.responses)
     avoided = tolerance_tables.avoided(data)
-    blocks: list[Block] = [SmallPrint(_blame_note(blame, lost=lost)), limits]
+    blocks: list[Block] = [SmallPrint(_attribution_note(attribution, lost=lost)), limits]
     if avoided is not None:
         blocks.append(PageSection("Losses avoided", [avoided, pictures.get("avoided")]))
     if indices is not None:
-        moved: list[Block] = [*_indices_note(data, blame), indices, pictures.get("indices")]
+        moved: list[Block] = [*_indices_note(data, attribution), indices, pictures.get("indices")]
         blocks.append(PageSection("Whose spread moves the margin", moved))
     blocks.append(_one("Worst corners", tolerance_tables.corners(data)))
     title = "Which part is to blame?" if lost else "What comes nearest to a loss?"
-    return PageSection(title, blocks, "blame", "", question_lines.blamed(data))
+    return PageSection(title, blocks, "blame", "", question_lines.attributed(data))
 
 
 INDICES_NOTE = (
@@ -420,9 +420,9 @@ INDICES_NOTE = (
 NOISE_NOTE = ", with the 95 % noise of the estimate, by the bootstrap over base samples."
 
 
-def _indices_note(data: ReportData, blame: Blame) -> list[Block]:
+def _indices_note(data: ReportData, attribution: Attribution) -> list[Block]:
     """What the indices are; where their noise was not stored, how to get it."""
-    if blame.noise_known:
+    if attribution.noise_known:
         return [SmallPrint(INDICES_NOTE + NOISE_NOTE)]
     folder = shlex.quote(data.folder) if data.folder else "DIR"
     measured = " --measured FILE" if data.plan.census else ""
@@ -434,7 +434,7 @@ def _indices_note(data: ReportData, blame: Blame) -> list[Block]:
     ]
 
 
-def _blame_note(blame: Blame, *, lost: bool) -> str:
+def _attribution_note(attribution: Attribution, *, lost: bool) -> str:
     replays = "No board was lost, so none was asked again. "
     if lost:
         replays = (
@@ -444,8 +444,8 @@ def _blame_note(blame: Blame, *, lost: bool) -> str:
     return replays + (
         "The margin is the distance to the loss, linear in the parts; its indices tell whose "
         "spread moves it, and are worth as much as the verdicts that it foretells. Cost: "
-        f"{words.plural(blame.attractors, 'attractor')} and "
-        f"{words.plural(blame.orbits, 'step')} of following orbits."
+        f"{words.plural(attribution.attractors, 'attractor')} and "
+        f"{words.plural(attribution.orbits, 'step')} of following orbits."
     )
 
 

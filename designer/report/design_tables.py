@@ -228,9 +228,9 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
             rows.append((one, words.quantity(gain * si.force_scale, "N")))
     base = design.base_per_volt()
     if base is not None and si is not None:
-        whose = ("one generator volt", "one volt of the second channel")[base[0]]
+        volt = ("one generator volt", "one volt of the second channel")[base[0]]
         text = acceleration_text(base[1] * si.acceleration_scale)
-        rows.append((f"{whose}, of the base's acceleration", text))
+        rows.append((f"{volt}, of the base's acceleration", text))
     return table(("scale", "value"), rows, (1,))
 
 

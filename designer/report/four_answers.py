@@ -26,7 +26,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
 from designer.report import words
 from designer.report.data import ReportData
-from designer.yields.blame_analysis import BlameStage
+from designer.yields.loss_attribution import AttributionStage
 from designer.yields.yield_count import Yield
 
 FEW = 100
@@ -104,7 +104,7 @@ def _low_yields(data: ReportData) -> Iterator[Remedy]:
         f"{words.plural(len(low), 'response')} below {100 * WANTED:g} % yield, the least is "
         f"{words.name(data.checked[place])} with {100 * least.rate:.3g} %."
     )
-    if parts := _blamed_parts(data, place):
+    if parts := _attributed_parts(data, place):
         text += f" Most losses would be avoided if {parts} were exact."
     if all(c.periodic for c in data.checked):
         yield Remedy(text, f"designer search DIR --yield {WANTED:g}")
@@ -112,12 +112,12 @@ def _low_yields(data: ReportData) -> Iterator[Remedy]:
         yield Remedy(text, "designer tolerance DIR --tuned --reached")
 
 
-def _blamed_parts(data: ReportData, response: int) -> str:
+def _attributed_parts(data: ReportData, response: int) -> str:
     """The parts that avoid most losses of a response, were they exact; "" where none is known."""
-    blame = data.blame_of(response)
-    if blame is None:
+    attribution = data.attribution_of(response)
+    if attribution is None:
         return ""
-    helpful = [s for s in blame.subjects if s.kind != "group" and s.avoided]
+    helpful = [s for s in attribution.subjects if s.kind != "group" and s.avoided]
     return " or ".join(s.name for s in helpful[:NAMED])
 
 
@@ -129,7 +129,7 @@ def _study(data: ReportData) -> Iterator[Remedy]:
         yield Remedy(text, f"designer tolerance DIR --samples {MANY}")
     if samples and not data.ngspice_ran and not any(map(words.problem, data.checked)):
         yield Remedy("ngspice was not asked.", "designer tolerance DIR --rung auto")
-    if data.study.blame_status.stage is BlameStage.NOT_YET:
+    if data.study.blame_status.stage is AttributionStage.NOT_YET:
         yield Remedy("The blame is not worked out yet.", "designer tolerance DIR --resume")
 
 

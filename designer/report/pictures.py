@@ -18,7 +18,7 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.relative_motion import different_motions
 from designer.plots import (
-    blame_plots,
+    attribution_plots,
     map_plots,
     model_drawing,
     orbit_plots,
@@ -60,7 +60,7 @@ INDICES = "First-order: what a coordinate explains alone; total: with all others
 NOISE = " Thin lines: the 95 % noise of each."
 
 SEEN: Mapping[Side, str] = {"top": "above", "bottom": "below"}
-"""From where each side is seen."""
+"""The direction from which each side is seen."""
 Element = Callable[[Figure, str], Markup]
 DrawnOnce = Callable[[str, Callable[[], Figure], str], Markup]
 """The element of a figure that the design decides, by its name (``ReportData.once``)."""
@@ -220,7 +220,7 @@ def _caption(data: ReportData, response: int, c: CheckedResponse) -> str:
 
 
 def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
-    """Yields, margins and blame, of what there is."""
+    """Yields, margins and attribution, of what there is."""
     labels = [words.label(c) for c in data.checked]
     responses = range(len(data.checked))
     interval = "among all boards" if data.plan.census else "with its 95 % interval"
@@ -239,16 +239,16 @@ def _study_pictures(data: ReportData, element: Element) -> dict[str, Picture]:
         rare = [(labels[data.study.response_indices[r.question]], r) for r in data.study.rare]
         shows = "Boards of a million that lose each response, as in the table."
         out["rare"] = Picture(svg=element(study_plots.rare_chart(rare), shows))
-    blames = [data.blame_of(i) for i in responses]
-    if any(b is not None and b.subjects for b in blames):
+    attributions = [data.attribution_of(i) for i in responses]
+    if any(b is not None and b.subjects for b in attributions):
         shows = (
             "Share of each response's losses that are avoided if one part or one group were exact."
         )
-        svg = element(blame_plots.avoided_chart(labels, blames), shows)
+        svg = element(attribution_plots.avoided_chart(labels, attributions), shows)
         out["avoided"] = Picture(caption=AVOIDED, svg=svg)
-    if any(b is not None and b.indices for b in blames):
+    if any(b is not None and b.indices for b in attributions):
         shows = "Sobol indices of each response's margin, its largest coordinates."
-        svg = element(blame_plots.index_chart(labels, blames), shows)
+        svg = element(attribution_plots.index_chart(labels, attributions), shows)
         known = data.study.blame is not None and data.study.blame.noise_known
         out["indices"] = Picture(caption=INDICES + NOISE * known, svg=svg)
     return out

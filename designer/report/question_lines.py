@@ -40,19 +40,19 @@ def working(data: ReportData) -> str:
     return f"{said} Of {words.name(data.checked[place])} most often {why[0]}." if why else said
 
 
-def blamed(data: ReportData) -> str:
+def attributed(data: ReportData) -> str:
     """What limits the response that fewest boards show."""
     known = [
         (math.inf if y is None or not math.isfinite(y.rate) else y.rate, i)
         for i, y in enumerate(data.yields)
-        if data.blame_of(i) is not None
+        if data.attribution_of(i) is not None
     ]
     if not known:
         return "Not worked out."
     place = min(known)[1]
-    blame = data.blame_of(place)
-    assert blame is not None
-    return f"{words.name(data.checked[place])}: {blame.limited_by}."
+    attribution = data.attribution_of(place)
+    assert attribution is not None
+    return f"{words.name(data.checked[place])}: {attribution.limited_by}."
 
 
 def chosen(data: ReportData) -> str:

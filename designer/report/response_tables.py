@@ -13,7 +13,7 @@ from designer.base.design_folder import TOLERANCE
 from designer.base.page import Table, table, table_of
 from designer.base.si_unit import is_angular
 from designer.check.checked_design import CheckedResponse
-from designer.check.coexistence import beside
+from designer.check.coexistence import coexisting_with
 from designer.circuit.nominal import nominal_reduction
 from designer.report import words
 from designer.report.data import ReportData
@@ -50,7 +50,7 @@ def response_table(data: ReportData) -> Table | None:
 
 
 def _exponents(checked: CheckedResponse) -> str:
-    """Of each engine with its standard error, per unit of the model's time."""
+    """The exponent by each engine with its standard error, per unit of the model's time."""
     each = [f"{name} {v:.3g} ± {e:.1g}" for name, (v, e) in checked.exponents.items()]
     return ", ".join(each) or words.NONE
 
@@ -60,7 +60,7 @@ def _coexisting(data: ReportData, checked: CheckedResponse) -> str:
     model = data.design.model.at(checked.model.b)
     others = [
         f"{b.orbit.response} ({100 * b.count / DRAWN_STARTS:.3g} %)"
-        for b in beside(model, checked.model)
+        for b in coexisting_with(model, checked.model)
     ]
     return f"{', '.join(others) or 'none'}, of {DRAWN_STARTS} starts"
 

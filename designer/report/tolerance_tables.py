@@ -1,5 +1,5 @@
 """Tables of a report about what a study has beside its boards as built: other kinds of yield,
-disagreements, start recipes, blame, maps. None for what it does not have."""
+disagreements, start recipes, attribution, maps. None for what it does not have."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from designer.report.measured_table import table as measured_boards
 from designer.report.response_tables import STARTED
 from designer.report.spread_words import warm_words
 from designer.verdicts.verdict import BoardRow
-from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.rare_losses import WIDEST, LossRegion, RareLosses, ToleranceMargin
 from designer.yields.two_engine_yield import Combined
 from designer.yields.worst_corner import NOISE, Corner, Index
@@ -133,24 +133,24 @@ def recipes(data: ReportData) -> Table | None:
     return table(("response", "how to reach it"), [row for row in rows if row[1]])
 
 
-def _blamed(data: ReportData) -> list[tuple[str, ResponseBlame]]:
-    """Name and blame of each response that has one."""
-    blames = ((words.name(c), data.blame_of(i)) for i, c in enumerate(data.checked))
-    return [(name, blame) for name, blame in blames if blame is not None]
+def _attributed(data: ReportData) -> list[tuple[str, ResponseAttribution]]:
+    """Name and attribution of each response that has one."""
+    attributions = ((words.name(c), data.attribution_of(i)) for i, c in enumerate(data.checked))
+    return [(name, attribution) for name, attribution in attributions if attribution is not None]
 
 
 def limits(data: ReportData) -> Table | None:
     """What limits each response, and how many verdicts the margin foretells."""
     rows = []
-    for name, blame in _blamed(data):
-        p = blame.prediction
+    for name, attribution in _attributed(data):
+        p = attribution.prediction
         decided = p.ok + p.lost
         foretold = words.NONE
         if decided:
             foretold = f"{p.right} of {decided}" if p.lost else NO_LOSS
             if p.right < decided:
                 foretold += f" (lost boards missed: {p.missed}, false alarms: {p.alarms})"
-        rows.append((name, blame.limited_by, foretold))
+        rows.append((name, attribution.limited_by, foretold))
     if all(row[-1] in (NO_LOSS, words.NONE) for row in rows):
         rows = [(*row[:-1], "") for row in rows]
     return table(("response", "what limits it", "verdicts foretold by the margin"), rows)
@@ -159,24 +159,24 @@ def limits(data: ReportData) -> Table | None:
 def avoided(data: ReportData) -> Table | None:
     """Losses that are avoided if one group of parts, or one part, were exact."""
     rows = []
-    for name, blame in _blamed(data):
-        if not blame.subjects:
+    for name, attribution in _attributed(data):
+        if not attribution.subjects:
             continue
-        groups = [s for s in blame.subjects if s.kind == "group"]
-        parts = [s for s in blame.subjects if s.kind != "group" and s.avoided][:PARTS_SHOWN]
+        groups = [s for s in attribution.subjects if s.kind == "group"]
+        parts = [s for s in attribution.subjects if s.kind != "group" and s.avoided][:PARTS_SHOWN]
         rows.append(
             (
                 name,
-                str(blame.lost),
+                str(attribution.lost),
                 ", ".join(map(_saved, groups)) or words.NONE,
-                ", ".join(map(_saved, parts)) or blame.skipped or "none by itself",
+                ", ".join(map(_saved, parts)) or attribution.skipped or "none by itself",
             )
         )
     columns = ("response", "lost", "losses avoided if a group were exact", "if one part were")
     return table(columns, rows, (1,))
 
 
-def _saved(subject: BlamedPart) -> str:
+def _saved(subject: PartAttribution) -> str:
     low, high = (100 * v for v in subject.interval)
     text = f"{subject.name}: {subject.avoided} of {subject.replayed}"
     if subject.avoided:
@@ -188,7 +188,11 @@ def _saved(subject: BlamedPart) -> str:
 
 def indices(data: ReportData) -> Table | None:
     """The largest Sobol indices of each margin, with their noise."""
-    rows = [(name, index) for name, blame in _blamed(data) for index in blame.indices[:PARTS_SHOWN]]
+    rows = [
+        (name, index)
+        for name, attribution in _attributed(data)
+        for index in attribution.indices[:PARTS_SHOWN]
+    ]
     columns: dict[str, Callable[[tuple[str, Index]], str]] = {
         "response": lambda row: row[0],
         "coordinate": lambda row: row[1].coordinate,
@@ -208,7 +212,11 @@ def _noisy(value: float, error: float) -> str:
 
 def corners(data: ReportData) -> Table | None:
     """The worst corner of each response."""
-    rows = [(name, blame.corner) for name, blame in _blamed(data) if blame.corner is not None]
+    rows = [
+        (name, attribution.corner)
+        for name, attribution in _attributed(data)
+        if attribution.corner is not None
+    ]
     columns: dict[str, Callable[[tuple[str, Corner]], str]] = {
         "response": lambda row: row[0],
         "worst corner, all else in the middle": lambda row: ", ".join(

@@ -1,4 +1,4 @@
-"""Sections of a report about what other verbs answered of the same design: cure, rules, trade,
+"""Sections of a report about what other verbs answered of the same design: repair, rules, trade,
 bench.
 
 Each is made from the JSON object that the verb wrote beside the report, and from nothing else.
@@ -27,23 +27,23 @@ from designer.report import record_page, words
 Answer = Mapping[str, Any]
 
 
-def cure_section(answer: Answer, files: Sequence[str]) -> PageSection:
-    """The cheapest cure. answer : ``cure.json`` (docs/contract.md). files : of it, for links."""
+def repair_section(answer: Answer, files: Sequence[str]) -> PageSection:
+    """The cheapest repair. answer : ``cure.json`` (docs/contract.md). files : of it, for links."""
     blocks: list[Block] = [
         _upgrades(answer),
         SmallPrint(
             "Yields of the exact circuit on fresh boards, with their 95 % intervals. Prices are "
             "over the design as it is, in euro by the catalogue's price classes."
         ),
-        _cured_responses(answer),
+        _repaired_responses(answer),
         PageSection("Yield against price", [_front(answer)]),
         PageSection("Not built", [_refused(answer)]) if answer["refused"] else None,
         FileLinks(tuple(files)),
     ]
-    return PageSection("The cheapest cure", blocks, "cure", "", _cure_lead(answer))
+    return PageSection("The cheapest cure", blocks, "cure", "", _repair_lead(answer))
 
 
-def _cure_lead(answer: Answer) -> str:
+def _repair_lead(answer: Answer) -> str:
     wanted, price = f"{100.0 * answer['target']:g} %", f"{answer['price']:.2f} €"
     if answer["reached"]:
         return f"Every response at {wanted} or better for {price}."
@@ -54,7 +54,7 @@ def _upgrades(answer: Answer) -> Items | str:
     return bullets(answer["said"]) if answer["said"] else "Nothing is changed."
 
 
-def _cured_responses(answer: Answer) -> Block:
+def _repaired_responses(answer: Answer) -> Block:
     columns: dict[str, Callable[[Answer], str]] = {
         "response": _response,
         "as it is": lambda r: _share(r["before"]),
@@ -224,7 +224,7 @@ def older_section(verb: str, files: Sequence[str]) -> PageSection:
 
 
 SECTIONS: Mapping[str, Callable[[Answer, Sequence[str]], PageSection]] = {
-    "cure": cure_section,
+    "cure": repair_section,
     "rules": rules_section,
     "trade": trade_section,
 }

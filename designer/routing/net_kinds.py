@@ -51,9 +51,9 @@ def net_kinds(rules: Sequence[CustomRule]) -> tuple[NetKind, ...]:
     ) -> NetKind:
         return NetKind(name, width / 2.0, clearance, front, back, via, yields)
 
-    beside = max(least, limits["summing-clearance"].limit)
+    summing_clearance = max(least, limits["summing-clearance"].limit)
     return (
-        kind(SUMMING, CLASSES[SUMMING]["track_width"], beside, 16, 24, 500_000, 4),
+        kind(SUMMING, CLASSES[SUMMING]["track_width"], summing_clearance, 16, 24, 500_000, 4),
         kind(DEFAULT, CLASSES[DEFAULT]["track_width"], least, 16, 20, 16_000, 16),
         kind(SUPPLY, supply, least, 16, 18, 12_000, 16),
         kind(GROUND_KIND, supply, least, 20, 16, 6_000, 16),

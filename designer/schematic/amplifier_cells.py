@@ -191,12 +191,12 @@ def _hang(cell: SheetCell, chain: Chain, at: Point, parts: SheetParts) -> None:
         if y > at[1] + 1:
             cell.end(net, (x, y), f"{part.name}_start", left=True)
         net = other(part.nets, net)
-        stand(cell, parts.items[part.name], net, (x, y + REACH), parts)
+        place_upright(cell, parts.items[part.name], net, (x, y + REACH), parts)
         y += 2 * REACH
     cell.end(net, (x, y), f"{chain.parts[-1].name}_end", left=False)
 
 
-def stand(cell: SheetCell, item: Item, below: str, at: Point, parts: SheetParts) -> Placed:
+def place_upright(cell: SheetCell, item: Item, below: str, at: Point, parts: SheetParts) -> Placed:
     """A part on end, its role beside it. below : net of its lower pin."""
     placed = turned(item, below, at, (90, 270))
     cell.symbols.append(placed)

@@ -16,8 +16,8 @@ from designer.schematic.amplifier_cells import (
     SheetParts,
     follower_cell,
     headed,
+    place_upright,
     row,
-    stand,
 )
 from designer.schematic.drawing_cells import Chain
 from designer.schematic.sheet_drawing import (
@@ -160,7 +160,7 @@ def _stack(
     y = 0
     for part in capacitors:
         item = parts.items[part.name]
-        stand(cell, item, part.minus, (x, y + REACH), parts)
+        place_upright(cell, item, part.minus, (x, y + REACH), parts)
         aside = (x, y) if y == 0 else (x - 3, y)
         cell.wire((x, y), aside)
         cell.end(part.plus, aside, f"{part.name}_plus", left=False)

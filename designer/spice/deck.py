@@ -1,7 +1,7 @@
 """The SPICE deck of a board: literal values, one element a line.
 
 Written for plain ``ngspice -b`` and for the shared library alike. Every op-amp is one subcircuit,
-which ``spice.opamp_model`` writes for the rung that is asked for. Text from a model file enters
+which ``spice.opamp_model`` writes for the fidelity that is asked for. Text from a model file enters
 only through ``title_line``.
 """
 
@@ -20,7 +20,7 @@ from designer.circuit.netlist import Circuit, Excitation, Generator, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.drive_shape import Shape
 from designer.spice import opamp_model
-from designer.spice.opamp_model import Rung, literal
+from designer.spice.opamp_model import Fidelity, literal
 
 FORMAT = 1
 IDEAL_GAIN = 1e9
@@ -70,7 +70,7 @@ def write(
     title: str,
     stop_time: float,
     initial: Array | None = None,
-    rung: Rung = "ideal",
+    fidelity: Fidelity = "ideal",
     kept_from: float = 0.0,
     stage: bool = True,
     bounded: bool = False,
@@ -78,7 +78,7 @@ def write(
 ) -> str:
     """The deck as text, ending in a newline.
 
-    initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
+    initial : (states,) capacitor voltages at t = 0; discharged where None. fidelity : the op-amps'
     model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
     time [s] before which ngspice keeps no point; what it computes is the same. stage : whether it
     keeps the nonlinear stage's output, beside the states and the generator. bounded : whether the
@@ -86,7 +86,7 @@ def write(
 
     Raises
     ------
-    ValueError : a rung above ``ideal`` for a circuit without the figures of its op-amp.
+    ValueError : a fidelity above ``ideal`` for a circuit without the figures of its op-amp.
     """
     drive = excitation
     lines = [
@@ -95,13 +95,15 @@ def write(
         *map(comment_line, notes),
         *generators(circuit, drive),
     ]
-    lines += _sources(circuit, board, rung)
+    lines += _sources(circuit, board, fidelity)
     lines += resistors(circuit, board)
     lines += capacitors(circuit, board, initial, drive.at_start)
-    lines += diodes(circuit, charge=rung != "ideal")
-    lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
+    lines += diodes(circuit, charge=fidelity != "ideal")
+    lines += _opamps(
+        circuit, board, fidelity, _outputs(circuit, board, excitation, initial, fidelity)
+    )
     lines += [
-        f"{options(settings)} noopiter{newton_bounds(circuit, board, rung) if bounded else ''}",
+        f"{options(settings)} noopiter{newton_bounds(circuit, board, fidelity) if bounded else ''}",
         f".save {voltages(circuit, stage=stage)}",
         f".tran {literal(settings.max_step)} {literal(stop_time)} "
         f"{literal(kept_from) if kept_from else 0} {literal(settings.max_step)} uic",
@@ -110,37 +112,41 @@ def write(
     return "\n".join(lines) + "\n"
 
 
-def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, float]) -> list[str]:
+def _opamps(
+    circuit: Circuit, board: Board, fidelity: Fidelity, outputs: Mapping[str, float]
+) -> list[str]:
     """One element line for each section, and the model.
 
     A vendor's model has a bandwidth and limits of its own, which no board changes.
     """
     gain = open_loop_gain(board)
-    if rung == "ideal":
-        return _instances(circuit, board, rung, outputs, {}) + opamp_model.ideal(gain)
+    if fidelity == "ideal":
+        return _instances(circuit, board, fidelity, outputs, {}) + opamp_model.ideal(gain)
     if circuit.figures is None:
-        raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
+        raise ValueError(f"rung {fidelity!r}: the circuit has no figures of its op-amp")
     figures = circuit.figures
-    vendor = rung == "full" and figures.spice is not None
+    vendor = fidelity == "full" and figures.spice is not None
     gbw_of = {} if vendor else board.gain_bandwidth
     slew_of = {} if vendor else board.slew
-    loads = {} if vendor or rung != "full" else circuit.output_loads(board.values)
+    loads = {} if vendor or fidelity != "full" else circuit.output_loads(board.values)
     more = {
         s.name: {
-            **(opamp_model.load(rung, loads[s.name]) if s.name in loads else {}),
-            **(opamp_model.bandwidth(rung, figures, gbw_of[s.name]) if s.name in gbw_of else {}),
-            **(opamp_model.slew_rate(rung, slew_of[s.name]) if s.name in slew_of else {}),
+            **(opamp_model.load(fidelity, loads[s.name]) if s.name in loads else {}),
+            **(
+                opamp_model.bandwidth(fidelity, figures, gbw_of[s.name]) if s.name in gbw_of else {}
+            ),
+            **(opamp_model.slew_rate(fidelity, slew_of[s.name]) if s.name in slew_of else {}),
         }
         for s in circuit.sections
     }
-    lines = _instances(circuit, board, rung, outputs, more)
-    return lines + opamp_model.subcircuit(rung, figures, gain)
+    lines = _instances(circuit, board, fidelity, outputs, more)
+    return lines + opamp_model.subcircuit(fidelity, figures, gain)
 
 
 def _instances(
     circuit: Circuit,
     board: Board,
-    rung: Rung,
+    fidelity: Fidelity,
     outputs: Mapping[str, float],
     more: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
@@ -148,7 +154,7 @@ def _instances(
         opamp_model.instance(
             s.name,
             (s.noninverting, s.inverting, s.output),
-            rung=rung,
+            fidelity=fidelity,
             vos=board.offset.get(s.name, 0.0),
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],
@@ -160,10 +166,14 @@ def _instances(
 
 
 def _outputs(
-    circuit: Circuit, board: Board, excitation: Excitation, initial: Array | None, rung: Rung
+    circuit: Circuit,
+    board: Board,
+    excitation: Excitation,
+    initial: Array | None,
+    fidelity: Fidelity,
 ) -> dict[str, float]:
     """Output voltage of each section at t = 0 where nothing is saturated, cut at its limits."""
-    if rung == "ideal":
+    if fidelity == "ideal":
         return {}
     x = np.zeros(len(circuit.states)) if initial is None else initial
     reduction = Reduction(circuit, board)
@@ -174,14 +184,14 @@ def _outputs(
     return {s.name: float(np.clip(volts[s.output], *board.rails[s.name])) for s in circuit.sections}
 
 
-def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
+def _sources(circuit: Circuit, board: Board, fidelity: Fidelity) -> list[str]:
     """Supplies that a part or a model uses; references at the board's value, fed as on the board.
 
     A reference is a source on ``ideal``; above, it needs its current and has its resistance.
     """
-    supplies = circuit.supplies if rung == "ideal" else circuit.rails
+    supplies = circuit.supplies if fidelity == "ideal" else circuit.rails
     lines = [f"{s.name} {s.net} 0 {literal(board.supply.get(s.name, s.volts))}" for s in supplies]
-    shunts = rung != "ideal" and any(r.least for r in circuit.references)
+    shunts = fidelity != "ideal" and any(r.least for r in circuit.references)
     for r in circuit.references:
         volts = board.reference[r.name]
         source = f"{r.name} {r.cathode} {r.anode} {literal(volts)}"
@@ -275,7 +285,7 @@ def following(
         return {}
     reduction = Reduction(circuit, board)
     try:
-        key = reduction.system().mode_at(states, channels[0], beside=channels[1])
+        key = reduction.system().mode_at(states, channels[0], second_drive=channels[1])
         volts = reduction.voltages(key, states, channels)
     except ArithmeticError:
         return {}
@@ -303,7 +313,7 @@ def diodes(circuit: Circuit, *, charge: bool) -> list[str]:
 
 
 def open_loop_gain(board: Board) -> float:
-    """Of the board's op-amps, `IDEAL_GAIN` where it is infinite."""
+    """The open-loop gain of the board's op-amps, `IDEAL_GAIN` where it is infinite."""
     return 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
 
 
@@ -315,7 +325,7 @@ def options(settings: SolverSettings) -> str:
     )
 
 
-def newton_bounds(circuit: Circuit, board: Board, rung: Rung) -> str:
+def newton_bounds(circuit: Circuit, board: Board, fidelity: Fidelity) -> str:
     """Options that keep Newton's method from stepping from one limit of an op-amp to the other.
 
     An op-amp without memory is linear while its input is below limit/gain, some 65 uV. An iteration
@@ -323,9 +333,9 @@ def newton_bounds(circuit: Circuit, board: Board, rung: Rung) -> str:
     gives the time step up after a hundred iterations. So no input of an XSPICE block may change by
     more than its own size in an iteration, which takes one that leaves a limit to 0, or by
     limit/gain where that is more. What is solved is the same, and so is the tolerance. Nothing
-    on the rungs above, whose op-amps have memory.
+    at the fidelities above, whose op-amps have memory.
     """
-    if rung != "ideal" or not circuit.sections:
+    if fidelity != "ideal" or not circuit.sections:
         return ""
     limit = min(abs(rail) for s in circuit.sections for rail in board.rails[s.name])
     return f" convlimit convstep=1 convabsstep={literal(limit / open_loop_gain(board))}"

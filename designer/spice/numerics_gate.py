@@ -33,7 +33,7 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import (
     BRIEF,
@@ -51,18 +51,20 @@ MOST_STEPS = 40_000
 run of more would take minutes, and such an orbit is next to grazing."""
 LEVELS = 5
 """How often the step is halved before the gate gives up."""
-CURES: tuple[Remedy, ...] = ("tolerance", "start")
+REMEDIES_OF_GATE: tuple[Remedy, ...] = ("tolerance", "start")
 """Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
-"""Of the peak: half the strobe tolerance, so that boards that differ have room too."""
+"""The bound on strobes, over the peak: half the strobe tolerance, so that boards that differ have
+room too."""
 WAVE_BOUND = 2e-3
-"""Of the peak: RMS over the last n periods of ngspice, with ideal op-amps, less exact circuit."""
+"""The bound on the wave, over the peak: RMS over the last n periods of ngspice, with ideal op-amps,
+less the exact circuit's."""
 RELTOL = 1e-5
 """ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
 MOST_DISCARDED = 400
-"""Drive periods: no run on any rung discards more."""
+"""Drive periods: no run at any fidelity discards more."""
 WAVE_POINTS = 20_000
 """Points of a period of the exact wave, so many that straight lines join them."""
 SHORTEST = 8
@@ -93,7 +95,7 @@ class GateResult:
     """``wave_error`` of the run at ``settings``; nan where it is not periodic, as ``difference``
     is."""
     wave_bound: float = float("nan")
-    """What ``wave`` was held to; nan where the run is not periodic, and above the rung
+    """What ``wave`` was held to; nan where the run is not periodic, and above the fidelity
     ``ideal``."""
 
     @property
@@ -122,7 +124,7 @@ class GateResult:
         return tuple(reasons) or (Reason(other, shown),)
 
     def as_dict(self) -> dict[str, object]:
-        """For provenance: the settings, and what they passed."""
+        """The settings and what they passed, for provenance."""
         return {
             **self.settings.as_dict(),
             "passed": self.passed,
@@ -152,7 +154,7 @@ class GateSubject:
     """(states,) capacitor voltages at t = 0 if not the orbit's."""
     discard: int = DISCARD
     """Periods left out before the run is judged."""
-    rung: Rung = "ideal"
+    fidelity: Fidelity = "ideal"
     """The op-amps' model in ngspice."""
     judged: int = 0
     """Periods that are judged at least."""
@@ -232,7 +234,7 @@ def deck_of(
         title="one response of one board",
         stop_time=stop,
         initial=capacitors,
-        rung=subject.rung,
+        fidelity=subject.fidelity,
         kept_from=kept,
         stage=False,
         bounded=True,
@@ -312,9 +314,9 @@ def check(
 ) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
-    All subjects move through the levels together, so that the workers stay busy. On a rung above
-    ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels : how
-    many step sizes are tried.
+    All subjects move through the levels together, so that the workers stay busy. At a fidelity
+    above ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels :
+    how many step sizes are tried.
     """
     subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
@@ -329,7 +331,7 @@ def check(
             trio = _trio(subjects[i].period / tried[i][-1])
             tasks += [task(subjects[i], settings, keep=True) for settings in trio]
         outcomes = {}
-        for number, outcome in remedies.run(pool, tasks, CURES):
+        for number, outcome in remedies.run(pool, tasks, REMEDIES_OF_GATE):
             outcomes[number] = outcome
             text = f"{len(outcomes)} of {len(tasks)} runs"
             doing(f"step size {level + 1} of at most {levels}: {text}")
@@ -340,9 +342,9 @@ def check(
 
 
 def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject]:
-    """The subjects with the periods that each has to discard on its rung, from a short run."""
+    """The subjects with the periods that each has to discard at its fidelity, from a short run."""
     out = list(subjects)
-    indices = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    indices = [i for i, s in enumerate(subjects) if s.fidelity != "ideal" and s.orbit.n]
     tasks = []
     for i in indices:
         s = subjects[i]
@@ -405,7 +407,7 @@ def _judge(
     good = [run.result for run in runs if isinstance(run.result, Read)]
     wanted = subject.orbit
     difference, wave, bound, passed = float("nan"), float("nan"), float("nan"), False
-    if wanted.status is OrbitStatus.PERIODIC and subject.rung == "ideal":
+    if wanted.status is OrbitStatus.PERIODIC and subject.fidelity == "ideal":
         bound = wave_bound(wanted)
     if len(good) == len(runs):
         passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
@@ -415,7 +417,7 @@ def _judge(
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND
-            passed = passed and (subject.rung != "ideal" or wave <= bound)
+            passed = passed and (subject.fidelity != "ideal" or wave <= bound)
     return GateResult(
         settings,
         passed,
@@ -423,7 +425,7 @@ def _judge(
         read,
         tried,
         contact / settings.max_step if len(wanted.impact_times) else float("nan"),
-        tuple(r for r in CURES if r in needed),
+        tuple(r for r in REMEDIES_OF_GATE if r in needed),
         subject.discard,
         wave,
         bound,

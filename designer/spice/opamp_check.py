@@ -20,7 +20,7 @@ from designer.catalog.output_stage import HEAVY_LOAD, RATED_LOAD
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
     NOISE_FREQUENCY,
-    Rung,
+    Fidelity,
     headroom,
     instance,
     recovery,
@@ -29,7 +29,7 @@ from designer.spice.opamp_model import (
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
 HARD = 0.25
-"""Of the supply: a differential input that drives every op-amp's output to its limit."""
+"""A differential input that drives every op-amp's output to its limit, over the supply."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,18 @@ class OpAmpBench:
 
     opamp: OpAmp
     """The catalogue's entry, at its rated supply and with every figure typical."""
-    rung: Rung
-    """Rung of its model."""
+    fidelity: Fidelity
+    """Fidelity of its model."""
     vos: float
     """Input offset voltage [V]."""
     rails: tuple[float, float]
     """Output limits, (low, high) [V]."""
 
     @classmethod
-    def of(cls, opamp: OpAmp, rung: Rung) -> OpAmpBench:
+    def of(cls, opamp: OpAmp, fidelity: Fidelity) -> OpAmpBench:
         """The op-amp with the offset and the limits of the catalogue."""
         limit = opamp.saturation.nominal
-        return cls(opamp, rung, opamp.offset.nominal, (-limit, limit))
+        return cls(opamp, fidelity, opamp.offset.nominal, (-limit, limit))
 
     @property
     def supply(self) -> float:
@@ -62,9 +62,9 @@ class OpAmpBench:
             "* op-amp bench",
             f"VCC vcc 0 {self.supply!r}",
             f"VEE vee 0 {-self.supply!r}",
-            instance("U1", ("inp", "inn", "out"), rung=self.rung, vos=self.vos,
+            instance("U1", ("inp", "inn", "out"), fidelity=self.fidelity, vos=self.vos,
                      ib=self.opamp.bias.nominal, rails=self.rails),
-            *subcircuit(self.rung, self.opamp),
+            *subcircuit(self.fidelity, self.opamp),
             *around,
             ".end",
         ]  # fmt: skip
@@ -218,15 +218,15 @@ class FigureCheck:
         return abs(self.measured - self.expected) <= self.tolerance * abs(self.expected)
 
 
-def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
-    """Every figure that this rung's model has, measured; a vendor's model on ``full`` if named.
+def checks(opamp: OpAmp, fidelity: Fidelity = "full") -> list[FigureCheck]:
+    """Every figure that this fidelity's model has, measured; a vendor's model on ``full`` if named.
 
     Raises
     ------
     SimulationFailed : ngspice has no answer for one of them.
     EnvironmentMissing : ngspice is missing.
     """
-    bench, out = OpAmpBench.of(opamp, rung), []
+    bench, out = OpAmpBench.of(opamp, fidelity), []
 
     def add(name: str, unit: str, figure: Figure | None, measured: float, tolerance: float) -> None:
         if figure is not None:
@@ -240,7 +240,7 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
     light = bench.swing(RATED_LOAD)
     add("swing into 10 kΩ, low", "V", opamp.saturation, -light[0], 0.01)
     add("swing into 10 kΩ, high", "V", opamp.saturation, light[1], 0.01)
-    if rung == "ideal":
+    if fidelity == "ideal":
         return out
     at = opamp.gbw.nominal / 10.0
     frequency, gain = bench.response(at, 2.0 * at)
@@ -248,7 +248,7 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
     for edge, slope in zip(("rising", "falling"), bench.slew(), strict=True):
         add(f"slew, {edge}", "V/s", opamp.slew, slope, 0.02)
     add("recovery", "s", opamp.recovery, bench.recovery(), 0.1)
-    if rung == "dynamic":
+    if fidelity == "dynamic":
         return out
     heavy = bench.swing(HEAVY_LOAD)
     add("swing into 2 kΩ, low", "V", opamp.swing_2k, -heavy[0], 0.01)

@@ -1,6 +1,6 @@
 """Op-amp models for ngspice, written from the catalogue's data-sheet figures.
 
-Three rungs share one subcircuit, ``opamp`` with the pins ``inp inn out vcc vee`` and, per
+Three fidelities share one subcircuit, ``opamp`` with the pins ``inp inn out vcc vee`` and, per
 instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground, at
 the pin as it is loaded), above ``ideal`` ``start`` [V] and, where it is drawn, ``gbw`` [Hz], on
 ``full`` ``load`` [ohm], which the limits belong to:
@@ -27,8 +27,8 @@ from typing import Literal, get_args
 from designer.catalog.entries import OpAmp
 from designer.catalog.output_stage import RATED_LOAD, saturation_resistance
 
-Rung = Literal["ideal", "dynamic", "full"]
-RUNGS: tuple[Rung, ...] = get_args(Rung)
+Fidelity = Literal["ideal", "dynamic", "full"]
+FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 
 PINS = "inp inn out vcc vee"
 LIMIT_RANGE = 1e-3
@@ -93,7 +93,7 @@ def instance(
     name: str,
     nets: tuple[str, str, str],
     *,
-    rung: Rung,
+    fidelity: Fidelity,
     vos: float,
     ib: float,
     rails: tuple[float, float],
@@ -108,51 +108,51 @@ def instance(
     own where None. ``ideal`` has neither memory nor bandwidth, and takes none of it.
     """
     parameters = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
-    if rung != "ideal":
+    if fidelity != "ideal":
         parameters |= {"start": start, **(more or {})}
     words = " ".join(f"{key}={literal(value)}" for key, value in parameters.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
 
-def bandwidth(rung: Rung, opamp: OpAmp, gbw: float) -> dict[str, float]:
+def bandwidth(fidelity: Fidelity, opamp: OpAmp, gbw: float) -> dict[str, float]:
     """Parameters of one op-amp with a gain-bandwidth [Hz] of its own.
 
     The second pole of ``full`` moves along, so that the phase margin stays the data sheet's.
     """
-    if rung == "ideal":
+    if fidelity == "ideal":
         return {}
     parameters = {"gbw": gbw}
-    if rung == "full":
+    if fidelity == "full":
         parameters["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
     return parameters
 
 
-def slew_rate(rung: Rung, slew: float) -> dict[str, float]:
+def slew_rate(fidelity: Fidelity, slew: float) -> dict[str, float]:
     """Parameter of one op-amp with a slew rate [V/s] of its own."""
-    return {} if rung == "ideal" else {"slew": slew}
+    return {} if fidelity == "ideal" else {"slew": slew}
 
 
-def load(rung: Rung, ohms: float) -> dict[str, float]:
+def load(fidelity: Fidelity, ohms: float) -> dict[str, float]:
     """Parameter of one op-amp whose limits are those into this load [ohm]: on ``full``, where they
     move with the current."""
-    return {"load": min(ohms, NO_LOAD)} if rung == "full" else {}
+    return {"load": min(ohms, NO_LOAD)} if fidelity == "full" else {}
 
 
-def subcircuit(rung: Rung, opamp: OpAmp, gain: float | None = None) -> list[str]:
-    """The lines of the subcircuit ``opamp`` of one rung, every figure typical.
+def subcircuit(fidelity: Fidelity, opamp: OpAmp, gain: float | None = None) -> list[str]:
+    """The lines of the subcircuit ``opamp`` of one fidelity, every figure typical.
 
     gain : in the place of the catalogue's. On ``full`` a vendor's model goes first.
     """
     gain = opamp.gain.nominal if gain is None else gain
-    if rung == "ideal":
+    if fidelity == "ideal":
         return ideal(gain)
-    if rung == "dynamic":
+    if fidelity == "dynamic":
         return _dynamic(opamp, gain)
     return _full(opamp, gain) if opamp.spice is None else opamp.spice.wrapped()
 
 
 def ideal(gain: float) -> list[str]:
-    """The subcircuit of the rung ``ideal``, for which the gain is all."""
+    """The subcircuit of the fidelity ``ideal``, for which the gain is all."""
     return [
         f".subckt opamp {PINS} {_EACH}",
         *_INPUT,

@@ -1,10 +1,11 @@
 """How many periods ngspice needs after a start on the exact circuit's orbit.
 
-On the rung ``ideal`` the start is right and two periods are enough. Op-amps with a pole and a
+At the fidelity ``ideal`` the start is right and two periods are enough. Op-amps with a pole and a
 slew limit have an orbit of their own nearby, so there is a way to go, which shrinks by the
-multiplier ρ with every n periods: after k of them c·ρᵏ is left. c is read off a short run of
-that rung (how far the strobe still moves, over 1 - ρ). ρ is the exact circuit's, or what the short
-run shows where that is slower: the rung's own orbit may be less stable than the exact circuit's.
+multiplier ρ with every n periods: after k of them c·ρᵏ is left. c is read off a short run of that
+fidelity (how far the strobe still moves, over 1 - ρ). ρ is the exact circuit's, or what the short
+run shows where that is slower: the fidelity's own orbit may be less stable than the exact
+circuit's.
 """
 
 from __future__ import annotations

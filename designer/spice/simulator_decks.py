@@ -61,12 +61,12 @@ class ResponseRun:
 
     @property
     def name(self) -> str:
-        """In words for a comment."""
+        """The run in words, for a comment."""
         return f"omega {self.omega:g}" + (f", {self.expected}" if self.expected else "")
 
 
 def file_name(dialect: Dialect) -> str:
-    """Of the deck in a design folder."""
+    """The name of the deck in a design folder."""
     return f"circuit-{dialect}.cir"
 
 
@@ -143,7 +143,7 @@ def _instances(circuit: Circuit, board: Board) -> Iterator[str]:
         yield opamp_model.instance(
             s.name,
             (s.noninverting, s.inverting, s.output),
-            rung="ideal",
+            fidelity="ideal",
             vos=board.offset.get(s.name, 0.0),
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],

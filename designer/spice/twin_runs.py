@@ -65,7 +65,9 @@ def with_exponents(
 
 def _has_exponent(subject: GateSubject, result: GateResult) -> bool:
     chaotic = subject.orbit.status is OrbitStatus.APERIODIC
-    return chaotic and subject.rung == "ideal" and result.passed and isinstance(result.read, Read)
+    return (
+        chaotic and subject.fidelity == "ideal" and result.passed and isinstance(result.read, Read)
+    )
 
 
 def _decided(result: GateResult, growth: Growth | SimulationFailed) -> GateResult:

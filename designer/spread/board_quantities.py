@@ -14,10 +14,10 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit
 
 _GROUPS = ("values", "offset", "low", "high", "bias", "reference", "supply")
-"""Of ``Boards``: what the exact rung depends on and a spread may draw. The drop of a diode and the
-gain are the same on every board; the bandwidth is for ngspice's models alone."""
+"""Of ``Boards``: what the exact circuit depends on and a spread may draw. The drop of a diode and
+the gain are the same on every board; the bandwidth is for ngspice's models alone."""
 ROUNDING = 1e-12
-"""Of a nominal value: what is no difference from it."""
+"""What is no difference from a nominal value, over that value."""
 _NAMES = {"values": "", "reference": "", "supply": ""}
 
 
@@ -71,14 +71,14 @@ def column(boards: Boards, quantity: Quantity) -> Array:
 
 
 def with_column(boards: Boards, quantity: Quantity, values: Array) -> Boards:
-    """The same boards with this quantity (N,) in the place of theirs."""
+    """The boards with this quantity (N,) in the place of theirs."""
     columns: Mapping[str, Array] = getattr(boards, quantity.group)
     changed: dict[str, Any] = {quantity.group: {**columns, quantity.part: np.asarray(values)}}
     return replace(boards, **changed)
 
 
 def exact_in(boards: Boards, groups: tuple[str, ...]) -> Boards:
-    """The same boards with these fields of ``Boards`` as on the nominal board, for every part."""
+    """The boards with these fields of ``Boards`` as on the nominal board, for every part."""
     nominal = Boards.of(boards.circuit, [nominal_board(boards.circuit)])
     changed: dict[str, Any] = {
         group: {

@@ -110,10 +110,10 @@ def stuck(circuit: Circuit, run: Run, other: Ask | None = None) -> Operating:
     theirs = other(_all_stuck, circuit, run, away) if other is not None else dict
     points = _all_stuck(circuit, run, [name for name in names if name not in away])
     points |= theirs()
-    return together([each for name in names for each in points[name]])
+    return merged([each for name in names for each in points[name]])
 
 
-def together(points: Sequence[Operating]) -> Operating:
+def merged(points: Sequence[Operating]) -> Operating:
     """What is met over all of these."""
     out = Operating()
     for point in points:
@@ -191,16 +191,16 @@ def _into(reference: Reference, circuit: Circuit, at: Mapping[str, Array]) -> Ar
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
     """(k, q) values of these rows (q, n + 2) on the strobes."""
     drive = sampled.flow.drive
-    u, beside = drive.at(sampled.angle), drive.beside_at(sampled.angle)
+    u, second_drive = drive.at(sampled.angle), drive.second_at(sampled.angle)
     inputs = np.column_stack([sampled.x, u, np.ones(len(u))])
-    return _by_mode(sampled, lambda _, solved: rows(solved), inputs, beside)
+    return _by_mode(sampled, lambda _, solved: rows(solved), inputs, second_drive)
 
 
 def _rates(sampled: Sampled, rows: Callable[[Solution], Array], circuit: Circuit) -> Array:
     """(k, sections) derivatives of these rows, one a section, on the strobes [1/s]; 0 where the
     section's loop is open."""
     drive = sampled.flow.drive
-    moving, beside = drive.rate_at(sampled.angle), drive.beside_rate_at(sampled.angle)
+    moving, second_drive = drive.rate_at(sampled.angle), drive.second_rate_at(sampled.angle)
     inputs = np.column_stack([sampled.slope, moving, np.zeros(len(moving))])
 
     def closed(key: ModeKey, solved: Solution) -> Array:
@@ -208,13 +208,13 @@ def _rates(sampled: Sampled, rows: Callable[[Solution], Array], circuit: Circuit
         loop = (np.array(shares) >= CLOSED)[:, None]
         return np.asarray(loop * rows(solved))
 
-    return _by_mode(sampled, closed, inputs, beside)
+    return _by_mode(sampled, closed, inputs, second_drive)
 
 
 def _by_mode(
-    sampled: Sampled, rows: Callable[[ModeKey, Solution], Array], inputs: Array, beside: Array
+    sampled: Sampled, rows: Callable[[ModeKey, Solution], Array], inputs: Array, second_drive: Array
 ) -> Array:
-    """inputs : (k, n + 2) of states, generator and 1. beside : (k,) of its second channel."""
+    """inputs : (k, n + 2) of states, generator and 1. second_drive : (k,) of its second channel."""
     reduction = sampled.reduction
     out: Array | None = None
     for i, key in enumerate(sampled.keys):
@@ -224,7 +224,7 @@ def _by_mode(
         value = inputs[inside] @ rows(key, reduction.solution(key)).T
         if sampled.flow.drive.second is not None:
             second = rows(key, reduction.by_second(key))[:, -2]
-            value += np.outer(beside[inside], second)
+            value += np.outer(second_drive[inside], second)
         if out is None:
             out = np.empty((len(inputs), value.shape[1]))
         out[inside] = value

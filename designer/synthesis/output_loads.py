@@ -45,7 +45,8 @@ RESOLUTION = 0.1
 LEAST_POINTS, MOST_POINTS = 64, 16384
 """Strobes a drive period: of the first look at the modes, and at most."""
 NEAR = 0.02
-"""Of the span: a peak this near to the largest is refined too, since it may be the larger one."""
+"""A peak this near to the largest, over the span, is refined too, since it may be the larger
+one."""
 BRACKET, ROUNDS = 16, 4
 """Parts of a bracket, and how often the best one is divided again."""
 WALK = 64
@@ -182,7 +183,8 @@ class Sampled:
             needed = min(int(np.ceil(run.drive.period * fastest / resolution)), MOST_POINTS)
 
     def extremes(self) -> dict[tuple[str, str], float]:
-        """By section: -lowest and highest voltage, largest current out of and into the output."""
+        """The extremes of each section: -lowest and highest voltage, largest current out of and
+        into the output."""
         names = [
             (s.name, quantity)
             for s in self.reduction.circuit.sections
@@ -206,7 +208,7 @@ class Sampled:
         """(k, 4 sections) -voltage, voltage, current and -current of each section's output at
         states (k, n), drive phases (k,) and modes (k,)."""
         drive = self.flow.drive
-        u, beside = drive.at(angle), drive.beside_at(angle)
+        u, second_drive = drive.at(angle), drive.second_at(angle)
         out = np.empty((len(x), 4 * len(self.reduction.circuit.sections)))
         for i, key in enumerate(self.keys):
             here = at == i
@@ -215,7 +217,7 @@ class Sampled:
                 out[here] = x[here] @ rows[:, :-2].T + np.outer(u[here], rows[:, -2]) + rows[:, -1]
                 if drive.second is not None:
                     rows = self._output_rows(self.reduction.by_second(key))
-                    out[here] += np.outer(beside[here], rows[:, -2])
+                    out[here] += np.outer(second_drive[here], rows[:, -2])
         return out
 
     def _output_rows(self, solved: Solution) -> Array:
@@ -236,12 +238,12 @@ class Sampled:
         self.keys: list[ModeKey] = list(dict.fromkeys([self.system.start, *self.flow.met]))
         self.at = modes_at(self.flow, self.x, self.angle, self.keys)
         self.slope = np.empty_like(self.x)
-        u, beside = drive.at(self.angle), drive.beside_at(self.angle)
+        u, second_drive = drive.at(self.angle), drive.second_at(self.angle)
         for i, key in enumerate(self.keys):
             here, mode = self.at == i, self.system.mode(key)
             self.slope[here] = self.x[here] @ mode.A.T + np.outer(u[here], mode.B) + mode.d
-            if mode.beside is not None:
-                self.slope[here] += np.outer(beside[here], mode.beside)
+            if mode.second is not None:
+                self.slope[here] += np.outer(second_drive[here], mode.second)
 
     def _angle(self, steps: Array) -> Array:
         """Drive phases at times given in strobes."""
@@ -287,13 +289,13 @@ def modes_at(flow: Flow, x: Array, angle: Array, keys: list[ModeKey]) -> Index:
     ArithmeticError : somewhere no mode holds.
     """
     system, drive = flow.system, flow.drive
-    u, beside = drive.at(angle), drive.beside_at(angle)
+    u, second_drive = drive.at(angle), drive.second_at(angle)
     at = np.zeros(len(x), dtype=np.intp)
     unsettled = np.arange(len(x))
     for i, key in enumerate(keys):
         mode = system.mode(key)
         if mode.guards and len(unsettled):
-            now = _guards(mode, x[unsettled], u[unsettled], beside[unsettled])
+            now = _guards(mode, x[unsettled], u[unsettled], second_drive[unsettled])
             holds = (now <= 0.0).all(axis=1)
             at[unsettled[holds]] = i
             unsettled = unsettled[~holds]
@@ -310,7 +312,7 @@ def modes_at(flow: Flow, x: Array, angle: Array, keys: list[ModeKey]) -> Index:
             mode = system.mode(keys[int(i)])
             if not mode.guards:
                 continue
-            value = _guards(mode, x[here], u[here], beside[here])
+            value = _guards(mode, x[here], u[here], second_drive[here])
             worst = value.argmax(axis=1)
             leaving = value[np.arange(len(here)), worst] > 0.0
             for g in distinct_indices(worst[leaving]):
@@ -326,6 +328,6 @@ def modes_at(flow: Flow, x: Array, angle: Array, keys: list[ModeKey]) -> Index:
     return at
 
 
-def _guards(mode: Mode, x: Array, u: Array, beside: Array) -> Array:
+def _guards(mode: Mode, x: Array, u: Array, second_drive: Array) -> Array:
     C, D, e = mode.guard_rows
-    return np.asarray(x @ C.T + np.outer(u, D) + e + np.outer(beside, mode.guards_beside))
+    return np.asarray(x @ C.T + np.outer(u, D) + e + np.outer(second_drive, mode.second_guards))

@@ -301,16 +301,16 @@ class _Search:
         if spec.most_values is not None or self.by_scales:
             return
         linear = first.linear
-        beside = best_beside(order, best.limits, linear, first, alone)
-        yield beside
-        best_pair = paired(beside)
+        alternative = best_alternative(order, best.limits, linear, first, alone)
+        yield alternative
+        best_pair = paired(alternative)
         yield best_pair
         most = BESIDE_PAIRS if spec.composites is True else BESIDE
 
         def make(other: LinearBlock) -> Attempt | Shortfall:
             return paired(alone(other))
 
-        yield best_beside(order, best.limits, linear, best_pair, make, most)
+        yield best_alternative(order, best.limits, linear, best_pair, make, most)
 
     def refuse(self, missed: _Missed, catalog: Catalog) -> NoReturn:
         """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees
@@ -488,7 +488,7 @@ class _Search:
                 return made  # two parts may cure the dead zone's error where it stands
             if most is None:
                 make = partial(attempt, self.order, within)
-                return best_beside(self.order, within, linear, made, make)
+                return best_alternative(self.order, within, linear, made, make)
             if isinstance(made, Shortfall):
                 # With few values left the dead zone may fail for any reason.
                 if number == 0 and made.what != "distinct values":
@@ -584,7 +584,7 @@ def _unbought(conflict: Conflict, spec: CircuitSpec, catalog: Catalog) -> str:
 def _refuse_conflicts(missed: _Missed, spec: CircuitSpec, catalog: Catalog) -> NoReturn:
     """Raise ``Unreachable`` with limits that cannot be kept together, and how far each would have
     to give: those that can, and why the others cannot."""
-    limits = ", ".join(c.limit.told(c.limit.value) for c in missed.conflicts)
+    limits = ", ".join(c.limit.text(c.limit.value) for c in missed.conflicts)
     found = f"no scales within the limits of the search (linear program): together stand {limits}"
     if missed.broken:
         names = ", ".join(n for n in SIDE_CONDITIONS if n in missed.broken)
@@ -592,13 +592,13 @@ def _refuse_conflicts(missed: _Missed, spec: CircuitSpec, catalog: Catalog) -> N
     given = [c for c in missed.conflicts if np.isfinite(c.needed) and c.needed]
     alone = [c for c in missed.conflicts if c not in given]
     lacking = {c: text for c in given if (text := _unbought(c, spec, catalog))}
-    ways = [c.limit.told(c.needed) for c in given if c not in lacking]
+    ways = [c.limit.text(c.needed) for c in given if c not in lacking]
     there = {c.limit.condition for c in missed.conflicts if c.frees}
     free = "one of them as wide as this, the others as they are: " + " or ".join(ways)
     if not ways:
         free = "two of them wider"
     for each, text in lacking.items():
-        free += f"; {each.limit.told(each.needed)} would do too, but the catalogue has {text}"
+        free += f"; {each.limit.text(each.needed)} would do too, but the catalogue has {text}"
     if alone and ways:
         free += f"; no value of {' or of '.join(c.limit.what for c in alone)} alone is enough"
     if there & set(SIDE_CONDITIONS):
@@ -640,7 +640,7 @@ def ways_to_less_error(spec: CircuitSpec) -> list[str]:
     return ways
 
 
-def best_beside(
+def best_alternative(
     order: Order,
     within: ConditionLimits,
     linear: LinearBlock,
@@ -658,7 +658,7 @@ def best_beside(
     what counts. make : an attempt with another linear block. most : of them.
     """
     best = first
-    left = deque(_beside(linear, (0.0, float("inf")), order.stiffness))
+    left = deque(_rest_of(linear, (0.0, float("inf")), order.stiffness))
     if not Targets.of(order.model).fully_coupled_pair:
         most = min(most, BESIDE_TREE)
     for number in range(most):
@@ -673,14 +673,14 @@ def best_beside(
             other = linear_block(order, within, between=between, level=linear.least)
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue
-            left.extend(_beside(other, between, order.stiffness))
+            left.extend(_rest_of(other, between, order.stiffness))
             made = make(other)
         if isinstance(made, Attempt) and _error(made) < _error(best) - EXACT:
             best = made
     return best
 
 
-def _beside(
+def _rest_of(
     linear: LinearBlock, between: tuple[float, float], name: str
 ) -> list[tuple[float, float]]:
     """What this block's resistor of this name leaves of an interval, the part above it first."""

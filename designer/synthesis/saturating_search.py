@@ -45,7 +45,7 @@ EXPANDED, NULLS = 400_000, 20_000
 """Rows of a join, of the slope's tables and of the others for one u, that are ranked by their new
 values before the rest is left out."""
 GROWTH = 3.0
-"""Of the level, where no row keeps the rules that tie two tables."""
+"""The factor on the level where no row keeps the rules that tie two tables."""
 
 
 def rows_within(
@@ -101,7 +101,7 @@ def _slope_rows(
     i, j = rank[row], hit
     total = u[i] + t.right_logs[j]
     error = np.maximum(np.maximum(low - total, total - high), 0.0)
-    table = t.left.take(i).beside(t.right.take(j))
+    table = t.left.take(i).joined_with(t.right.take(j))
     return TableRows(table, error, np.searchsorted(t.u, u[i] - 1e-12))
 
 
@@ -132,7 +132,7 @@ def null_rows(
         rank = rank[order[: max(1, int(np.searchsorted(np.cumsum(count[order]), most)))]]
     row, hit = between(d, wanted[rank] - wide, wanted[rank] + wide)
     a = rank[row]
-    table = t.first.take(i[a]).beside(t.second.take(j[a])).beside(t.divider.take(hit))
+    table = t.first.take(i[a]).joined_with(t.second.take(j[a])).joined_with(t.divider.take(hit))
     error = t.target.mu * np.abs(wanted[a] - d[hit])
     if t.shift is not None:
         table, error = _with_shift(t, near, table, error, u, level)
@@ -146,7 +146,7 @@ def _with_shift(
     order = np.argsort(near["R200"], kind="stable")
     own = near.take(order)
     row, hit = between(own["R200"], table["R200"] - 1e-6, table["R200"] + 1e-6)
-    both = table.take(row).beside(ValueTable(("R211", "R212"), own.take(hit).values[:, 1:]))
+    both = table.take(row).joined_with(ValueTable(("R211", "R212"), own.take(hit).values[:, 1:]))
     error = error[row]
     shift = steep_gain(both.columns) * t.target.supply * both["R200"] / both["R211"]
     # Only what lies in the range of c has a threshold at all.
@@ -179,7 +179,9 @@ def pick(
         choice = None if rows is None else choose(rows, noise_rules(t, *rows), ranking)
         if rows is not None and choice is not None:
             (i, j), status = choice
-            chosen = rows[0].table.take(np.array([i])).beside(rows[1].table.take(np.array([j])))
+            chosen = (
+                rows[0].table.take(np.array([i])).joined_with(rows[1].table.take(np.array([j])))
+            )
             return dict(zip(chosen.names, chosen.values[0].tolist(), strict=True)), status
         level *= GROWTH
     return None

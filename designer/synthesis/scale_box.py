@@ -20,9 +20,9 @@ from designer.base.arrays import Array
 from designer.synthesis.scale_program import LinearBound, ScaleProgram, StatedLimit
 
 FAR = 60.0
-"""Of a logarithm: further than any scale or value."""
+"""A logarithm further than any scale or value."""
 TINY = 1e-7
-"""Of a logarithm: what is kept to so much is kept."""
+"""A limit on a logarithm that is kept to so much is kept."""
 TANGENTS = 60
 """Rounds of tangents; a few do."""
 LEVELS, OUTPUTS = 0.05, 0.3
@@ -115,12 +115,13 @@ class ScaleBox:
             if self.point(any_point, without={*gone, limit}) is None:
                 gone.append(limit)
         held = [limit for limit in limits if limit not in gone]
-        whose = {
+        by_condition = {
             limit.condition: [one for one in limits if one.condition == limit.condition]
             for limit in held
         }
         frees = {
-            name: self.point(any_point, without=own) is not None for name, own in whose.items()
+            name: self.point(any_point, without=own) is not None
+            for name, own in by_condition.items()
         }
         return [Conflict(limit, self._needed(limit), frees[limit.condition]) for limit in held]
 

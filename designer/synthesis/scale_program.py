@@ -45,8 +45,8 @@ from designer.synthesis.part_checks import nearest
 from designer.synthesis.stop_halves import INPUTS
 
 HIGHEST = 0.95
-"""Of the output limit: the highest threshold. A stop that no wanted response meets has to be within
-reach of the displacement too."""
+"""The highest threshold, over the output limit. A stop that no wanted response meets has to be
+within reach of the displacement too."""
 EQUAL = 1e-9
 """Relative: values that differ by less are one."""
 STILL = 1e-6
@@ -56,7 +56,7 @@ STILL = 1e-6
 CATALOGUE, TRIED, STAGE = "catalogue", "tried", "stage"
 """Limits that neither a side condition nor a key sets: by what can be bought, by the values that a
 search tries, by a stage's own way to work."""
-_TOLD = {
+_SOURCES = {
     CATALOGUE: "no other can be bought",
     TRIED: "no other is tried there",
     STAGE: "of the stage itself",
@@ -78,18 +78,18 @@ class StatedLimit:
     least: bool = False
     """Whether it is a limit from below."""
 
-    def told(self, value: float) -> str:
+    def text(self, value: float) -> str:
         """The limit in words, at this value."""
         number = format_quantity(value, self.unit, 3)
         keys = {each.name for each in fields(CircuitSpec)}
-        whose = f"rule {self.condition}"
-        if self.condition in _TOLD:
-            whose = _TOLD[self.condition]
+        source = f"rule {self.condition}"
+        if self.condition in _SOURCES:
+            source = _SOURCES[self.condition]
         elif self.condition in SIDE_CONDITIONS:
-            whose = f"side condition {self.condition}"
+            source = f"side condition {self.condition}"
         elif self.condition in keys:
-            whose = f"circuit.{self.condition}"
-        return f"{self.what} {'>=' if self.least else '<='} {number} ({whose})"
+            source = f"circuit.{self.condition}"
+        return f"{self.what} {'>=' if self.least else '<='} {number} ({source})"
 
 
 @dataclass(frozen=True)
@@ -182,11 +182,11 @@ class ScaleProgram:
     sums: tuple[ExponentialSum, ...]
     """What is not."""
     thresholds: tuple[Affine, ...]
-    """Of each gap: the voltage [V] at which its half conducts."""
+    """The voltage [V] at which the half of each gap conducts."""
     levels: tuple[Affine, ...]
-    """Of each state: its peak [V]."""
+    """The peak [V] of each state."""
     outputs: tuple[Affine, ...]
-    """Of each half: the stage's output at the deepest contact [V]."""
+    """The stage's output at the deepest contact [V], for each half."""
 
     @classmethod
     def of(cls, order: Order, within: ConditionLimits) -> ScaleProgram:
@@ -309,20 +309,20 @@ class _Maker:
 
     @property
     def time(self) -> Affine:
-        """Of the time scale [s]."""
+        """The logarithm of the time scale [s]."""
         return self._unit(0)
 
     def volts(self, state: int) -> Affine:
-        """Of a state's volts per unit."""
+        """The logarithm of a state's volts per unit."""
         return self._unit(1 + state)
 
     def part(self, name: str) -> Affine:
-        """Of a part's value, if that is chosen at will."""
+        """The logarithm of a part's value, if that is chosen at will."""
         return self._unit(self.shared[name])
 
     def rate(self, mass: int) -> Affine:
-        """Of what a resistor from a mass's displacement into its velocity is, times the coefficient
-        that it makes (``CircuitScales.rates``)."""
+        """The logarithm of what a resistor from a mass's displacement into its velocity is, times
+        the coefficient that it makes (``CircuitScales.rates``)."""
         x, v = 2 * mass, 2 * mass + 1
         return self.time + self.volts(x) - self.volts(v) - self.part(f"C{v + 1}")
 
@@ -363,7 +363,7 @@ class _Maker:
             )
 
     def _ranges(self) -> None:
-        """Of the parts that are chosen at will."""
+        """Keep the ranges of the parts that are chosen at will."""
         for name, place in self.shared.items():
             own = np.exp(self.lists[place][[0, -1]])
             for end, most in zip(own.tolist(), (False, True), strict=True):
@@ -380,14 +380,14 @@ class _Maker:
         )
         allowed = series_values(series, *span)[-1 if most else 0]
         sold = bought.max() if most else bought.min()
-        whose = TRIED
+        source = TRIED
         if np.isclose(value, allowed, rtol=EQUAL, atol=0.0):
-            whose = f"{kind}_range"
+            source = f"{kind}_range"
         elif np.isclose(value, sold, rtol=EQUAL, atol=0.0):
-            whose = CATALOGUE
+            source = CATALOGUE
         # One key is one limit for every part that it bounds.
         what = f"the {'largest' if most else 'smallest'} {kind}"
-        return StatedLimit(whose, what, value, unit, least=not most)
+        return StatedLimit(source, what, value, unit, least=not most)
 
     def _row(
         self,
@@ -434,7 +434,7 @@ class _Maker:
         self._keep(log, StatedLimit("load", "the stop's resistor", bounds.stop, "Ω", least=True))
 
     def _gain(self, place: DeadZonePlace) -> Affine:
-        """Of the amplifier that sums displacements in front of a stage; 1 without one."""
+        """The gain of the amplifier that sums displacements in front of a stage; 1 without one."""
         if not place.sums:
             return Affine(np.zeros(len(self.lists)))
         return self._difference(place, self.order.peaks.reach(place.index))
@@ -447,7 +447,7 @@ class _Maker:
 
     @property
     def _drop(self) -> float:
-        """Of a diode [V]."""
+        """The drop of a diode [V]."""
         assert self.order.stage.diode is not None
         return diode_model(self.order.stage.diode).drop
 
@@ -458,7 +458,7 @@ class _Maker:
         return (self.within.swing if strict else self.order.output.limit) - self._drop
 
     def _highest_end(self, clearance: Clearance) -> float:
-        """Of a gap, or of a bend, which no wanted response may reach: highest voltage [V]."""
+        """The highest voltage [V] of a gap, or of a bend, which no wanted response may reach."""
         highest = HIGHEST * self.order.output.limit
         return min(highest, self.within.swing) if clearance.bend_of else highest
 

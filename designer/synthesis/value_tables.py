@@ -43,13 +43,13 @@ class ValueTable:
         """The rows of an index or mask array."""
         return ValueTable(self.names, self.values[which])
 
-    def beside(self, other: ValueTable) -> ValueTable:
+    def joined_with(self, other: ValueTable) -> ValueTable:
         """The columns of both, row by row."""
         return ValueTable(self.names + other.names, np.hstack([self.values, other.values]))
 
     def with_column(self, name: str, values: Array) -> ValueTable:
         """The values (rows,) of one more part."""
-        return self.beside(ValueTable((name,), values[:, None]))
+        return self.joined_with(ValueTable((name,), values[:, None]))
 
     @classmethod
     def stacked(cls, tables: Sequence[ValueTable]) -> ValueTable:
@@ -84,7 +84,8 @@ def sums(first: Array, second: Array) -> Array:
 
 
 def distance(table: Array, low: Array, high: Array) -> Array:
-    """From each interval [low, high] to the nearest entry of an ascending table; 0 inside."""
+    """The distance from each interval [low, high] to the nearest entry of an ascending table; 0
+    inside."""
     if len(table) == 0:
         return np.full(len(low), np.inf)
     right = np.searchsorted(table, low)

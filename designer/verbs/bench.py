@@ -161,7 +161,9 @@ def bench(
     frequency = None if omega is None else scales.frequency(omega)
     bench_job.check_decays(files, decays, boards)
     read = [read_record(file) for file in files]
-    motions = [recorded_motion(each, prediction, frequency=frequency, told=roles) for each in read]
+    motions = [
+        recorded_motion(each, prediction, frequency=frequency, stated=roles) for each in read
+    ]
     free = bench_job.free_decays(decays, files, motions, prediction, boards)
     benched = []
     for file, motion in zip(files, motions, strict=True):

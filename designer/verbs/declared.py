@@ -66,10 +66,14 @@ Samples = Annotated[
 ]
 Blame = Annotated[
     bool | None,
-    option("--blame/--no-blame", None, "Say which part is to blame [yes, or as the folder has]."),
+    option(
+        "--blame/--no-blame",
+        None,
+        "Attribute losses to parts: say which is to blame [yes, or as the folder has].",
+    ),
 ]
 BlameBudget = Annotated[
-    int | None, option("--blame-budget", "STEPS", "Most steps of the work on the blame [20000].")
+    int | None, option("--blame-budget", "STEPS", "Most steps of the attribution [20000].")
 ]
 Seed = Annotated[int, option("--seed", "N", "Seed of the random numbers.")]
 OwnSeed = Annotated[

@@ -61,8 +61,8 @@ def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
     yield from after_board(folder)
 
 
-def after_cure(folder: Path) -> Iterator[Step]:
-    """With a cured design in a folder of its own."""
+def after_repair(folder: Path) -> Iterator[Step]:
+    """With a repaired design in a folder of its own."""
     yield _step("how many of its boards will work", "tolerance", folder)
     yield _step("its KiCad project, its board routed", "export", folder, "--routed")
 

@@ -61,7 +61,7 @@ def run(
         jobs=jobs,
         overwrite=overwrite,
         resume=resume,
-        blame_anew=bool(blame),
+        attribution_anew=bool(blame),
         **stated_options(words),
     )
     return design_and_study(

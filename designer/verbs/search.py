@@ -1,4 +1,4 @@
-"""The verb ``search``: the design of the highest yield, the cheapest cure of a design, or both."""
+"""The verb ``search``: the design of the highest yield, the cheapest repair of one, or both."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Sourc
 from designer.verbs.tables import design_written, drive_cells, whole_job
 
 if TYPE_CHECKING:
-    from designer.jobs.cure_job import CureResult
     from designer.jobs.job_outcome import JobOutcome
     from designer.jobs.options import Options
+    from designer.jobs.repair_job import CureResult
     from designer.model.model_file import ModelFile
 
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
-"""Of upgrades; as ``cure_branch.KINDS``."""
+"""Kinds of upgrades; as ``repair_branch.KINDS``."""
 CURED = "cured"
-"""Folder of the cured design, in that of the search whose design is cured."""
+"""Folder of the repaired design, in that of the search whose design is repaired."""
 
 
 def search(
@@ -37,28 +37,28 @@ def search(
         int | None, option("--samples", "N", f"Fresh boards at the end [{SEARCH_SAMPLES}].")
     ] = None,
     yield_: Annotated[
-        float | None, option("--yield", "Y", "The cheapest cure: the yield wanted.")
+        float | None, option("--yield", "Y", "The cheapest repair (cure): the yield wanted.")
     ] = None,
     ppm: Annotated[
         float | None,
-        option("--ppm", "N", "The cheapest cure: boards of a million that may be lost."),
+        option("--ppm", "N", "The cheapest repair (cure): boards of a million that may be lost."),
     ] = None,
     budget: Annotated[
-        float | None, option("--budget", "PRICE", "The most that a cure may cost.")
+        float | None, option("--budget", "PRICE", "The most that a repair may cost.")
     ] = None,
     without: Annotated[
         Sequence[str],
         option(
             "--without",
             "KIND",
-            f"A cure without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
+            f"A repair without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
             reads=list[str],
         ),
     ] = (),
     rung: Annotated[
         StudyEngine | None,
         option(
-            "--rung", None, "Of the final study; auto: by a trade that is in the folder. [auto]"
+            "--rung", None, "Fidelity of the final study; auto: by a trade in the folder. [auto]"
         ),
     ] = None,
     seed: OwnSeed = None,
@@ -67,11 +67,11 @@ def search(
     resume: Resume = False,
     progress: Progress | None = None,
 ) -> JobOutcome | CureResult:
-    """Find the design of the highest yield; with --yield or --ppm, its cheapest cure too.
+    """Find the design of the highest yield; with --yield or --ppm, its cheapest repair (cure).
 
     A model file is searched, and written into ``out``. With ``yield_`` or ``ppm`` the found design
-    is then cured: the cured one is a design folder of its own, ``out``/cured. A design folder is
-    cured, as ``cure`` does it.
+    is then repaired at least cost: what comes of it is a design folder of its own, ``out``/cured. A
+    design folder is repaired, as ``cure`` does it.
 
     Raises
     ------
@@ -86,9 +86,9 @@ def search(
         raise InputError(path, "MODEL|DIR", MISSING, "a model file or a design folder")
     if isinstance(path, Path) and path.is_dir():
         _refuse({"--samples": samples, "--rung": rung}, "no such option with a design folder")
-        from designer.jobs import cure_job
+        from designer.jobs import repair_job
 
-        return cure_job.cure(
+        return repair_job.cure(
             path,
             yield_=yield_,
             ppm=ppm,
@@ -122,17 +122,17 @@ def search(
     options.check()
     place = None if out is None else Path(out)
     modelfile, folder = source(path, place)
-    cure = _asked_cure(modelfile, options)
+    repair = _asked_repair(modelfile, options)
     options = folder_numbers.of_search(folder, options, words)
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(VERB.command, model=name, out=place)
     progress = Progress() if progress is None else progress
-    usual = usual_times.SEARCH if cure is None else {**usual_times.SEARCH, **usual_times.CURED}
+    usual = usual_times.SEARCH if repair is None else {**usual_times.SEARCH, **usual_times.REPAIRED}
     with progress.whole(usual):
         found = search_job.search_into(modelfile, folder, options, progress, command)
-        if cure is None:
+        if repair is None:
             return found
-        cured = cure(folder, out=folder / CURED, options=options, progress=progress)
+        cured = repair(folder, out=folder / CURED, options=options, progress=progress)
     return replace(
         found,
         answer={**found.answer, "cure": cured.answer},
@@ -141,21 +141,21 @@ def search(
     )
 
 
-def _asked_cure(modelfile: ModelFile, options: Options) -> Callable[..., CureResult] | None:
-    """``cure_into`` with what is asked of the found design; None where nothing is.
+def _asked_repair(modelfile: ModelFile, options: Options) -> Callable[..., CureResult] | None:
+    """``repair_into`` with what is asked of the found design; None where nothing is.
 
     Raises
     ------
-    InputError : no cure of a design of this model file can reach it.
+    InputError : no repair of a design of this model file can reach it.
     """
     if options.yield_ is None and options.ppm is None:
         return None
-    from designer.jobs import cure_job  # a search need not import the cure
+    from designer.jobs import repair_job  # a search need not import the repair
 
-    target = cure_job.target_of(options.yield_, options.ppm)
+    target = repair_job.target_of(options.yield_, options.ppm)
     wish: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
-    cure_job.check_wish(modelfile, **wish)
-    return partial(cure_job.cure_into, **wish)
+    repair_job.check_wish(modelfile, **wish)
+    return partial(repair_job.repair_into, **wish)
 
 
 def _refuse(options: Mapping[str, object], expected: str) -> None:
@@ -167,31 +167,31 @@ def _refuse(options: Mapping[str, object], expected: str) -> None:
 
 def show(result: JobOutcome | CureResult) -> None:
     """The tables, where the files are, and what may be done next."""
-    from designer.jobs.job_outcome import JobOutcome  # a search need not import the cure
+    from designer.jobs.job_outcome import JobOutcome  # a search need not import the repair
 
     if isinstance(result, JobOutcome):
         design_written(result, result.answer, tables, _after)
     else:
-        _cure_told(result.answer)
+        _repair_told(result.answer)
 
 
-def _cure_told(cure: Mapping[str, Any]) -> None:
-    from designer.centering import cure_table
+def _repair_told(repair: Mapping[str, Any]) -> None:
+    from designer.centering import repair_table
 
-    tell(cure_table.text(cure))
+    tell(repair_table.text(repair))
 
 
 def _after(folder: Path, answer: Mapping[str, Any]) -> Iterator[next_steps.Step]:
-    """What may be done next: with the cured design, where there is one."""
+    """What may be done next: with the repaired design, where there is one."""
     if answer.get("cure", {}).get("reached"):
-        yield from next_steps.after_cure(folder / CURED)
+        yield from next_steps.after_repair(folder / CURED)
     else:
         yield from next_steps.after_study(folder, answer)
 
 
 def tables(answer: Mapping[str, Any]) -> None:
     """A run; then the responses at their places, what limits them, what each lever is worth; then
-    the cure, where one was asked for."""
+    the repair, where one was asked for."""
     whole_job(answer)
     search = answer["search"]
     pairs = zip(search["final"]["responses"], answer["confirmation"]["responses"], strict=True)
@@ -228,11 +228,11 @@ def tables(answer: Mapping[str, Any]) -> None:
         )
     if "cure" in answer:
         say("")
-        _cure_told(answer["cure"])
+        _repair_told(answer["cure"])
 
 
-def _sigmas(distance: float | None) -> str:
-    return "-" if distance is None else f"{distance:.2f} σ"
+def _sigmas(reliability_index: float | None) -> str:
+    return "-" if reliability_index is None else f"{reliability_index:.2f} σ"
 
 
 VERB = Verb(

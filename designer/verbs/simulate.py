@@ -97,7 +97,7 @@ def simulate(
     ] = "model",
     rung: Annotated[
         Literal["ideal", "dynamic", "full"],
-        option("--rung", None, "The op-amps' model, with --engine ngspice."),
+        option("--rung", None, "Fidelity of the op-amps' model, with --engine ngspice."),
     ] = "ideal",
     starts: Annotated[
         int,
@@ -179,7 +179,7 @@ def simulate(
         jobs=jobs,
         progress=progress,
         traces=place is not None,
-        rung=rung,
+        fidelity=rung,
         starts=starts,
         seed=seed,
         start=begin,
@@ -312,7 +312,7 @@ def tables(answer: Mapping[str, Any]) -> None:
             say(f"{place}: {r['response']}: {r['reason']}")
         for each in (r, *r["others"]):
             for misfit in misfits_in(each):
-                say(f"{place}: {misfit.told(each['response'], in_si=in_si)}")
+                say(f"{place}: {misfit.text(each['response'], in_si=in_si)}")
         if r["frequencies"] is not None:
             say(f"{place}: {frequencies(r)}")
         for other in r["others"]:
@@ -460,7 +460,7 @@ def _response_cells_in_si(
 
 
 def _share(counted: Mapping[str, Any]) -> str:
-    """With its 95 % interval."""
+    """A share with its 95 % interval."""
     low, high = 100 * counted["low"], 100 * counted["high"]
     return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.blame_noise import lacks_noise
+from designer.base.attribution_noise import lacks_noise
 from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
@@ -28,7 +28,7 @@ def design_written(
     """What a verb that writes a design folder has to say. answer : of the outcome, as it is
     printed. tables : shows it. after : what may be done next."""
     if outcome.shown:
-        blame_status(answer)
+        attribution_status(answer)
         _rare(answer.get("responses", ()))
     else:
         tables(answer)
@@ -157,7 +157,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         problem = EquationCheck.read(answer["equation_check"]).problem
         if problem:
             say(problem)
-    blame_status(answer)
+    attribution_status(answer)
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         say(f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
@@ -184,8 +184,8 @@ def _boards(answer: Mapping[str, Any]) -> None:
     grid(f"All {len(boards)} boards", ["board", *heads, "all of them"], rows, gap=1)
 
 
-def blame_status(answer: Mapping[str, Any]) -> None:
-    """One line about a blame that is not whole, or whose indices an earlier version stored
+def attribution_status(answer: Mapping[str, Any]) -> None:
+    """One line about an attribution that is not whole, or whose indices an earlier version stored
     without their noise; none else."""
     status = answer.get("blame") or {}
     if status.get("reason"):
@@ -336,7 +336,8 @@ def _mechanism(
 
 
 def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
-    """Of a share in per cent; of all boards there are, which have none, how many they are."""
+    """The interval of a share in per cent; where all boards there are were asked, which leaves
+    none, their number."""
     if counted.get("census") and ends["low"] == ends["high"]:
         return f"all {counted['samples']}"
     return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"

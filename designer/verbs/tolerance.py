@@ -43,7 +43,7 @@ STUDY_KEYS = (
     "maps",
     "provenance",
 )
-"""Of what a study's JSON object has, in the order in which they are printed."""
+"""The keys of a study's JSON object that are printed, in their order."""
 
 
 def tolerance(
@@ -62,8 +62,8 @@ def tolerance(
         option(
             "--rung",
             None,
-            "exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board in ngspice "
-            "too [auto, or as the folder has].",
+            "Fidelity; exact: no ngspice; bandwidth: with op-amps that lag; ngspice: every board "
+            "in ngspice too [auto, or as the folder has].",
         ),
     ] = None,
     tuned: Annotated[
@@ -128,7 +128,7 @@ def tolerance(
         rare=rare,
         map_=tuple(dict.fromkeys(map_)),
         cluster=cluster,
-        blame_anew=bool(blame),
+        attribution_anew=bool(blame),
         **stated_options(words),
     )
     if measured is None:
@@ -153,7 +153,7 @@ def tolerance(
 
 
 def printed(result: JobOutcome) -> dict[str, Any]:
-    """Of the answer, what is of the study."""
+    """The part of the answer that is of the study."""
     answer: Mapping[str, Any] = result.answer
     return {
         **{key: answer[key] for key in STUDY_KEYS if key in answer},

@@ -29,7 +29,7 @@ class TradeResult:
     """Whether the folder held the answer already."""
 
     def rungs(self) -> pd.DataFrame:
-        """Time and error of every rung on every response."""
+        """Time and error of every fidelity on every response."""
         return frame(self.answer["rungs"])
 
     def boards(self) -> pd.DataFrame:
@@ -37,7 +37,7 @@ class TradeResult:
         return frame(self.answer["boards"])
 
     def cheapest(self) -> pd.DataFrame:
-        """The cheapest rung for each question."""
+        """The cheapest fidelity for each question."""
         return frame(self.answer["cheapest"])
 
     def _repr_html_(self) -> str:
@@ -84,7 +84,7 @@ def trade(
     EnvironmentMissing : ngspice is missing.
     """
     from designer.base.design_folder import Folder
-    from designer.fidelity.rungs import TOP, VENDOR
+    from designer.fidelity.fidelity_answers import TOP, VENDOR
     from designer.folders.model_source import source
     from designer.jobs import folder_numbers, trade_job
     from designer.jobs.options import Options, stated_options
@@ -119,7 +119,7 @@ def trade(
 def _need_vendor_model(modelfile: ModelFile) -> None:
     """InputError unless the catalogue names a vendor's model of the wanted op-amp."""
     from designer.catalog.parts_catalog import load_catalog
-    from designer.fidelity.rungs import TOP, VENDOR
+    from designer.fidelity.fidelity_answers import TOP, VENDOR
 
     spec = modelfile.circuit
     opamp = load_catalog().opamp(spec.opamp, spec.supply)
@@ -129,7 +129,7 @@ def _need_vendor_model(modelfile: ModelFile) -> None:
 
 
 def show(result: TradeResult) -> None:
-    """Time and error of every rung."""
+    """Time and error of every fidelity."""
     from designer.fidelity.trade_files import sheet
 
     tell(sheet(result.answer))

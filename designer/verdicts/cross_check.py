@@ -47,7 +47,7 @@ class StartKind(StrEnum):
 
 
 class NgspiceVerdict(StrEnum):
-    """How ngspice's answer compares with the exact rung's."""
+    """How ngspice's answer compares with the exact circuit's."""
 
     AGREED = "agreed"
     DIFFERED = "differed"
@@ -102,11 +102,11 @@ class CrossCheck(Ask):
     either: str = ""
     """The last two answers of an undecided one, with `OR` between them."""
     finer: int = 1
-    """By how much the gate's step was divided in the run that answers: above 1 where the answer at
-    that step was not the exact circuit's."""
+    """The number by which the gate's step was divided in the run that answers: above 1 where the
+    answer at that step was not the exact circuit's."""
 
     def agrees(self, answer: Answer) -> bool | None:
-        """Whether ngspice names the response that the exact rung names; None without an answer.
+        """Whether ngspice names the response that the exact circuit names; None without an answer.
         Two step sizes that name different ones both differ from a third."""
         exact = name_in_ngspice(answer.response)
         if is_answer(self.response):
@@ -175,8 +175,8 @@ def margin_share(answer: Answer, nominal: Orbit) -> float:
 
 
 def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> list[Ask]:
-    """Of the random subset: of the first `OWN_SAMPLES` those with a period from their own orbit,
-    the first ``nominal`` from the nominal orbit, and every slow one from there."""
+    """The asks about the random subset: of the first `OWN_SAMPLES` those with a period from their
+    own orbit, the first ``nominal`` from the nominal orbit, and every slow one from there."""
     asks = []
     for a in answers:
         if not _orbits(a):
@@ -243,5 +243,5 @@ def _ask_own(answer: Answer) -> list[Ask]:
 
 
 def _orbits(answer: Answer) -> bool:
-    """Whether the exact rung has an attractor, so that ngspice can be told how long to run."""
+    """Whether the exact circuit has an attractor, so that ngspice can be told how long to run."""
     return answer.verdict is not Verdict.FAILED

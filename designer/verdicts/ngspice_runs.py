@@ -1,7 +1,7 @@
 """Runs of ngspice on samples: which it makes, and how long.
 
-Two starts. On the sample's own orbit of the exact circuit rung ngspice only has to stay there. From
-the nominal design's orbit it has to find its way, as the exact rung did: at least 5/(1 - ρ) drive
+Two starts. On the sample's own orbit of the exact circuit ngspice only has to stay there. From the
+nominal design's orbit it has to find its way, as the exact circuit did: at least 5/(1 - ρ) drive
 periods (times n for a period of n), and no fewer than the exact trajectory from that very start
 takes to come within `REMAINDER` of its attractor. `verdicts.cross_check` says who is asked.
 """
@@ -26,11 +26,11 @@ from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.convergence_aids import RunQueue, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, name_in_ngspice
 from designer.spice.simulator import SimulationFailed
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.cross_check import (
     OR,
     UNDECIDED,
@@ -46,7 +46,8 @@ T = TypeVar("T")
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
 REMAINDER = 5e-4
-"""Of the peak: a quarter of the strobe tolerance."""
+"""How near its attractor a trajectory has arrived, over the peak: a quarter of the strobe
+tolerance."""
 MOST_PERIODS = 4000
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
 out by name."""
@@ -54,8 +55,8 @@ MOST_AGAIN = 4 * MOST_PERIODS
 """Longest run that is made again, in drive periods at the step of the first; a quarter of the step
 counts four times."""
 FINER = 4
-"""By how much the step is divided in each round where ngspice disagrees. Half a step may say the
-same by the same error: next to a period doubling it takes a sixteenth to see."""
+"""The number by which the step is divided in each round where ngspice disagrees. Half a step may
+say the same by the same error: next to a period doubling it takes a sixteenth to see."""
 MOST_PATIENCE = 16
 """How many times the pool's time a run at a finer step may take."""
 SURE_ROUND = 2
@@ -96,7 +97,7 @@ class NgspiceAnswer:
     response: str
     """n-p-q, status or ``UNDECIDED``."""
     reason: str = ""
-    """Why; of an undecided one, both answers."""
+    """Why that is the answer; both answers of an undecided one."""
     remedies: str = ""
     """Remedies that the last run needed."""
     symmetric: bool = False
@@ -104,7 +105,7 @@ class NgspiceAnswer:
     either: str = ""
     """Both answers of an undecided one, if both are any."""
     finer: int = 1
-    """By how much the step of the run that answers was divided."""
+    """The number by which the step of the run that answers was divided."""
 
 
 def cross_checks(
@@ -114,13 +115,15 @@ def cross_checks(
     jobs: int,
     progress: Callable[[], None] = lambda: None,
     *,
-    rung: Rung = "ideal",
+    fidelity: Fidelity = "ideal",
     refinements: int = NOMINAL_REFINEMENTS,
 ) -> list[CrossCheck]:
     """ngspice's answers in the order of ``asks``, without those that cannot be asked; see
     `checks_run`. progress : called once for each answer."""
     answers: dict[int, CrossCheck] = {}
-    for k, answer in checks_run(plan, [asks], pool, jobs, rung=rung, refinements=refinements):
+    for k, answer in checks_run(
+        plan, [asks], pool, jobs, fidelity=fidelity, refinements=refinements
+    ):
         if answer is not None:
             answers[k] = answer
             progress()
@@ -133,24 +136,24 @@ def checks_run(
     pool: SpicePool,
     jobs: int,
     *,
-    rung: Rung = "ideal",
+    fidelity: Fidelity = "ideal",
     refinements: int = NOMINAL_REFINEMENTS,
 ) -> Iterator[tuple[int, CrossCheck | None]]:
     """ngspice's answers as they come, with the number of the ask, counted through all blocks.
 
-    The exact rung is asked again for the boards of a block, before the last runs of the block
+    The exact circuit is asked again for the boards of a block, before the last runs of the block
     before have ended: where to start and how long to run is its to say. Of a block the longest
     runs come first.
 
     Parameters
     ----------
-    rung : the op-amps' model. Above ``ideal`` a board's own orbit is only near ngspice's, so that
-        as many periods are discarded as shrink a deviation to a hundredth.
+    fidelity : the op-amps' model. Above ``ideal`` a board's own orbit is only near ngspice's, so
+        that as many periods are discarded as shrink a deviation to a hundredth.
     refinements : rounds of finer steps at most, of runs from the nominal orbit.
 
     Yields
     ------
-    None where the exact rung has no orbit or the response no settings.
+    None where the exact circuit has no orbit or the response no settings.
     """
     ask_of: dict[int, tuple[int, Ask]] = {}
     ready_rows: deque[tuple[int, CrossCheck | None]] = deque()
@@ -159,7 +162,9 @@ def checks_run(
         first = 0
         for block in blocks:
             ready = []
-            for k, (ask, query) in enumerate(_queries(plan, block, jobs, rung, refinements), first):
+            for k, (ask, query) in enumerate(
+                _queries(plan, block, jobs, fidelity, refinements), first
+            ):
                 if isinstance(query, Query):
                     ready.append((k, ask, query))
                 else:
@@ -187,7 +192,7 @@ def _row(ask: Ask, answer: NgspiceAnswer, periods: int) -> CrossCheck:
 
 
 def _queries(
-    plan: StudyPlan, asks: Sequence[Ask], jobs: int, rung: Rung, refinements: int
+    plan: StudyPlan, asks: Sequence[Ask], jobs: int, fidelity: Fidelity, refinements: int
 ) -> Iterator[tuple[Ask, Query | CrossCheck | None]]:
     """Each ask with the run that answers it, or with what is known without one."""
     subjects = _subjects(plan, asks, jobs)
@@ -205,9 +210,9 @@ def _queries(
                 continue
             subject = replace(subject, start=question.start.start, discard=int(way))
             halvings = refinements
-        elif rung != "ideal":
-            subject = replace(subject, discard=way_to_rung(subject.orbit))
-        subject = replace(subject, rung=rung, brief=True)
+        elif fidelity != "ideal":
+            subject = replace(subject, discard=way_to_fidelity(subject.orbit))
+        subject = replace(subject, fidelity=fidelity, brief=True)
         expected = name_in_ngspice(subject.orbit.response)
         yield ask, Query(subject, question.settings, expected, halvings)
 
@@ -222,13 +227,13 @@ def _subjects(
     subjects: dict[tuple[int, int], GateSubject | None] = {}
     for _, group in groupby(samples, key=lambda pair: pair[1] - pair[0]):  # without gaps
         run = [sample for _, sample in group]
-        for answer, subject in exact_rung.subjects(fewer, range(run[0], run[-1] + 1), jobs):
+        for answer, subject in exact_circuit.subjects(fewer, range(run[0], run[-1] + 1), jobs):
             subjects[answer.sample, numbers[answer.question]] = subject
     return subjects
 
 
-def way_to_rung(orbit: Orbit) -> int:
-    """Drive periods from the exact circuit's orbit to that of another rung: n·5/(1 - ρ)."""
+def way_to_fidelity(orbit: Orbit) -> int:
+    """Drive periods from the exact circuit's orbit to that of another fidelity: n·5/(1 - ρ)."""
     if orbit.n == 0:
         return UNKNOWN_PERIODS
     way = orbit.n * 5.0 / (1.0 - orbit.radius) if orbit.radius < 1.0 else math.inf

@@ -1,6 +1,6 @@
 """What boards are asked, what they answer, and how it is judged.
 
-A verdict is decided on the exact circuit rung, started on the nominal design's orbit
+A verdict is decided on the exact circuit, started on the nominal design's orbit
 (docs/definitions.md).
 """
 
@@ -16,7 +16,7 @@ from designer.circuit.netlist import Circuit, Excitation
 from designer.dynamics.orbit import SETTLED, Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spread.spread import Spread, draw_many
 
 BLOCK = 250
@@ -48,7 +48,8 @@ class Question:
 
     @property
     def stream(self) -> str:
-        """Names what is drawn for this response alone: the same wherever it stands in a plan."""
+        """The name of the stream that is drawn for this response alone: the same wherever it stands
+        in a plan."""
         return f"{self.omega:.9g}:{self.spec.expect}"
 
     @property
@@ -124,7 +125,7 @@ class StudyPlan:
     """Whether the boards are computed with op-amps that lag, see ``reduction.Reduction``."""
 
     @property
-    def rung(self) -> Rung:
+    def fidelity(self) -> Fidelity:
         """The op-amps' model in ngspice that goes with these boards."""
         return "dynamic" if self.bandwidth else "ideal"
 

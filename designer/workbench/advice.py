@@ -25,7 +25,7 @@ from designer.dynamics.orbit import Orbit
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
 from designer.model.tuning_bands import Bands
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, Verdict
 from designer.workbench.board_fit import BoardFit
 from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset, widths
@@ -99,7 +99,7 @@ class Advice:
         return "no setting and no single part helps"
 
     def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
-        """As a JSON answer has it."""
+        """The advice as a JSON answer has it."""
         to = self.excitation
         return {
             "omega": self.question.omega,

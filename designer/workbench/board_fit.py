@@ -40,7 +40,7 @@ from designer.workbench.free_decay import FreeDecay
 from designer.workbench.observation import Observation
 
 TERMS = 12
-"""Of Taylor's series of an exponential: 1e-12 where the matrix has a norm of a half."""
+"""Terms of Taylor's series of an exponential: 1e-12 where the matrix has a norm of a half."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class OrbitMatch:
     """Squares of what is left of the record, over what is allowed for."""
     orbit: NetOrbit
     shift: float
-    """In time [drive periods]."""
+    """The shift in time [drive periods]."""
 
 
 def matches(
@@ -184,7 +184,7 @@ def matches(
 
 
 def _nearest(obs: Observation, orbit: NetOrbit) -> OrbitMatch:
-    """At the best of the shifts that the record allows."""
+    """The match at the best of the shifts that the record allows."""
     width = max(1, len(obs.phase) // LOOK)
     phase, volts = obs.phase[::width], obs.volts[::width]
     sigma = obs.spread_of(np.abs(orbit.volts).max(axis=0)) / np.sqrt(width)
@@ -214,13 +214,14 @@ and where none of them has orbits like all records."""
 ROUNDS = 16
 """Steps of Gauss and Newton at most."""
 DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
-"""Of a step, over the diagonal of its matrix: the next where one leads to no better board."""
+"""The dampings of a step, over the diagonal of its matrix: the next where one leads to no better
+board."""
 STARTS, GOOD = 4, 1.5
 """Boards from which the search begins, one after the other, until the misfit is good."""
 LONGEST = 2.0
 """Standard deviations that a step moves a coordinate at most."""
 ENOUGH = 0.02
-"""Of the objective, minus twice the logarithm of the probability: a gain that ends the search."""
+"""The gain that ends the search, in the objective: minus twice the logarithm of the probability."""
 UNALIGNED = 0.25
 """Drive periods: standard deviation of the shift of a record without the generator."""
 
@@ -284,7 +285,7 @@ class BoardFit:
     """Steps that the search took."""
 
     @property
-    def told(self) -> float:
+    def determined(self) -> float:
         """How many numbers the records tell of the board, a coordinate of one each."""
         return float(len(self.centre) - np.trace(self.covariance))
 
@@ -373,8 +374,8 @@ class _Problem:
     def candidates(
         self, starts: Sequence[Sequence[Array]], draws: Array
     ) -> list[tuple[Array, list[OrbitMatch]]]:
-        """Those of the boards (N, K) that settle on motions like all records, with their orbits,
-        the nearest first."""
+        """The boards among (N, K) that settle on motions like all records, with their orbits, the
+        nearest first."""
         self.looks = [
             matches(self.prior, draws, obs, states)
             for obs, states in zip(self.observations, starts, strict=True)

@@ -36,7 +36,7 @@ from designer.workbench.prediction import (
 from designer.workbench.record import Record, RecordedMotion
 
 BAND = 0.15
-"""Of a setting's frequency: how far from it the drive may be."""
+"""How far the drive may be from a setting's frequency, over that frequency."""
 ASKED = 3
 """Wanted responses, the nearest in frequency, whose waves channels are laid over."""
 GAIN = (0.75, 1.33)
@@ -46,14 +46,15 @@ ALIKE = 0.35
 APART = 0.02
 """Least difference of that share to the next way of saying which channel is which."""
 KNOTS = 64
-"""Of a period."""
+"""Knots of a period."""
 STEPS, STRETCH = 64, 1 << 14
 """Of the fastest that a board does: samples of its period that equations of motion are held
 against; and the most samples of a record."""
 SINE_LEFT = 0.04
-"""Of the generator's amplitude: what is left of its channel where that is a sine."""
+"""What is left of the generator's channel where that is a sine, over its amplitude."""
 MOST_WAYS = 6000
-"""Of giving channels to nets: of more it has to be said."""
+"""Ways of giving channels to nets; where there are more, the user has to say which net a channel
+shows."""
 FITS, LOOSE = 5.0, 10.0
 """Misfit of channels that are taken for those nets; and up to which what they leave is taken for
 the drive where they are told."""
@@ -67,12 +68,12 @@ def recorded_motion(
     prediction: BoardPrediction,
     *,
     frequency: float | None = None,
-    told: Mapping[str, str] | None = None,
+    stated: Mapping[str, str] | None = None,
 ) -> RecordedMotion:
     """A record with the nets that its channels show and its drive.
 
     frequency : about that of the drive [Hz], for a record without the generator; else it is found.
-    told : the channel of each net; what it does not name is left out. Else the channels are
+    stated : the channel of each net; what it does not name is left out. Else the channels are
     recognised: by the board's equations of motion (``force_balance``), and where these say nothing
     by the shapes that the nets have at the nearest settings.
 
@@ -81,24 +82,24 @@ def recorded_motion(
     InputError : a net or channel that is not there; a record shorter than two drive periods; or one
         whose channels are like no nets of the board.
     """
-    if told:
-        _check(record, prediction, told)
-        if set(told) == {prediction.generator}:
+    if stated:
+        _check(record, prediction, stated)
+        if set(stated) == {prediction.generator}:
             expected = "a net of the board as well"
             raise InputError(None, "--channels", "the generator alone", expected)
-    channels = tuple(dict.fromkeys(told.values())) if told else tuple(record.signals)
+    channels = tuple(dict.fromkeys(stated.values())) if stated else tuple(record.signals)
     shown = [c for c in channels if record.moves(c)]
     if not shown:
         raise InputError(record.source, "its channels", "no signal", "a channel that moves")
     band = (0.0, math.inf) if frequency is None else _near(frequency)
     balance = ForceBalance(prediction, *_stretch(record, shown, prediction), band)
-    if told:
-        net_of = {channel: net for net, channel in told.items()}
+    if stated:
+        net_of = {channel: net for net, channel in stated.items()}
         best, doubt, remedy = balance.balance([net_of[c] for c in shown]), "", ""
     else:
         best, doubt, remedy = _recognised(balance, shown, prediction.generator)
         _not_alone(record, best.nets, shown[0], prediction)
-    nets = dict(told) if told else dict(zip(best.nets, shown, strict=False))
+    nets = dict(stated) if stated else dict(zip(best.nets, shown, strict=False))
     drive = best.frequency
     if best.misfit > LOOSE and prediction.generator not in nets:
         drive = math.nan
@@ -115,11 +116,11 @@ def recorded_motion(
         _not_alone(record, nets, shown[0], prediction)
         doubt = doubt or "its channels were recognised by their shapes alone"
         remedy = remedy or _example(nets)
-    if not told and not doubt and (other := _cut_as_an_output(record, nets, prediction)):
+    if not stated and not doubt and (other := _cut_as_an_output(record, nets, prediction)):
         channel, output = other
         doubt = f"{channel}, which is cut off where {output} rests, may be {output}"
         remedy = _example({**{n: c for n, c in nets.items() if c != channel}, output: channel})
-    if not told and not doubt and prediction.circuit.bends:
+    if not stated and not doubt and prediction.circuit.bends:
         laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
         doubt = f"its channels were recognised without the spread of the bends of {laws}"
         remedy = _example(nets)
@@ -155,9 +156,9 @@ def _recognised(
     displacement: in a linear part of the board, far from the stops, that is one as well.
     """
     loose = [each for each in balance.assignments(MOST_WAYS) if not each.misfit >= LOOSE]
-    loose.sort(key=lambda each: -each.told)
+    loose.sort(key=lambda each: -each.explained)
     every = [each for each in loose if not each.misfit >= FITS]
-    if not every or not every[0].told > LITTLE:
+    if not every or not every[0].explained > LITTLE:
         return _by_shapes(balance, shown)
     # One that hardly fits is not taken, but rules out that another is sure.
     best = every[0]
@@ -170,7 +171,7 @@ def _recognised(
         place = sine_as.nets.index(generator)
         doubt = f"{shown[place]}, a sine as the generator's, may be {best.nets[place]} as well"
         return sine_as, doubt, _example(dict(zip(sine_as.nets, shown, strict=True)))
-    if others and best.told - others[0].told < CLEARER:
+    if others and best.explained - others[0].explained < CLEARER:
         if not best.whole:
             return _by_shapes(balance, shown)
         other = ", ".join(f"{net}={c}" for net, c in zip(others[0].nets, shown, strict=True))
@@ -196,8 +197,8 @@ def _cut_as_an_output(
 def _with_generator(
     balance: ForceBalance, best: Balance, every: Sequence[Balance], generator: str
 ) -> Balance | None:
-    """The same assignment with a channel that is a sine as the generator's, if it is among every
-    one that fits."""
+    """The assignment with a channel that is a sine as the generator's, if it is among those that
+    fit."""
     for each in every:
         differing = [k for k, net in enumerate(each.nets) if net != best.nets[k]]
         if [each.nets[k] for k in differing] == [generator] and math.isfinite(
@@ -258,8 +259,8 @@ def _motion(
     generator: str,
     frequency: float,
 ) -> RecordedMotion:
-    """With the drive by the generator's channel, where there is one; else by how the record lies on
-    itself."""
+    """The motion with the drive by the generator's channel, where there is one; else by how the
+    record lies on itself."""
     channel = nets.get(generator)
     amplitude = offset = phase = math.nan
     if channel is not None and channel in shown:
@@ -283,8 +284,8 @@ def _motion(
     return RecordedMotion(record, dict(nets), generator, frequency, error, amplitude, offset, phase)
 
 
-def _check(record: Record, prediction: BoardPrediction, told: Mapping[str, str]) -> None:
-    for net, channel in told.items():
+def _check(record: Record, prediction: BoardPrediction, stated: Mapping[str, str]) -> None:
+    for net, channel in stated.items():
         if net not in prediction.nets:
             expected = f"one of the nets {', '.join(prediction.nets)}"
             raise InputError(None, "--channels", net, expected)

@@ -2,7 +2,7 @@
 
 A record can tell figures of a board, with intervals: gaps, constant force, resonances. What a
 record leaves open is not reported: a figure is told where the records have narrowed it to less than
-``TOLD`` of what the spread alone says.
+``DETERMINED`` of what the spread alone says.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from designer.workbench.naming import NamedMotion
 from designer.workbench.observation import Observation, observe
 from designer.workbench.prediction import BoardPrediction, PredictedResponse
 
-TOLD = 0.5
-"""Of the standard deviation over the spread."""
+DETERMINED = 0.5
+"""The widest interval of a figure that the records determine, over the interval of the spread."""
 DRAWS = 256
 """Boards of the spread that say how far a figure varies; the first is the middle one."""
 NORMAL = 1.959964
@@ -47,7 +47,7 @@ class BoardFigure:
     unit: str
     """Its unit; "" where it has none."""
     value: float
-    """On the most probable board."""
+    """The figure of the most probable board."""
     low: float
     """Lower end of the 95 % interval."""
     high: float
@@ -57,22 +57,22 @@ class BoardFigure:
     """Standard deviation over the boards of the spread."""
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the records say more of it than the spread does."""
-        return self.high - self.low < TOLD * 2.0 * NORMAL * self.sigma
+        return self.high - self.low < DETERMINED * 2.0 * NORMAL * self.sigma
 
     def as_dict(self) -> dict[str, Any]:
-        """As a JSON answer has it."""
+        """The figure as a JSON answer has it."""
         return asdict(self)
 
 
-def told_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
-    """The figures that the records tell."""
-    return tuple(figure for figure in figures(fit) if figure.told)
+def determined_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
+    """The figures that the records determine."""
+    return tuple(figure for figure in figures(fit) if figure.determined)
 
 
 def figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
-    """Every figure of the board, told or not: its value on the most probable board, and the
+    """Every figure of the board, determined or not: its value on the most probable board, and the
     interval by the figure's slopes there."""
     prior, circuit = fit.prior, fit.prior.circuit
     near = board_figures(circuit, prior.boards(np.vstack([fit.centre, fit.centre + _steps(fit)])))
@@ -194,17 +194,17 @@ class FittedBoard:
     figures: tuple[BoardFigure, ...] = ()
     """What the records tell of it."""
     advice: tuple[Advice, ...] = ()
-    """For each response that it was asked for."""
+    """The advice for each response that was asked for."""
     reason: str = ""
     """Why there is no fit; "" where there is one."""
 
     @property
     def misfit(self) -> float | None:
-        """Of the worst record; see ``BoardFit.misfits``."""
+        """The misfit of the worst record; see ``BoardFit.misfits``."""
         return None if self.fit is None else max(self.fit.misfits)
 
     def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
-        """As a JSON answer has it. The residual is that of the worst record."""
+        """The board as a JSON answer has it. The residual is that of the worst record."""
         return {
             "board": self.name,
             "files": list(self.files),
@@ -244,7 +244,7 @@ def board_behind(
         return FittedBoard(name, files, reason=str(error))
     questions = [r.question for r in (prediction.responses if wanted is None else wanted)]
     advice = advise(fit, questions, prediction.synthesis.modelfile.tuning)
-    return FittedBoard(name, files, fit, told_figures(fit), advice)
+    return FittedBoard(name, files, fit, determined_figures(fit), advice)
 
 
 def _observation(named: NamedMotion, prediction: BoardPrediction) -> Observation:

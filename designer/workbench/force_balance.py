@@ -30,17 +30,17 @@ BY_OUTPUT, BY_DISPLACEMENT = 0.01, 0.06
 """Of the power of the drive's answer: what a board of a usual spread leaves of the equations, with
 the force of the stops recorded, and with that which the nominal stops have."""
 ZONE = 0.03
-"""Of the power of a dead zone's output: what a board leaves of it by the nominal stops."""
+"""What a board leaves of a dead zone's output by the nominal stops, over its power."""
 SINE = 0.005
-"""Of the power of the generator's channel: what is no sine."""
+"""What of the generator's channel is no sine, over its power."""
 FAINT = 0.1
-"""Of a contact as deep as the clearance: a dead zone's output that is no contact."""
+"""A dead zone's output that is no contact, over that at a contact as deep as the clearance."""
 LEAST_SHARE = 1e-3
-"""Of a channel's power: what is left of it counts as at least as much."""
+"""What is left of a channel counts as at least this share of its power."""
 FREE = 0.1
-"""Of a channel: what must not be cut off to say anything of it."""
+"""The share of a channel that must not be cut off to say anything of it."""
 DIRECT = 1e-9
-"""Of the largest entry of a board's matrix: the difference that makes its modes distinct."""
+"""The difference that makes a board's modes distinct, over the largest entry of its matrix."""
 
 
 @dataclass(frozen=True)
@@ -52,19 +52,19 @@ class Balance:
     misfit: float
     """What is left over, in units of what a usual board leaves: about 1 or less for the right
     one; nan where these channels test nothing."""
-    told: float
+    explained: float
     """How much of the channels it explains: the sum of -log of the share of its own power that is
     left of each; a channel that nothing tests adds nothing."""
     whole: bool
     """Whether every channel is tested by the others."""
     frequency: float
-    """Of the drive [Hz]; nan where they do not tell it."""
+    """The frequency of the drive [Hz]; nan where the channels do not tell it."""
 
 
 @dataclass(frozen=True)
 class _Test:
-    """Of one channel: what the equations leave of what they weigh, how much of that a usual board
-    leaves, and what is left over the channel's own power."""
+    """The test of one channel: what the equations leave of what they weigh, how much of that a
+    usual board leaves, and what is left over the channel's own power."""
 
     left: float
     allowed: float
@@ -105,7 +105,7 @@ class ForceBalance:
                 yield self.balance(way)
 
     def balance(self, nets: Sequence[str]) -> Balance:
-        """Of one way: the net of each channel."""
+        """The balance of one assignment. nets : the net of each channel."""
         of = {net: k for k, net in enumerate(nets)}
         generator = of.get(self._prediction.generator)
         tests: dict[str, _Test] = {}
@@ -135,8 +135,10 @@ class ForceBalance:
                 if net not in tests:
                     tests[net] = self._driven(forces, of[net], net, drive, allowed)
         misfit = max((test.left / test.allowed for test in tests.values()), default=math.nan)
-        told = sum(-math.log(min(max(test.share, LEAST_SHARE), 1.0)) for test in tests.values())
-        return Balance(tuple(nets), misfit, told, len(tests) == len(nets), frequency)
+        explained = sum(
+            -math.log(min(max(test.share, LEAST_SHARE), 1.0)) for test in tests.values()
+        )
+        return Balance(tuple(nets), misfit, explained, len(tests) == len(nets), frequency)
 
     def sine(self, channel: int) -> tuple[float, float]:
         """Frequency [Hz] of the sine that is most like a channel, and the share of its power that
@@ -199,8 +201,8 @@ class ForceBalance:
         return self._answers[key]
 
     def _zone(self, stop: PredictedStop, of: Mapping[str, int]) -> _Test | None:
-        """Of a dead zone's output by its displacement; None where too little of both is not cut
-        off. Where only the output is, it has to be beyond."""
+        """The test of a dead zone's output by its displacement; None where too little of both is
+        not cut off. Where only the output is, it has to be beyond."""
         place = of[stop.output]
         known, sides = self._uncut(stop, of), self._sides(place, stop)
         free = sides == 0.0
@@ -334,7 +336,7 @@ class ForceBalance:
         drive: object,
         allowed: float,
     ) -> _Test:
-        """Of a state's channel by the answer to the generator."""
+        """The test of a state's channel by the answer to the generator."""
         answer = self._without_rest(self._answers[drive][:, self._states.index(net)], channel)
         rest = self._rest(forces, channel, net)
         power = max(float(rest @ rest), float(answer @ answer), 1e-300)
@@ -375,7 +377,7 @@ class _LinearPart:
 
 
 def _linear(prediction: BoardPrediction) -> _LinearPart:
-    """Of the nominal board with every clearance open."""
+    """The linear equations of the nominal board with every clearance open."""
     reduction, circuit = prediction.reduction, prediction.circuit
     system = reduction.system()
     rest, n = system.mode(circuit.open), system.size

@@ -30,15 +30,15 @@ in contact. Inside the clearance it may follow the displacement by a hundredth o
 ON = 0.05
 """Of the range of the generator's channel: how far from where it ends it is still on."""
 END = 0.1
-"""Of a record: its end, where everything rests."""
+"""The share of a record at its end where everything rests."""
 FEWEST = 1.5
 """Periods of the nominal board's slowest resonance that a decay lasts at least."""
 LOUDEST, CLEAR = 2.0, 6.0
 """Times the noise that it is at least in its first period (RMS); and that a contact stands out."""
 STEP, LEAST = 1e-4, 1e-2
-"""Of a resonance: the step of a difference quotient; and the least damping ratio for it."""
+"""The step of a difference quotient, over the resonance; and the least damping ratio for it."""
 REAL = 1e-9
-"""Of a root: an imaginary part that is rounding."""
+"""An imaginary part that is rounding, over the root."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class FreeDecay:
 
     def slopes(self, prior: Prior, z: Array) -> Array:
         """(k · nets, K) change of that with each coordinate of the board."""
-        here, *beside = _resonances_of(prior, np.vstack([z, z + PROBE * np.eye(len(z))]))
-        moved = (np.array(beside) - here).reshape(len(z), -1) / PROBE
+        here, *shifted = _resonances_of(prior, np.vstack([z, z + PROBE * np.eye(len(z))]))
+        moved = (np.array(shifted) - here).reshape(len(z), -1) / PROBE
         base, columns = self.residual(here), []
         for index in np.ndindex(here.shape):
             near = here.copy()

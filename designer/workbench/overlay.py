@@ -2,8 +2,8 @@
 a board's motion in ngspice there.
 
 The motion in ngspice is that of full op-amps: its response, and its last periods. The run starts on
-the board's exact orbit and is left to settle on ngspice's own, as ``verdicts.way_to_rung`` says how
-long. Its step follows the shortest contact.
+the board's exact orbit and is left to settle on ngspice's own, as ``verdicts.way_to_fidelity`` says
+how long. Its step follows the shortest contact.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.read_orbit import Reading, clearance_rows, read
 from designer.spice.simulator import SpiceJob, Waveforms
-from designer.verdicts.ngspice_runs import way_to_rung
+from designer.verdicts.ngspice_runs import way_to_fidelity
 from designer.workbench.board_fit import BoardFit
 from designer.workbench.folding import POINTS as CURVE_POINTS
 from designer.workbench.naming import NamedMotion
@@ -44,7 +44,7 @@ class NgspiceMotion:
     """How a board moves in ngspice."""
 
     orbit: Orbit
-    """As read by the board's own stops."""
+    """The orbit as read by the board's own stops."""
     signals: Mapping[str, Array]
     """(periods · points + 1,) voltage of each net [V] at equal steps, from a strobe of the
     generator to the last one of the run."""
@@ -52,7 +52,9 @@ class NgspiceMotion:
 
 def full_subject(reduction: Reduction, excitation: Excitation, orbit: Orbit) -> GateSubject:
     """A board on full op-amps under a setting of the generator. orbit : its exact one there."""
-    return GateSubject(reduction, excitation, orbit, discard=way_to_rung(orbit), rung="full")
+    return GateSubject(
+        reduction, excitation, orbit, discard=way_to_fidelity(orbit), fidelity="full"
+    )
 
 
 def motion_job(subject: GateSubject, periods: int, points: int) -> SpiceJob[NgspiceMotion]:
@@ -78,7 +80,7 @@ def motion_job(subject: GateSubject, periods: int, points: int) -> SpiceJob[Ngsp
         title="a board on the bench",
         stop_time=length * period,
         initial=subject.orbit.start[: len(circuit.states)],
-        rung=subject.rung,
+        fidelity=subject.fidelity,
         kept_from=max(subject.discard - 1, 0) * period,
     )
     nets = (*circuit.outputs, circuit.generator.net)
@@ -110,7 +112,7 @@ class NgspiceWave:
     waves: Array
     """(k, nets) its waves at the phases of the overlay's [V]."""
     errors: Mapping[str, float]
-    """By net, as those of the overlay."""
+    """The errors by net, as those of the overlay."""
 
 
 @dataclass(frozen=True)
@@ -131,9 +133,9 @@ class Overlay:
     predicted: Array
     """(k, nets) the orbit's waves at the same phases [V]."""
     points: int = POINTS
-    """Of both, in a drive period."""
+    """Points of both curves in a drive period."""
     ngspice: NgspiceWave | None = None
-    """The same in ngspice on full op-amps; None where it was not run."""
+    """The motion in ngspice on full op-amps; None where it was not run."""
 
     @property
     def errors(self) -> Mapping[str, float]:
@@ -170,7 +172,7 @@ class Overlay:
     def with_ngspice(
         self, motion: NgspiceMotion, prediction: BoardPrediction, *, fitted: bool
     ) -> Overlay:
-        """The same with ngspice's motion, or its mirror twin where that is nearer, in phase."""
+        """The overlay with ngspice's motion, or its mirror twin where that is nearer, in phase."""
         table = np.column_stack([motion.signals[net][:-1] for net in self.nets])
         waves = [_in_phase(self.recorded, image) for image in _images(table, prediction)]
         best = min(waves, key=lambda wave: sum(self._errors(wave).values()))

@@ -16,7 +16,7 @@ import numpy as np
 from designer.base.arrays import Array, Index, Mask
 
 ORDERS = range(1, 7)
-"""Of the differences that the noise is estimated from."""
+"""The orders of the differences that the noise is estimated from."""
 NORMAL = 0.6744897501960817
 """Median of the absolute value of a standard normal number."""
 MOST_LEVELS = 2**16
@@ -24,7 +24,7 @@ MOST_LEVELS = 2**16
 FEWEST_REPEATS = 4
 """Samples a level, in the mean, from which on the values are taken for a converter's levels."""
 DITHER_SEED = 1
-"""Of the numbers that spread values over a step."""
+"""The seed of the numbers that spread values over a step."""
 FEWEST_CUT, CUT_SHARE, OFTEN, BESIDE = 8, 5e-3, 6, 4
 """Of a channel that is cut off, at its last value: samples, share of all, and times as many as at
 any of so many values before it."""
@@ -35,7 +35,7 @@ the noise."""
 LEAST_VOLTS, ROUNDING = 1e-9, 1e-12
 """Span of a channel that is no signal [V], and of its largest value."""
 ON_LEVEL = 0.1
-"""Of a step: how far from its level a value may be written."""
+"""How far from its level a value may be written, over the step."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,12 @@ class Record:
 
     @property
     def interval(self) -> float:
-        """From one sample to the next [s]."""
+        """The time from one sample to the next [s]."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     @property
     def duration(self) -> float:
-        """From the first sample to the last [s]."""
+        """The time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
     @cached_property
@@ -116,11 +116,11 @@ class RecordedMotion:
     generator: str
     """Net of the generator, a key of ``channels`` where it was recorded."""
     frequency: float
-    """Of the drive [Hz]."""
+    """The frequency of the drive [Hz]."""
     frequency_error: float
     """Standard error of it [Hz]."""
     amplitude: float
-    """Of the drive [V peak]; nan where the generator was not recorded."""
+    """The amplitude of the drive [V peak]; nan where the generator was not recorded."""
     offset: float
     """Mean of the generator's channel [V], the scope's own offset included; nan where it was not
     recorded."""
@@ -194,11 +194,11 @@ def limits_of(signal: Array) -> tuple[float, float]:
 
 def _piled(counts: Index, total: int) -> bool:
     """Whether samples pile up at the first of some values. counts : (m,) samples at each."""
-    last, beside = int(counts[0]), counts[1 : 1 + BESIDE]
+    last, neighbours = int(counts[0]), counts[1 : 1 + BESIDE]
     return (
-        len(beside) > 0
+        len(neighbours) > 0
         and last >= max(FEWEST_CUT, CUT_SHARE * total)
-        and last > OFTEN * int(beside.max())
+        and last > OFTEN * int(neighbours.max())
     )
 
 

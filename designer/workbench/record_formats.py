@@ -21,13 +21,13 @@ from designer.workbench.scope_text import EXPECTED, NUMBER, TextColumns, read_co
 FEWEST_SAMPLES, MOST_SAMPLES = 100, 1 << 21
 """Fewer show no motion; more tell nothing that these do not."""
 MOST_CHANNELS = 16
-"""Of an oscilloscope."""
+"""The most channels of an oscilloscope."""
 LONGEST_NAME = 200
 """Characters of a column's name in a text; the rest is left out."""
 MOST_VOLTS, MOST_SECONDS = 1e6, 1e9
 """What a probe is put to, and how long one waits for a record."""
 STEPS = (1e-12, 1e3)
-"""From one sample to the next [s]."""
+"""The least and the greatest time from one sample to the next [s]."""
 FARTHEST = 1e11
 """Steps of the first time from 0: a float then has it to a thousandth of a step or better."""
 TIME_NAMES = re.compile(r"(time|zeit|temps|tiempo|tempo|x-axis|x|t|s|seconds?)", re.IGNORECASE)
@@ -59,7 +59,7 @@ ARRAYS: Mapping[str, tuple[str, Callable[[Path], Mapping[str, Array]]]] = {
 }
 """By the end of a file's name: the format, and what reads its arrays by their names."""
 UNEVEN = 0.75
-"""Of a step, or of the digits that the times are written with: how far a time may be off."""
+"""How far a time may be off, over the step or over the digits that the times are written with."""
 
 
 @dataclass(frozen=True)
@@ -153,10 +153,10 @@ def _even(times: Array, path: Path, lines: Sequence[int]) -> Array:
     return np.asarray(begin + step * k)
 
 
-def _check_times(path: Path, time: Array, told: float | None) -> None:
+def _check_times(path: Path, time: Array, stated: float | None) -> None:
     """InputError for steps that no oscilloscope has, or that the digits of a number do not hold.
-    told : the step that a header says [s]."""
-    step = float(time[-1] - time[0]) / (len(time) - 1) if told is None else told
+    stated : the step that a header says [s]."""
+    step = float(time[-1] - time[0]) / (len(time) - 1) if stated is None else stated
     low, high = STEPS
     if not low <= step <= high:
         expected = f"from {low:g} s to {high:g} s"
@@ -271,7 +271,7 @@ def _of_arrays(path: Path, kind: str, read: Callable[[Path], Mapping[str, Array]
 
 
 def _floats(values: Array) -> Array:
-    """As floats; what is too large for one is infinite."""
+    """The numbers as floats; what is too large for one is infinite."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(values, dtype=np.float64)
 

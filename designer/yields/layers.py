@@ -1,6 +1,6 @@
 """The layers of a study, each a set of rows in blocks: who computes them, and what is on disk.
 
-``samples`` (the exact rung's answers), ``ngspice``, ``tuned``, ``trimmed``, ``reached``: each
+``samples`` (the exact circuit's answers), ``ngspice``, ``tuned``, ``trimmed``, ``reached``: each
 stands on the first alone, so a study can get another one later and keep what is there.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 
 from designer.base.threads import parallel
 from designer.spice.pool import SpicePool
-from designer.verdicts import exact_rung, ngspice_runs
+from designer.verdicts import exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import Ask, CrossCheck, Why
 from designer.verdicts.verdict import BLOCK, Answer, BoardRow, StudyPlan
 from designer.yields.power_up import PowerUp
@@ -61,8 +61,8 @@ class LocalRunner:
 
 
 def samples_task(plan: StudyPlan, block: range) -> Task:
-    """The exact rung's answers of a block."""
-    return partial(exact_rung.block, plan, block)
+    """The exact circuit's answers of a block."""
+    return partial(exact_circuit.block, plan, block)
 
 
 def fill(
@@ -153,7 +153,7 @@ def fill_cross_checks(
     left = {number: len(some) for number, some in missing.items()}
     for number in [n for n, count in left.items() if not count]:
         finish(number)
-    for k, row in ngspice_runs.checks_run(plan, blocks, pool, jobs, rung=plan.rung):
+    for k, row in ngspice_runs.checks_run(plan, blocks, pool, jobs, fidelity=plan.fidelity):
         number = todo[k].sample // CHUNK
         if row is not None:
             answers[number][row.key] = row

@@ -28,14 +28,15 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Answer, Question, Verdict
 from designer.yields.stored_parts import StoredParts, counted
 
 STEP = 0.02
-"""Of a quantity's standard deviation: half the span of a central difference."""
+"""Half the span of a central difference, over a quantity's standard deviation."""
 BACK = 0.8
-"""Of the way to the crossing: where its gradient is taken, since a fold has none at its end."""
+"""Share of the way to the crossing at which its gradient is taken, since a fold has none at its
+end."""
 DRAWN = 256
 """Boards, at least, from which the standard deviations of the quantities are taken."""
 NEAREST = 6
@@ -43,7 +44,7 @@ NEAREST = 6
 CROSSINGS = 8
 """Lost boards for each response whose crossings are sought."""
 PACE = 0.25
-"""Of the way to a lost board: the first steps; then the gap is halved."""
+"""Share of the way to a lost board of the first steps; then the gap is halved."""
 ROUNDS = 10
 """Attractors sought for a crossing, at most."""
 
@@ -67,8 +68,8 @@ class Limit:
     """The lost board it was found on; -1 for the nominal board."""
 
     @property
-    def distance(self) -> float:
-        """Standard deviations between the nominal board and the loss."""
+    def reliability_index(self) -> float:
+        """The standard deviations between the nominal board and the loss."""
         return self.nominal / self.sigma
 
 
@@ -128,12 +129,12 @@ class Margin:
     sought: int = 0
     """Lost boards on which the response was looked for."""
     there: int = 0
-    """Of ``sought`` lost boards, those on which the response exists all the same and the
-    nominal orbit leads to another attractor."""
+    """How many of the ``sought`` lost boards have the response all the same, while the nominal
+    orbit leads to another attractor."""
 
     def each(self, boards: Boards) -> Array:
         """(N, limits) every limit on these boards, in its own standard deviations."""
-        total = np.tile([limit.distance for limit in self.limits], (len(boards), 1))
+        total = np.tile([limit.reliability_index for limit in self.limits], (len(boards), 1))
         slopes = np.array([limit.slopes / limit.sigma for limit in self.limits])
         # Summed one by one: the last digits of a matrix product depend on the number of boards.
         for k, q in enumerate(self.quantities):
@@ -250,9 +251,9 @@ def _stored_crossings(
             for _ in range(ROUNDS):
                 progress()
     missing = [pair for pair in lost if pair not in by_board]
-    fresh = crossings(boards, missing, questions, jobs=jobs, progress=progress)
-    parts.put({f"crossing {c.question} {c.board}": c for c in fresh})
-    by_board |= {(c.question, c.board): c for c in fresh}
+    computed = crossings(boards, missing, questions, jobs=jobs, progress=progress)
+    parts.put({f"crossing {c.question} {c.board}": c for c in computed})
+    by_board |= {(c.question, c.board): c for c in computed}
     return [by_board[pair] for pair in lost]
 
 
@@ -317,7 +318,7 @@ class _Base:
 
 
 def _probes(board: Boards, differing: Sequence[Quantity]) -> Ensemble:
-    """For each quantity the board with a little less of it, then with a little more."""
+    """The boards with a little less, then a little more of each quantity."""
     rows = board.take(np.zeros(2 * len(differing), dtype=np.intp))
     for k, q in enumerate(differing):
         values = column(rows, q).copy()
@@ -378,7 +379,7 @@ def _nominal_limits(
         _limit(f, f.value, row, differing, boards) for f, row in zip(wanted, slopes, strict=True)
     ]
     limits = [limit for limit in all_ if limit is not None]
-    return tuple(sorted(limits, key=lambda limit: limit.distance)[:NEAREST])
+    return tuple(sorted(limits, key=lambda limit: limit.reliability_index)[:NEAREST])
 
 
 def _crossing_limit(
@@ -432,23 +433,26 @@ def _limit(
 
 
 def _foretelling(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> Margin:
-    """Of its limits those that foretell the verdicts of even boards, tested on the odd ones."""
+    """The margin with those of its limits that foretell the verdicts of even boards, tested on the
+    odd ones."""
     ok, lost = (
         np.array([a.sample for a in answers if a.verdict is verdict], dtype=np.intp)
         for verdict in (Verdict.OK, Verdict.LOST)
     )
     if margin.limits:
         picked = _picked(margin.each(boards) > 0.0, ok[ok % 2 == 0], lost[lost % 2 == 0])
-        nearest = int(np.argmin([limit.distance for limit in margin.limits]))
+        nearest = int(np.argmin([limit.reliability_index for limit in margin.limits]))
         limits = [margin.limits[k] for k in picked or [nearest]]
-        margin = replace(margin, limits=tuple(sorted(limits, key=lambda limit: limit.distance)))
+        margin = replace(
+            margin, limits=tuple(sorted(limits, key=lambda limit: limit.reliability_index))
+        )
     fine, ok, lost = margin.of(boards) > 0.0, ok[ok % 2 == 1], lost[lost % 2 == 1]
     prediction = Prediction(len(ok), len(lost), int(fine[lost].sum()), int((~fine[ok]).sum()))
     return replace(margin, prediction=prediction)
 
 
 def _picked(each: NDArray[np.bool_], ok: Index, lost: Index) -> list[int]:
-    """Of the limits, those that set more of these verdicts right, one after the other.
+    """The limits that set more of these verdicts right, one after the other.
 
     each : (boards, limits) whether each limit lets the board pass.
     """

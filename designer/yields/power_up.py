@@ -23,7 +23,7 @@ from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import BoardRow, Question, StudyPlan, Verdict
 from designer.yields.start_recipe import Recipe
 
@@ -35,7 +35,7 @@ nearer after one more of its periods, has arrived."""
 BESIDE = 24
 """Boards whose modes are solved together, where one of them enters these."""
 WAITS = (8, 8, 4)
-"""Of the last drive's periods, the parts after which a start may have come to its orbit."""
+"""The parts of the last drive's periods after which a start may have come to its orbit."""
 STILL = 1e-3
 """Peaks below this share of the largest count as so much."""
 STREAM = "phase:"
@@ -147,7 +147,7 @@ def _onwards(
 def _swept(
     swept: Swept | None, stages: Sequence[tuple[Drive, int]], arrivals: Sequence[Arrival | None]
 ) -> dict[int, Arrival]:
-    """Of these arrivals, by their places, those that the faster way knows after these stages."""
+    """The arrivals that the faster way knows after these stages, by their places."""
     begun = {k: arrival for k, arrival in enumerate(arrivals) if arrival is not None}
     if swept is None or not begun:
         return {}
@@ -251,13 +251,13 @@ def _arrivals(
     ]
 
     boards = list(dict.fromkeys(board for board, _ in groups))
-    beside = {b: boards[k - k % BESIDE :][:BESIDE] for k, b in enumerate(boards)}
+    neighbours = {b: boards[k - k % BESIDE :][:BESIDE] for k, b in enumerate(boards)}
 
     def arrive(task: tuple[tuple[int, Recipe], list[int]]) -> list[Arrival | str]:
         (board, recipe), members = task
         try:
             system = ensemble.reduction(board).system()
-            swept = partial(ensemble.swept, board, beside=beside[board])
+            swept = partial(ensemble.swept, board, neighbours=neighbours[board])
             phases = [starts[k][3] for k in members]
             orbit = known[members[0]] if known else None
             if orbit is None:
@@ -281,7 +281,7 @@ def _arrived(
     known: Sequence[Orbit | None],
     jobs: int,
 ) -> list[Orbit | None]:
-    """Of each start the known orbit that it has come to; None where that is not plain."""
+    """The known orbit that each start has come to; None where that is not plain."""
     out: list[Orbit | None] = [None] * len(starts)
     groups: dict[tuple[int, Recipe], list[int]] = {}
     for k, orbit in enumerate(known):

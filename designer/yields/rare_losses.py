@@ -32,7 +32,7 @@ from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.loss_walks import LossWalk, Shown, independent, walk
 from designer.yields.margins import nominal_limits
@@ -55,17 +55,18 @@ PILOTS, PILOT = 3, 600
 ENOUGH = 50.0
 """Effective number of lost boards, at least, of an estimate that ends before its most boards."""
 SOME = 20.0
-"""The same, of an estimate that ends on one side of a bound."""
+"""Effective number of lost boards, at least, of an estimate that ends on one side of a bound."""
 FEWEST = 6
 """Lost boards of one kind that begin a region."""
 TELLING = 12.0
 """Effective number of lost boards that move a tilt."""
 EVEN = 0.4
-"""Of the boards of all regions, what is shared evenly; the rest by how much each adds."""
+"""Share of the boards of all regions that is dealt evenly; the rest goes by how much each region
+adds."""
 CLEAR = 1.5
 """Standard errors by which a coordinate's mean has to be off to move its tilt at all."""
 WIDE = (1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
-"""By how much more than they may be the parts of boards are off that look for further regions."""
+"""The factors on the deviations of boards that look for further regions."""
 OFTEN = 0.05
 """Share of lost boards at which they are wide enough."""
 MET, MANY = 3, 16
@@ -86,7 +87,7 @@ MOST_WALKS, MOST_REGIONS = 6, 12
 SHOWN_PARTS = 5
 """Parts of a region that are named."""
 WIDEST = 10.0
-"""By how much tolerances are widened at most, to see where the first board is lost."""
+"""The factor by which tolerances are widened at most, to see where the first board is lost."""
 STEPS = 16
 """Widths that are looked at, twice: over the whole range, then between two of them."""
 SINGLE = 8
@@ -98,9 +99,9 @@ APART = 1.4
 TAG = 0xAA5E
 """Sets these boards apart from those of a study with the same seed."""
 QUANTILE = 1.959964
-"""Of the normal distribution, for 95 %, two-sided."""
+"""The quantile of the normal distribution for 95 %, two-sided."""
 PATH = (0.3, 0.5, 0.65, 0.8, 0.9, 1.0, 1.15, 1.35, 1.7, 2.2, 3.0)
-"""Of the tilt that a linear limit foretells: where on its way the loss is looked for."""
+"""Shares of the tilt that a linear limit foretells at which the loss is looked for."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ class LossRegion:
     becomes: str
     """What most of its lost boards show instead."""
     share: float
-    """Of all losses, those that are most likely of this region."""
+    """Share of all losses that are most likely of this region."""
     boards: int
     """Lost boards of it that were drawn."""
     parts: tuple[str, ...]
@@ -153,7 +154,7 @@ class RareLosses:
     effective: float
     """Effective number of lost boards: the square of their weights' sum over the sum of squares."""
     largest_weight: float
-    """Of a lost board, over the mean weight of 1."""
+    """The largest weight of a lost board, over the mean weight of 1."""
     gain: float
     """Plain boards that the same interval would take, over those drawn, pilots included; nan
     without a loss."""
@@ -198,7 +199,7 @@ class _Found:
     boards: int
     """Boards that were asked."""
     plain: int
-    """Of these, plain ones of pilot rounds."""
+    """How many of these boards are plain ones of pilot rounds."""
     strays: Array
     """(N, coordinates) of those the lost ones."""
 
@@ -214,7 +215,7 @@ class _Sample:
     responses: tuple[str, ...]
 
     def joined(self, other: _Sample) -> _Sample:
-        """Both, one after the other."""
+        """Both samples, one after the other."""
         return _Sample(
             np.concatenate([self.points, other.points]),
             np.concatenate([self.component, other.component]),
@@ -352,8 +353,8 @@ def rare_losses(
         doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
         narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
         narrow = narrow and result.effective >= ENOUGH
-        told = bound is not None and _beside(result, bound)
-        if count >= most or ((narrow or told) and count >= LEAST_BOARDS):
+        decided = bound is not None and _is_decided(result, bound)
+        if count >= most or ((narrow or decided) and count >= LEAST_BOARDS):
             break
         sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
     spent = found.boards + count
@@ -427,7 +428,7 @@ def _interval(mean: float, error: float, outside: float) -> tuple[float, float]:
     return mean / spread, min(mean * spread, 1.0)
 
 
-def _beside(estimate: _Estimate, bound: float) -> bool:
+def _is_decided(estimate: _Estimate, bound: float) -> bool:
     """Whether an estimate's interval lies on one side of a share, by enough lost boards."""
     if estimate.effective < SOME:
         return False
@@ -534,14 +535,14 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
             yield _Region(tilts[lost[0]], limit.what)
 
 
-def _strength(way: Array, distance: float) -> float:
-    """The tilt along a way at whose mean a limit at this distance is reached; the steepest where
-    none is steep enough."""
+def _strength(way: Array, reliability_index: float) -> float:
+    """The tilt along a way at whose mean a limit of this reliability index is reached; the steepest
+    where none is steep enough."""
     low, high = 0.0, STEEPEST / float(np.abs(way).max())
     for _ in range(60):
         middle = 0.5 * (low + high)
         moved = float(way @ (mean_of(middle * way) - 0.5))
-        low, high = (middle, high) if moved < distance else (low, middle)
+        low, high = (middle, high) if moved < reliability_index else (low, middle)
     return 0.5 * (low + high)
 
 
@@ -722,8 +723,8 @@ def _leading(names: Sequence[str], tilt: Array) -> tuple[str, ...]:
 
 
 def _margins(drawing: _Drawing, regions: Sequence[_Region]) -> Iterator[ToleranceMargin]:
-    """Of the corners that the regions lean to, and of single parts at the ends that they lean to.
-    Tolerances are widened in proportion, every law with them."""
+    """The tolerance margins of the corners that the regions lean to, and of single parts at the
+    ends that they lean to. Tolerances are widened in proportion, every law with them."""
     if not regions:
         return
     doing("tolerance margins")

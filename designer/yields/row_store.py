@@ -19,7 +19,7 @@ import pyarrow as pa
 
 from designer.base.atomic_write import appearing
 from designer.base.keyed_store import KeyedStore, Vouch, nobody
-from designer.base.parquet_entry import MOST_ROWS, ParquetForm, Rows
+from designer.base.parquet_entry import MOST_ROWS, ParquetCodec, Rows
 from designer.base.progress import quiet
 from designer.base.record_check import checked_record
 from designer.dynamics.counts import read_counts
@@ -81,8 +81,8 @@ class BlockStore(Generic[Row]):
         self._noted = 0
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
         most = size * len(StartKind) * len(omegas) if omegas else MOST_ROWS
-        form = ParquetForm(self._schema_of(), most=most)
-        self._store: KeyedStore[Rows] = KeyedStore(root, form, note, vouch, self._write)
+        codec = ParquetCodec(self._schema_of(), most=most)
+        self._store: KeyedStore[Rows] = KeyedStore(root, codec, note, vouch, self._write)
         self._read: dict[str, list[Row]] = {}
 
     def name(self, block: range) -> str:

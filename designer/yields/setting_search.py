@@ -20,7 +20,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, Verdict
 from designer.yields import window_path
 from designer.yields.adjustment import AS_BUILT, Adjustment, widths
@@ -29,9 +29,9 @@ from designer.yields.window_path import PathSetting, find_window
 HALVED = 4
 """Pairs of settings halved at once."""
 APART = 0.02
-"""Of the half-bands: settings nearer than this are one."""
+"""Settings nearer than this, over the half-bands, are one."""
 PATHS = ((0.0, True), (0.5, True), (-0.5, True), (0.5, False))
-"""Of each path, half-bands of DC offset at which it sets out, and whether it is tied."""
+"""The paths: each with the half-bands of DC offset at which it sets out, and whether it is tied."""
 SPOTS = 3
 """Settings of a path that are asked, at most: those deepest inside the window."""
 MOST_TRIES = (1 + 8 + 2 * HALVED) + len(PATHS) * SPOTS
@@ -209,13 +209,13 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
 
 
 def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
-    """Those that differ from what was tried, from as built and from each other."""
+    """The settings that differ from what was tried, from as built and from each other."""
     earlier = [AS_BUILT, *(t.setting for t in case.tries)]
-    fresh: list[Adjustment] = []
+    untried: list[Adjustment] = []
     for setting in settings:
-        if all(_distance(setting, other, bands) > APART for other in (*earlier, *fresh)):
-            fresh.append(setting)
-    return fresh
+        if all(_distance(setting, other, bands) > APART for other in (*earlier, *untried)):
+            untried.append(setting)
+    return untried
 
 
 def _distance(a: Adjustment, b: Adjustment, bands: Bands) -> float:

@@ -19,7 +19,7 @@ from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.power_up import switched_on
 from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind
@@ -56,9 +56,9 @@ LONGEST_WAIT = 4000
 ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
-"""Of the amplitude: where an amplitude ramp begins."""
+"""Share of the amplitude at which an amplitude ramp begins."""
 ABOVE = 1.1
-"""Of the highest resonance inside the clearance: where the long sweep begins."""
+"""Where the long sweep begins, over the highest resonance inside the clearance."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -145,7 +145,8 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
 
 
 def highest_resonance(system: PiecewiseLinearSystem) -> float:
-    """Of the free motion inside the clearance, per unit of the system's time; 0 without one."""
+    """The highest resonance of the free motion inside the clearance, per unit of the system's time;
+    0 without one."""
     poles = np.linalg.eigvals(system.mode(system.start).A).astype(complex)
     return float(np.abs(poles.imag).max()) / (2.0 * math.pi)
 
@@ -170,7 +171,7 @@ class _Trials:
 
     @property
     def share(self) -> float:
-        """Of all starts, those that lead to the response."""
+        """Share of all starts that lead to the response."""
         starts = (*self.nominal, *self.boards.values())
         return sum(starts) / len(starts)
 
@@ -220,7 +221,7 @@ class _Bench:
     elsewhere: Callable[[bool, Sequence[_Trial]], Callable[[], list[bool]]] | None = None
 
     def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
-        """From the first ``count`` phases, without those that were tried before."""
+        """The trials from the first ``count`` phases, without those that were tried before."""
         own = self.question.start
         known = own if self.question.periodic and own.radius < 1.0 else None
         starts = [

@@ -21,7 +21,7 @@ from designer.spread.part_rules import spread_of
 from designer.verdicts.cross_check import CrossCheck
 from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
 from designer.yields import two_engine_yield
-from designer.yields.blame_analysis import Blame, BlameStatus
+from designer.yields.loss_attribution import Attribution, AttributionStatus
 from designer.yields.power_up import PowerUp
 from designer.yields.rare_losses import RareLosses
 from designer.yields.row_store import Row
@@ -39,7 +39,7 @@ BOARD_COLUMNS = tuple(
     "sample board number omega expected verdict response reason radius penetration miss "
     "asymmetry periods waveform".split()
 )
-"""Of the table of boards."""
+"""The columns of the table of boards."""
 _COUNTS = ("ok", "lost", "grazing", "failed", "samples", "rate")
 
 
@@ -102,14 +102,14 @@ class Study:
     """Rows of the boards powered up; None where these were not asked for."""
     recipes: tuple[Recipe, ...] | None = None
     """Recipes of power-up, one for each question."""
-    blame: Blame | None = None
-    """The blame by question; None where none was asked for."""
+    blame: Attribution | None = None
+    """The attribution by question; None where none was asked for."""
     maps: tuple[YieldMap, ...] = ()
     """Yield maps of questions; empty where none were asked for."""
     rare: tuple[RareLosses, ...] = ()
     """Estimates by boards that are drawn where they are lost; empty where none were asked for."""
     blame_wanted: bool = True
-    """Whether a blame was asked for."""
+    """Whether an attribution was asked for."""
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
     """Wall time of each part of the work [s], as far as it has gone."""
 
@@ -118,7 +118,7 @@ class Study:
         return self._answers.get(index, ())
 
     def rows_of(self, index: int, rows: Sequence[Row] | None) -> tuple[Row, ...]:
-        """Those of these rows of a layer that are about response number ``index``, by sample."""
+        """The rows of a layer that are about response number ``index``, by sample."""
         return tuple(row for row in rows or () if self.response_indices[row.question] == index)
 
     def boards(self) -> pd.DataFrame:
@@ -161,7 +161,7 @@ class Study:
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out."""
+        """The yield of each response; None where it was left out."""
         return tuple(
             count(self.answers_to(i), self.plan.census) if i in self.response_indices else None
             for i in range(len(self.checked))
@@ -169,7 +169,7 @@ class Study:
 
     @cached_property
     def combined(self) -> tuple[Combined | None, ...]:
-        """For each response: both engines together; None where ngspice has no answer."""
+        """Both engines' estimate of each response; None where ngspice has no answer."""
         return tuple(
             two_engine_yield.combine(
                 self.answers_to(i),
@@ -187,9 +187,9 @@ class Study:
         return next((r for r in self.rare if self.response_indices[r.question] == index), None)
 
     @property
-    def blame_status(self) -> BlameStatus:
-        """How much of the blame there is."""
-        return BlameStatus.of(self.blame, self.blame_wanted and bool(self.response_indices))
+    def blame_status(self) -> AttributionStatus:
+        """How much of the attribution there is."""
+        return AttributionStatus.of(self.blame, self.blame_wanted and bool(self.response_indices))
 
     @property
     def all_on_one_board(self) -> Yield | None:
@@ -212,8 +212,9 @@ class Study:
 
 
 def trust_of_yield(counted: Yield, nominal: Trust) -> Trust:
-    """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
-    boards without an answer that they could move it out of its own interval."""
+    """The trust in a yield. It is not better than that in the nominal orbit on which each board
+    starts, and doubted where so many boards have no answer that they could move the yield out of
+    its interval."""
     doubts = [Reason(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
     if counted.failed:
         least = counted.ok / counted.samples
@@ -260,7 +261,7 @@ class RunResult:
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out of the study."""
+        """The yield of each response; None where the study left it out."""
         return self.study.yields
 
     def _repr_html_(self) -> str:

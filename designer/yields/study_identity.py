@@ -27,8 +27,8 @@ RULES = {
 }
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
 the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
-the layer, so that rows of the old rules are not taken for rows of the new ones. So with the blame
-and with the equation check and the gate."""
+the layer, so that rows of the old rules are not taken for rows of the new ones. So with the
+attribution and with the equation check and the gate."""
 
 
 def study_hash(
@@ -63,8 +63,8 @@ def study_hash(
     return _hash(inputs)
 
 
-def blame_hash(plan: StudyPlan) -> str:
-    """Hash of everything that decides the blame of a study's answers."""
+def attribution_hash(plan: StudyPlan) -> str:
+    """Hash of everything that decides the attribution of a study's answers."""
     return study_hash(plan, "blame", {"samples": plan.samples})
 
 

@@ -32,12 +32,12 @@ from designer.spread.part_rules import warmed
 from designer.spread.spread import NO_BANDWIDTH, Spread
 from designer.verdicts import cross_check
 from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
-from designer.verdicts.rung_gate import gated
+from designer.verdicts.fidelity_gate import gated
 from designer.verdicts.verdict import BLOCK, StudyPlan
 from designer.yields import layers
-from designer.yields.blame_analysis import Blame, blame
-from designer.yields.blame_replay import BUDGET, extent_of
 from designer.yields.layers import LayerName, Runner, Task
+from designer.yields.loss_attribution import Attribution, attribute
+from designer.yields.loss_replay import BUDGET, extent_of
 from designer.yields.power_up import power_up_block
 from designer.yields.rare_losses import counted_losses, rare_losses
 from designer.yields.row_store import BlockStore
@@ -84,7 +84,7 @@ def lagging_plan(
     questions = tuple(replace(plan.questions[k], start=orbits[k], settings=None) for k in left)
     plan = replace(plan, questions=questions)
     if pool is not None and questions:
-        plan, _ = gated(plan, pool, plan.rung)
+        plan, _ = gated(plan, pool, plan.fidelity)
     return plan, left, why
 
 
@@ -94,7 +94,7 @@ each time all its rows are counted anew."""
 MOST_NOMINAL = 1000
 """Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
 MORE_NOMINAL = 50
-"""By how many their number grows."""
+"""By how many boards their number grows."""
 
 
 IN_VAIN = 0.1
@@ -103,7 +103,7 @@ ngspice that keeps the whole interval wide."""
 
 
 class Stores:
-    """Where the layers of a study are kept, and its blame; this one keeps nothing."""
+    """Where the layers of a study are kept, and its attribution; this one keeps nothing."""
 
     def rows(
         self, layer: LayerName, plan: StudyPlan, more: Mapping[str, Any] | None = None
@@ -111,15 +111,15 @@ class Stores:
         """The blocks of a layer. more : what decides its rows beside the plan."""
         return None
 
-    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
-        """The whole blame, or one of this budget at least."""
+    def attribution(self, plan: StudyPlan, budget: int) -> Attribution | None:
+        """The whole attribution, or one of this budget at least."""
         return None
 
-    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+    def put_attribution(self, plan: StudyPlan, attribution: Attribution) -> None:
         pass
 
-    def blame_parts(self, plan: StudyPlan) -> StoredParts:
-        """Where the finished parts of a blame are."""
+    def attribution_parts(self, plan: StudyPlan) -> StoredParts:
+        """Where the finished parts of an attribution are."""
         return StoredParts()
 
     def maps(self, plan: StudyPlan) -> StoredParts:
@@ -152,11 +152,11 @@ def tolerance(
     *,
     samples: int = SAMPLES,
     until: float | None = None,
-    rung: StudyEngine = "auto",
+    fidelity: StudyEngine = "auto",
     tuned: bool = False,
     reached: bool = False,
-    blamed: bool = True,
-    blame_budget: int = BUDGET,
+    attributed: bool = True,
+    attribution_budget: int = BUDGET,
     maps: Sequence[Over] = (),
     rare: bool = False,
     seed: int = SEED,
@@ -172,17 +172,16 @@ def tolerance(
     """How many boards show each response, under the spread of the model file.
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
-    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``verdicts.cross_check``
-    says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice`` about every board. tuned,
-    reached, blamed : whether these are wanted; a fitted trimmer is always asked for. blame_budget :
-    steps of the blame (``blame_replay``). maps : settings over which the yield is wanted
-    (``yield_maps.OVERS``). rare : whether boards are drawn where they are lost (``rare_losses``).
-    checked : of the same design, to save the time of the gate. pool : where
-    ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
-    to. runner : who computes blocks; this process if None. sampled : is given the study once the
-    exact circuit has every board, before ngspice is asked. standing : is given the study once its
-    yields stand and the blame or maps are still to be
-    worked out.
+    does not grow if None. fidelity : ``exact`` asks no ngspice, ``auto`` as
+    ``verdicts.cross_check`` says, ``bandwidth`` as ``auto``, with op-amps that lag, ``ngspice``
+    about every board. tuned, reached, attributed : whether these are wanted; a fitted trimmer is
+    always asked for. attribution_budget : steps of the attribution (``loss_replay``). maps :
+    settings over which the yield is wanted (``yield_maps.OVERS``). rare : whether boards are drawn
+    where they are lost (``rare_losses``). checked : of the same design, to save the time of the
+    gate. pool : where ngspice runs; without one ngspice is not asked. stores : where rows are read
+    from and written to. runner : who computes blocks; this process if None. sampled : is given the
+    study once the exact circuit has every board, before ngspice is asked. standing : is given the
+    study once its yields stand and the attribution or maps are still to be worked out.
     """
     need_responses(synthesis.modelfile)
     warm = None
@@ -197,7 +196,7 @@ def tolerance(
     if listed is not None and listed.labels:
         expected = "no list of measured boards, which are as many as there are"
         raise InputError(None, "--rare", "spread.measured", expected)
-    pool = None if rung == "exact" else pool
+    pool = None if fidelity == "exact" else pool
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     indices = tuple(i for i in range(len(checked)) if i not in left_out)
@@ -209,7 +208,7 @@ def tolerance(
         samples=samples,
         seed=seed,
     )
-    if rung == "bandwidth":
+    if fidelity == "bandwidth":
         progress.stage("nominal orbits with bandwidth")
         plan, left, gone = lagging_plan(plan, pool)
         left_out |= {indices[k]: reason for k, reason in gone.items()}
@@ -218,7 +217,14 @@ def tolerance(
         progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     laps = Laps()
     study = Study(
-        checked, plan, indices, left_out, (), until=until, blame_wanted=blamed, seconds=laps.seconds
+        checked,
+        plan,
+        indices,
+        left_out,
+        (),
+        until=until,
+        blame_wanted=attributed,
+        seconds=laps.seconds,
     )
     if not indices:
         return study
@@ -228,8 +234,8 @@ def tolerance(
         Stores() if stores is None else stores,
         layers.LocalRunner(jobs) if runner is None else runner,
         progress,
-        rung,
-        blame_budget,
+        fidelity,
+        attribution_budget,
     )
     if until is None:
         study = work.sampled(study)
@@ -249,13 +255,13 @@ def tolerance(
     if reached:
         study = work.powered_up(study)
     laps.end("further_layers")
-    if blamed:
-        study = replace(study, blame=work.stores.blame(study.plan, blame_budget))
-    if standing is not None and (maps or rare or (blamed and study.blame is None)):
+    if attributed:
+        study = replace(study, blame=work.stores.attribution(study.plan, attribution_budget))
+    if standing is not None and (maps or rare or (attributed and study.blame is None)):
         standing(study)
         laps.end("first_report")
-    if blamed and study.blame is None:
-        study = work.blamed(study)
+    if attributed and study.blame is None:
+        study = work.attributed(study)
     if rare:
         study = work.drawn_where_lost(study)
     return work.mapped(study, maps, warm) if maps else study
@@ -284,22 +290,23 @@ class StudyWork:
     runner: Runner
     """Who computes blocks."""
     progress: Progress
-    """Told how far the work is."""
+    """Is told how far the work is."""
     engine: StudyEngine
     """Which engine decides."""
-    blame_budget: int = BUDGET
-    """Steps that the blame may take."""
+    attribution_budget: int = BUDGET
+    """Steps that the attribution may take."""
 
     def sampled(self, study: Study) -> Study:
-        """With the exact circuit's answers of the plan's samples."""
+        """The study with the exact circuit's answers of the plan's samples."""
         return self._with_samples(study, study.plan.samples)
 
     def cross_checked(self, study: Study) -> Study:
-        """With ngspice's answers about some of the boards, or all."""
+        """The study with ngspice's answers about some of the boards, or all."""
         return self._with_all_checks(study, NOMINAL_SAMPLES)
 
     def grown(self, study: Study) -> Study:
-        """With as many samples as it takes; it stops at edges of blocks only."""
+        """The study with as many samples as its intervals take; it stops at edges of blocks
+        only."""
         until = study.until
         assert until is not None
         samples = -(-study.plan.samples // BLOCK) * BLOCK
@@ -349,7 +356,7 @@ class StudyWork:
         return not silent and _widest(study) < until
 
     def tuned(self, study: Study, bands: Bands) -> Study:
-        """With the generator free within the bands."""
+        """The study with yields where the generator is free within the bands."""
         plan, count = study.plan, len(study.plan.questions)
         more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
 
@@ -360,7 +367,7 @@ class StudyWork:
         return replace(study, tuned=self._rows("tuned", "tuned boards", plan, task, more))
 
     def trimmed(self, study: Study, trim: DcTrim) -> Study:
-        """With the trimmer of each board set once."""
+        """The study with yields where the trimmer of each board is set once."""
         plan = study.plan
 
         def task(block: range) -> Task:
@@ -370,7 +377,8 @@ class StudyWork:
         return replace(study, trimmed=rows)
 
     def powered_up(self, study: Study) -> Study:
-        """From power-up, by the recipes that the nominal circuit and a few boards suggest."""
+        """The study with yields from power-up, by the recipes that the nominal circuit and a few
+        boards suggest."""
         plan = study.plan
         self.progress.stage("start recipes")
         recipes = find_recipes(plan, self.jobs)
@@ -382,10 +390,10 @@ class StudyWork:
         rows = self._rows("reached", "boards from power-up", plan, task, more)
         return replace(study, power_ups=rows, recipes=recipes)
 
-    def blamed(self, study: Study) -> Study:
-        """With the parts that the losses come from."""
-        plan, answers, budget = study.plan, study.answers, self.blame_budget
-        result = blame(
+    def attributed(self, study: Study) -> Study:
+        """The study with the attribution of its losses."""
+        plan, answers, budget = study.plan, study.answers, self.attribution_budget
+        result = attribute(
             plan,
             answers,
             budget=budget,
@@ -393,13 +401,14 @@ class StudyWork:
             progress=self.progress.stage(
                 "blame, boards asked again", extent_of(plan, answers, budget).steps
             ),
-            parts=self.stores.blame_parts(plan),
+            parts=self.stores.attribution_parts(plan),
         )
-        self.stores.put_blame(plan, result)
+        self.stores.put_attribution(plan, result)
         return replace(study, blame=result)
 
     def drawn_where_lost(self, study: Study) -> Study:
-        """With an estimate of each response's losses by boards that are drawn where they are."""
+        """The study with an estimate of each response's losses, by boards that are drawn where they
+        are lost."""
         found, parts = [], self.stores.rare(study.plan)
         for number, index in enumerate(study.response_indices):
             name = f"rare {number}"
@@ -415,7 +424,7 @@ class StudyWork:
         return replace(study, rare=tuple(found))
 
     def mapped(self, study: Study, overs: Sequence[Over], warm: Spread | None = None) -> Study:
-        """With a yield map of each response over each of these settings.
+        """The study with a yield map of each response over each of these settings.
 
         warm : ``warmed`` of ``yield_map``.
         """
@@ -453,7 +462,8 @@ class StudyWork:
         return tuple(layers.fill(plan, store, size, task, self.runner, step, first))
 
     def _with_samples(self, study: Study, samples: int) -> Study:
-        """With the answers of so many samples; those that it has are at an edge of a block."""
+        """The study with the answers of so many samples; those that it has end at an edge of a
+        block."""
         plan = replace(study.plan, samples=samples)
         stage = f"tolerance study, {samples} boards, responses: {len(plan.questions)}"
         task = partial(layers.samples_task, plan)
@@ -467,8 +477,9 @@ class StudyWork:
         return cross_check.ask_random(study.answers, nominal)
 
     def _with_all_checks(self, study: Study, nominal: int) -> Study:
-        """With the boards at a boundary, which are known only once there is no more sample, and
-        those on which the engines differ, once that is known."""
+        """The study with ngspice's answers about the boards at a boundary, which are known only
+        once there is no more sample, and about those on which the engines differ, once that is
+        known."""
         asks = self._random(study, nominal)
         if self.engine != "ngspice":
             asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
@@ -515,7 +526,7 @@ def _more(samples: int) -> int:
 
 
 def _decided(study: Study) -> list[bool]:
-    """For each response, whether any board has an answer."""
+    """Whether any board has an answer, for each response."""
     return [y is not None and y.samples > y.failed for y in study.yields]
 
 

@@ -23,7 +23,7 @@ from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Resistor
 from designer.spread.spread import draw_many
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, rounded
 from designer.yields.bench_procedure import BITS, READINGS
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 HIGH, LOW = "RV901H", "RV901L"
 """The track between the wiper and its ends."""
 END = 1e-3
-"""Of the travel at either end: what stays unused."""
+"""Share of the travel that stays unused at either end."""
 SCREEN = 4.0
 """Volts on the whole screen while the stops are read, over the nominal board's stop."""
 FINER = 10.0
@@ -144,7 +144,7 @@ def trimmed_answers(
     plan : of the circuit without the trimmer. progress : called once an answer.
     """
     boards, position = trimmed_boards(trim, plan, indices)
-    return exact_rung.of_boards(plan, boards, indices, jobs, progress), position
+    return exact_circuit.of_boards(plan, boards, indices, jobs, progress), position
 
 
 def trimmed_block(

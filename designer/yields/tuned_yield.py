@@ -18,7 +18,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import FloatingCircuit
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, Verdict, rounded
 from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset
 from designer.yields.bench_procedure import BenchResult, find_on_bench

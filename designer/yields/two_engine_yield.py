@@ -1,8 +1,8 @@
-"""The exact rung and ngspice together: one yield from both, and where they differ.
+"""The exact circuit and ngspice together: one yield from both, and where they differ.
 
-All N boards have the exact rung's verdict X; some have ngspice's from the nominal orbit too, Y.
-The estimate of ngspice's yield is the difference estimator (the exact rung is the control
-variate), in strata h that the exact rung defines: boards nearest to a boundary, slow ones, the
+All N boards have the exact circuit's verdict X; some have ngspice's from the nominal orbit too, Y.
+The estimate of ngspice's yield is the difference estimator (the exact circuit is the control
+variate), in strata h that the exact circuit defines: boards nearest to a boundary, slow ones, the
 rest::
 
     p = mean of X over all + sum over h of (N_h/N) · mean of (Y - X) over those asked in h
@@ -12,12 +12,12 @@ many indices of independent draws; all of those at a boundary), so the estimate 
 of them have an answer. Those without are left out as if they were like the others, which they need
 not be (the way to an attractor is longest next to the loss of its stability); the estimates if all
 of them were lost, and if all were ok, stand beside. The variance is that of two-phase sampling,
-S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling Techniques, 1977, 12.2 and 7.2;
-Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
-terms by the method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27,
-2008, 1693): each enters with its own limits instead of its standard error, Wilson's of the yield,
-those of the mid-p value of D = +1 and D = -1. So fifty boards without a difference do not make the
-exact rung's interval ngspice's: the disagreement may be as large as fifty boards can hide, 5.8 %.
+S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling Techniques, 1977, 12.2 and 7.2; Särndal,
+Swensson and Wretman, 1992, 9.6). The interval joins the terms by the method of variance estimates
+recovery (Zou and Donner, Statistics in Medicine 27, 2008, 1693): each enters with its own limits
+instead of its standard error, Wilson's of the yield, those of the mid-p value of D = +1 and D = -1.
+So fifty boards without a difference do not make the exact circuit's interval ngspice's: the
+disagreement may be as large as fifty boards can hide, 5.8 %.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Explanation(StrEnum):
 
 @dataclass(frozen=True)
 class Disagreement:
-    """One board on which ngspice shows another response than the exact rung."""
+    """One board on which ngspice shows another response than the exact circuit."""
 
     sample: int
     """Number of the board."""
@@ -66,7 +66,7 @@ class Disagreement:
     why: Why
     """Why the board was asked about."""
     exact: str
-    """n-p-q or status on the exact rung."""
+    """n-p-q or status on the exact circuit."""
     ngspice: str
     """n-p-q or status in ngspice."""
     distance: float
@@ -99,13 +99,13 @@ class Stratum:
     asked: int
     """Boards in the stratum with an answer of ngspice, n_h."""
     gained: int
-    """Of ``asked``, boards that only ngspice calls ok."""
+    """How many of the boards ``asked`` only ngspice calls ok."""
     lost: int
-    """Of ``asked``, boards that only the exact rung calls ok."""
+    """How many of the boards ``asked`` only the exact circuit calls ok."""
     could_gain: int
-    """Boards in the stratum that the exact rung does not call ok."""
+    """Boards in the stratum that the exact circuit does not call ok."""
     could_lose: int
-    """Boards in the stratum that the exact rung calls ok."""
+    """Boards in the stratum that the exact circuit calls ok."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ def combine(
 def interval(
     ok: int, strata: Sequence[Stratum], census: bool = False
 ) -> tuple[float, float, float]:
-    """Estimate and 95 % limits, from ``ok`` boards on the exact rung and the strata. census : the
-    boards are no sample of others."""
+    """Estimate and 95 % limits, from ``ok`` boards on the exact circuit and the strata. census :
+    the boards are no sample of others."""
     total = sum(s.samples for s in strata)
     estimate = ok / total
     below = above = 0.0

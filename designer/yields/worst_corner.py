@@ -23,7 +23,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import column
 from designer.spread.spread import BOARD, Spread, part_of
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.margins import Margin
 from designer.yields.stored_parts import StoredParts, counted
@@ -69,11 +69,11 @@ class Corner:
     margin: float
     """Margin in the worst corner."""
     verdict: Verdict
-    """What became of the corner's board on the exact rung."""
+    """What became of the corner's board on the exact circuit."""
     response: str
-    """n-p-q or status of the corner's board on the exact rung."""
+    """n-p-q or status of the corner's board on the exact circuit."""
     survived: int
-    """Of ``corners`` corners, those whose board shows the response."""
+    """How many of the ``corners`` corners have a board that shows the response."""
     corners: int
     """Corners that were asked."""
 
@@ -152,7 +152,7 @@ def worst_corners(
     progress: Callable[[], None],
     parts: StoredParts | None = None,
 ) -> list[Corner | None]:
-    """For each question the corners of its ``CORNER`` largest indices, on the exact rung; None
+    """For each question the corners of its ``CORNER`` largest indices, on the exact circuit; None
     where nothing limits. progress : called once an attractor. parts : the known ones, and where the
     others go.
     """

@@ -36,10 +36,10 @@ Counts = NDArray[np.int64]
 SET: tuple[Over, ...] = ("omega", "b", "omega-grade")
 """What the generator is set to along the first axis; the nominal circuit has a window there."""
 POINTS = 17
-"""Of ω or b across a window; the setting in use is one more."""
+"""Points of ω or b across a window; the setting in use is one more."""
 SAMPLES = 100
 GRADES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
-"""Of resistors and capacitors alike."""
+"""The grades of resistors and capacitors alike."""
 TEMPERATURES = (-20.0, 0.0, 25.0, 40.0, 55.0, 70.0, 85.0)
 """°C of all boards of a point."""
 PACE, LARGEST_PACE = 0.0025, 0.01
@@ -47,7 +47,7 @@ PACE, LARGEST_PACE = 0.0025, 0.01
 REACH = 0.3
 """Relative: how far from the setting in use a window is followed."""
 HALVINGS = 6
-"""Of the last step, at each edge."""
+"""Halvings of the last step, at each edge."""
 DOUBTED = 10
 """Boards left open by a forecast that are settled before the others are taken for lost."""
 NEARLY_SYMMETRIC = 0.01
@@ -298,8 +298,8 @@ def yield_map(
 def _specified(plan: StudyPlan) -> tuple[float | None, float | None]:
     """The range of temperatures [°C] of the plan's op-amp, as far as the catalogue knows."""
     figures = plan.circuit.figures
-    stands = None if figures is None else figures.temperature
-    return (None, None) if stands is None else (stands.min, stands.max)
+    rated = None if figures is None else figures.temperature
+    return (None, None) if rated is None else (rated.min, rated.max)
 
 
 class _Task(NamedTuple):

@@ -32,7 +32,7 @@ from reports.makers.evidence import (
     figure_block,
     name_axes,
 )
-from reports.makers.first_touch import first_touches, linear_orbit
+from reports.makers.first_grazing import first_grazings, linear_orbit
 
 SOFTER = (1.0, 0.7, 0.5)
 """Factors on force and damping: the weaker both are, the nearer the fold lies to the backbone."""
@@ -96,7 +96,7 @@ def _resonance(model: LumpedSystem) -> tuple[Branch, tuple[float, float] | None]
     """The symmetric branch over ω, and (ω, largest x) at its fold of the highest frequency."""
     unit = model.second_order().own_frequency
     low, high = LOW * unit, HIGH * unit
-    if first_touches(model, high)[0].b > model.b:
+    if first_grazings(model, high)[0].b > model.b:
         raise ArithmeticError(f"the stops are hit at ω = {high:g}")
     known = [(high, linear_orbit(model, high))]
     located = survey(of_model(model, high, "omega"), known, low, high, depth=0)

@@ -24,7 +24,7 @@ from reports.makers.evidence import (
     figure_block,
     name_axes,
 )
-from reports.makers.first_touch import first_touches
+from reports.makers.first_grazing import first_grazings
 
 GRID_POINTS = 400
 """Frequencies at which the first touch of each stop is drawn."""
@@ -64,8 +64,8 @@ def _compared(model: LumpedSystem) -> tuple[Comparison, ...]:
     )
 
 
-def _touches(model: LumpedSystem, omega: float) -> Mapping[tuple[str, int], float]:
-    return {(t.clearance, t.side): t.b for t in first_touches(model, omega)}
+def _grazings(model: LumpedSystem, omega: float) -> Mapping[tuple[str, int], float]:
+    return {(t.clearance, t.side): t.b for t in first_grazings(model, omega)}
 
 
 @styled
@@ -74,7 +74,7 @@ def _figure(model: LumpedSystem) -> Figure:
     axes = figure.subplots()
     modes = model.second_order().natural_frequencies()
     omegas = np.linspace(0.3 * modes[0], 1.3 * modes[-1], GRID_POINTS)
-    curves = [_touches(model, float(w)) for w in omegas]
+    curves = [_grazings(model, float(w)) for w in omegas]
     labels: dict[tuple[float, ...], str] = {}
     for clearance, side in sorted(curves[0]):
         values = tuple(curve[clearance, side] for curve in curves)

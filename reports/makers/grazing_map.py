@@ -39,7 +39,7 @@ from reports.makers.evidence import (
     comparison_table,
     figure_block,
 )
-from reports.makers.first_touch import first_touches, linear_state
+from reports.makers.first_grazing import first_grazings, linear_state
 
 DEPTHS = np.geomspace(1e-8, 1e-3, 11)
 """δ over the gap."""
@@ -129,7 +129,7 @@ def evidence(file: ModelFile) -> list[Evidence]:
 def grazing_map(model: LumpedSystem, omega: float, stop: StopKind) -> GrazingMap:
     """Measure the map of one mass and its upper stop alone at the factor b of the first touch."""
     model = replace(model, gaps=(replace(model.gaps[0], lower=None, lower_stiffness=None),))
-    grazing = model.changed({"b": first_touches(model, omega)[0].b})
+    grazing = model.changed({"b": first_grazings(model, omega)[0].b})
     name, system = grazing.gaps[0].name, grazing.second_order()
     side = system.clearances[0].first
     critical = 2.0 * float(system.mass[0]) * system.own_frequency
@@ -137,9 +137,9 @@ def grazing_map(model: LumpedSystem, omega: float, stop: StopKind) -> GrazingMap
     changes = {f"{name}.preload": preload / grazing.b, f"{name}.damping": stop.damping * critical}
     flow = model_flow(grazing.changed(changes), omega)
     start, depths = linear_state(grazing, omega), DEPTHS * side.gap
-    touch = _touch(flow, start)
+    moment = _time_of_grazing(flow, start)
     A = flow.system.mode(flow.system.start).A
-    before, after = expm(A * touch), expm(A * (flow.drive.period - touch))
+    before, after = expm(A * moment), expm(A * (flow.drive.period - moment))
     kicks, traces, determinants = [], [], []
     for depth in depths:
         offset = np.linalg.solve(before, [depth, 0.0])
@@ -188,7 +188,7 @@ def _leading(depths: Array, contact: _Contact, N: Array) -> Array:
     return np.column_stack([kick, trace, np.exp(-c * lasting / m)])
 
 
-def _touch(flow: Flow, start: Array) -> float:
+def _time_of_grazing(flow: Flow, start: Array) -> float:
     """Time at which the linear response is farthest out, in the first drive period.
 
     The displacement is (x - c) = R sin(ωt + φ), with R cos φ = v/ω and R sin φ = x - c at t = 0;

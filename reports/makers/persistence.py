@@ -29,7 +29,7 @@ from reports.makers.evidence import (
     comparison_table,
     figure_block,
 )
-from reports.makers.first_touch import linear_state, located_touch
+from reports.makers.first_grazing import linear_state, located_grazing
 
 RATIOS = (2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
 """m = 2 ω₀/ω that are looked at."""
@@ -112,7 +112,7 @@ def passage(model: MechanicalModel, m: float) -> Passage:
 
 def _compared(model: MechanicalModel, omega: float) -> Comparison:
     expected = grazing_amplitude(model, omega)
-    computed = located_touch(model, omega, BASE, expected)
+    computed = located_grazing(model, omega, BASE, expected)
     return Comparison(f"grazing amplitude at ω = {omega:.4g}", expected, computed)
 
 

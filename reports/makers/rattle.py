@@ -22,7 +22,7 @@ from reports.makers.evidence import (
     figure_block,
     name_axes,
 )
-from reports.makers.first_touch import first_touches, located_touch
+from reports.makers.first_grazing import first_grazings, located_grazing
 
 SHARES = (0.0, 0.2, 0.4, 0.55, 0.6, 0.7, 0.75, 0.9, 1.0)
 """Of the force on the second mass, at which the first touch is located."""
@@ -67,7 +67,7 @@ def _shared(model: LumpedSystem, share: float) -> LumpedSystem:
 def _gap(model: LumpedSystem, omega: float, share: float) -> float:
     """Of the first touch."""
     shared = _shared(model, share)
-    return first_touches(shared, omega)[0].b * shared.second_order().clearances[0].first.gap
+    return first_grazings(shared, omega)[0].b * shared.second_order().clearances[0].first.gap
 
 
 def _compared(model: LumpedSystem, omega: float, share: float) -> Comparison:
@@ -75,7 +75,7 @@ def _compared(model: LumpedSystem, omega: float, share: float) -> Comparison:
     quiet, shared = quiet_share(model), _shared(model, share)
     expected = _gap(model, omega, 0.0) * abs(quiet - share) / quiet
     gap = shared.second_order().clearances[0].first.gap
-    b = located_touch(shared, omega, "b", expected / gap)
+    b = located_grazing(shared, omega, "b", expected / gap)
     return Comparison(f"gap of the first touch, share {share:g}", expected, b * gap)
 
 

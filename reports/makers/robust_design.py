@@ -4,8 +4,8 @@
 
 A search of ``examples/robust.toml`` (every place free) and one at the model's own clearance (ω
 free), the paper's circuit as printed and as corrected, and the rectifier stage by the match alone:
-yields as built on fresh boards, tuned and reached for what was searched, blame, what limits each
-response, price and parts, and what every lever is worth. Each case is on disk when it is done.
+yields as built on fresh boards, tuned and reached for what was searched, attribution, what limits
+each response, price and parts, and what every lever is worth. Each case is on disk when it is done.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ from designer.paper.report_files import README, make_report, write_files
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
 from designer.verbs.search import VERB
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan
 from designer.yields import study_identity
-from designer.yields.blame_analysis import blame
+from designer.yields.loss_attribution import attribute
 from designer.yields.study import Study, plan_study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.yield_count import Yield, all_on_one, count
@@ -60,8 +60,9 @@ SAMPLES, SHORT, SEED = 4000, 500, 71
 TARGET, MORE = 0.99, 4
 """Yield that tuned and reached boards are to have; where the interval of a response has this
 inside, so many times the boards are asked, once."""
-OTHERS, BLAMED = 500, 250
-"""Boards at most of the paper's circuits, where most settle slowly; boards behind a blame."""
+OTHERS, ATTRIBUTED = 500, 250
+"""Boards at most of the paper's circuits, where most settle slowly; boards behind an
+attribution."""
 FREE, NOMINAL = "searched", "searched, nominal b"
 DATA = "robust-design.json"
 FILES = (DATA, "yields.png", "yields.svg", "levers.png", "levers.svg", README)
@@ -170,10 +171,10 @@ def _searched(
         study = tolerance(
             synthesis,
             samples=boards,
-            rung="exact",
+            fidelity="exact",
             tuned=tuned,
             reached=True,
-            blamed=False,
+            attributed=False,
             seed=options.seed,
             jobs=jobs,
             checked=checked,
@@ -208,12 +209,12 @@ def _decided(study: Study, responses: int) -> bool:
 def _as_built(
     plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, progress: Progress
 ) -> dict[str, Any]:
-    """Yields, blame, limits, price and parts of a circuit."""
+    """Yields, attribution, limits, price and parts of a circuit."""
     step = progress.stage("boards as built", plan.samples * len(plan.questions))
-    answers = exact_rung.block(plan, range(plan.samples), jobs, step)
-    some = replace(plan, samples=min(plan.samples, BLAMED))
+    answers = exact_circuit.block(plan, range(plan.samples), jobs, step)
+    some = replace(plan, samples=min(plan.samples, ATTRIBUTED))
     first = answers[: some.samples * len(plan.questions)]
-    blamed = blame(some, first, jobs=jobs, progress=progress.stage("blame")).responses
+    attributed = attribute(some, first, jobs=jobs, progress=progress.stage("blame")).responses
     limits = limitings(some, first, jobs=jobs, progress=progress.stage("limits"))
     rows = []
     for k, question in enumerate(plan.questions):
@@ -223,7 +224,7 @@ def _as_built(
                 "expect": str(question.spec.expect),
                 "omega": question.spec.omega,
                 "as built": _counted(counted),
-                "blame": blamed[k].limited_by,
+                "blame": attributed[k].limited_by,
                 "limited_by": limits[k].line,
             }
         )

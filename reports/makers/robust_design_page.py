@@ -101,7 +101,7 @@ def robust_design_page(cases: Sequence[Case], command: str, model: str) -> Page:
         PageSection("Yields", _yields(cases)),
         PageSection("On ngspice", [_ngspice(case) for case in confirmed]),
         PageSection("Places", [PageSection(c["name"], [_places(c)]) for c in searched]),
-        PageSection("Blame", [_blame(cases)]),
+        PageSection("Blame", [_attribution(cases)]),
         PageSection("Price and parts", [_bills(cases)]),
         PageSection("What each lever is worth", levers),
     ]
@@ -159,7 +159,7 @@ def _places(case: Case) -> Table | None:
     return table_of(rows, columns)
 
 
-def _blame(cases: Sequence[Case]) -> Table | None:
+def _attribution(cases: Sequence[Case]) -> Table | None:
     rows = [{**row, "name": case["name"]} for case in cases for row in case["responses"]]
     columns: Columns = {
         "circuit": lambda row: row["name"],

@@ -23,7 +23,7 @@ from reports.makers.evidence import (
     figure_block,
     name_axes,
 )
-from reports.makers.first_touch import located_touch
+from reports.makers.first_grazing import located_grazing
 
 RATIOS = (0.5, 0.7, 0.9, 1.0, 1.2, 1.5, 2.0)
 """Drive frequencies over the hammer's own."""
@@ -53,7 +53,7 @@ def evidence(file: ModelFile) -> list[Evidence]:
     return [Evidence("What the weight does", blocks, {name: _figure(model, compared)}, compared)]
 
 
-def touching_amplitude(model: LumpedSystem, omega: float, *, weight: bool = True) -> float:
+def grazing_amplitude(model: LumpedSystem, omega: float, *, weight: bool = True) -> float:
     """Base amplitude of the first touch; with or without the weight."""
     system = model.second_order()
     own, mass = system.own_frequency, float(system.mass[0])
@@ -68,8 +68,8 @@ def _sag(model: LumpedSystem) -> float:
 
 
 def _compared(model: LumpedSystem, omega: float) -> Comparison:
-    expected = touching_amplitude(model, omega)
-    computed = located_touch(model, omega, BASE, expected)
+    expected = grazing_amplitude(model, omega)
+    computed = located_grazing(model, omega, BASE, expected)
     hertz = omega / (2.0 * math.pi)
     return Comparison(f"touching amplitude at {hertz:.4g} Hz", MM * expected, MM * computed)
 
@@ -81,7 +81,7 @@ def _figure(model: LumpedSystem, compared: tuple[Comparison, ...]) -> Figure:
     own = model.second_order().own_frequency
     omegas = own * np.geomspace(0.4, 2.4, 300)
     for weight, look in ((True, {"color": INK}), (False, {"color": MUTED, "ls": (0, (4, 3))})):
-        amplitudes = [MM * touching_amplitude(model, float(w), weight=weight) for w in omegas]
+        amplitudes = [MM * grazing_amplitude(model, float(w), weight=weight) for w in omegas]
         label = "with the weight" if weight else "without"
         axes.semilogy(omegas / (2.0 * math.pi), amplitudes, lw=1.2, label=label, **look)
     dots = [ratio * own / (2.0 * math.pi) for ratio in RATIOS]

@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 
 from designer.base.errors import InputError
 from designer.base.keyed_store import DAMAGED, UNSEALED, KeyedStore, Lines, read_line, sealed_line
-from designer.base.parquet_entry import HEAD, ParquetForm, Rows
+from designer.base.parquet_entry import HEAD, ParquetCodec, Rows
 from designer.base.seal import BLANK, MARK, intact, sealed
 
 SCHEMA = pa.schema([("sample", pa.int64()), ("size", pa.float64()), ("reason", pa.string())])
@@ -26,7 +26,7 @@ NAME, KEY = "rows.parquet/block-000000.parquet", {"format": 2, "study": "a"}
 
 
 def parquet(root: Path, notes: list[str], **more: Any) -> KeyedStore[Rows]:
-    return KeyedStore(root, ParquetForm(SCHEMA), notes.append, **more)
+    return KeyedStore(root, ParquetCodec(SCHEMA), notes.append, **more)
 
 
 def flipped(content: bytes, place: int, bit: int) -> bytes:
@@ -61,18 +61,18 @@ def test_an_entry_comes_back_for_its_own_key(tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / NAME).to_pylist() == ROWS
 
 
-@pytest.mark.parametrize("form", [ParquetForm(SCHEMA.remove(1)), ParquetForm(SCHEMA, most=1)])
+@pytest.mark.parametrize("codec", [ParquetCodec(SCHEMA.remove(1)), ParquetCodec(SCHEMA, most=1)])
 def test_an_entry_of_another_form_is_foreign_only_for_another_request(
-    tmp_path: Path, form: ParquetForm
+    tmp_path: Path, codec: ParquetCodec
 ) -> None:
     """The rows of another map have other columns, or are more: nothing is damaged. Under the key
     that was asked for such an entry is no entry."""
     parquet(tmp_path, []).write(NAME, KEY, ROWS)
     notes: list[str] = []
-    other = KeyedStore(tmp_path, form, notes.append)
+    other = KeyedStore(tmp_path, codec, notes.append)
     assert other.read(NAME, {**KEY, "study": "b"}) is None
     assert (notes, other.foreign) == ([], {NAME})
-    own = KeyedStore(tmp_path, form, notes.append)
+    own = KeyedStore(tmp_path, codec, notes.append)
     assert own.read(NAME, KEY) is None
     assert (notes, own.foreign) == ([f"{tmp_path / NAME}: {DAMAGED}"], set())
 
@@ -153,7 +153,7 @@ def test_a_head_that_is_no_object(tmp_path: Path, head: Any) -> None:
 def test_other_columns_are_no_entry(tmp_path: Path) -> None:
     parquet(tmp_path, []).write(NAME, KEY, ROWS)
     notes: list[str] = []
-    other = ParquetForm(pa.schema([*SCHEMA, ("more", pa.float64())]))
+    other = ParquetCodec(pa.schema([*SCHEMA, ("more", pa.float64())]))
     assert KeyedStore(tmp_path, other, notes.append).read(NAME, KEY) is None
     assert len(notes) == 1
 

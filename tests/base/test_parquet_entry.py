@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from designer.base.parquet_entry import MOST_VALUES, ParquetForm, Rows
+from designer.base.parquet_entry import MOST_VALUES, ParquetCodec, Rows
 
 PAIR = pa.struct([("kind", pa.string()), ("values", pa.list_(pa.float64()))])
 SCHEMA = pa.schema(
@@ -21,7 +21,7 @@ SCHEMA = pa.schema(
         ("pairs", pa.list_(PAIR)),
     ]
 )
-FORM = ParquetForm(SCHEMA, most=1000)
+FORM = ParquetCodec(SCHEMA, most=1000)
 ROW: dict[str, Any] = {"sample": 1, "reason": "why", "good": True, "values": [], "pairs": []}
 
 
@@ -119,4 +119,4 @@ def test_encodings_that_swell_are_refused() -> None:
     encoding = {"reason": "DELTA_BYTE_ARRAY"}
     pq.write_table(table, out, use_dictionary=False, column_encoding=encoding)
     with pytest.raises(ValueError, match="another encoding"):
-        ParquetForm(table.schema).decode(out.getvalue().to_pybytes())
+        ParquetCodec(table.schema).decode(out.getvalue().to_pybytes())

@@ -1,4 +1,5 @@
-"""The benchmark of the exact rung runs, on a few boards, and its report says what it measured."""
+"""The benchmark of the exact circuit runs, on a few boards, and its report says what it
+measured."""
 
 from __future__ import annotations
 

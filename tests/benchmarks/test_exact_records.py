@@ -37,7 +37,7 @@ def test_an_output_mostly_in_contact_is_counted_from_its_level_in_the_clearance(
     """The mass rests against stop B: half of the time the output is not at its level."""
     truth, (_, prediction) = drawn(57, 78), preloaded()
     told = {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
-    name = identify_response(recorded_motion(truth.record, prediction, told=told), prediction)
+    name = identify_response(recorded_motion(truth.record, prediction, stated=told), prediction)
     assert truth.response == "1-1-0;0-1"
     assert "v1" not in told
     assert truth.response in (name.response, *name.others)

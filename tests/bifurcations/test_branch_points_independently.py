@@ -19,7 +19,7 @@ from tests.bifurcations.test_continuation import PAPER, PLAIN, monodromy
 from tests.bifurcations.test_points import tip
 from tests.shared.oracles import integrate
 
-TOUCHES = [
+GRAZINGS = [
     # an attractor at ω; its branch from, to; a grazing point; the grazing is a contact that is lost
     # as ω rises (1), or two contacts that become one (-1)
     (0.215, 0.2135, 0.2195, 0.2184843842, -1),  # 1-8-8 → 1-7-7
@@ -53,7 +53,7 @@ def point(where: Branch, kind: PointKind, near: float) -> Bifurcation:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("omega", "low", "high", "near", "lost"), TOUCHES)
+@pytest.mark.parametrize(("omega", "low", "high", "near", "lost"), GRAZINGS)
 def test_last_impact_shrinks_to_nothing_at_a_grazing_point(
     omega: float, low: float, high: float, near: float, lost: int
 ) -> None:

@@ -213,14 +213,14 @@ def test_both_sides_of_the_corner_in_which_a_pitchfork_meets_a_grazing() -> None
     points = [end.point for end in (stable.low, stable.high) if end.point is not None]
     within = PlaneWindow((0.2105, 0.2205), (0.235, 0.255))
     plan = CurvePlan(ModelSubject(PAPER), "omega", "b", 0.25, within)
-    grazing, touching, clear = run(plan, points)
+    grazing, grazed, clear = run(plan, points)
     (met,) = grazing.codimension_two
-    assert (touching.response, clear.response) == ("1-8-8", "1-7-7")
-    assert touching.ends == clear.ends == ("grazing meets pitchfork", "edge of b")
-    assert touching.points[0] == pytest.approx(met.values, abs=1e-9)
+    assert (grazed.response, clear.response) == ("1-8-8", "1-7-7")
+    assert grazed.ends == clear.ends == ("grazing meets pitchfork", "edge of b")
+    assert grazed.points[0] == pytest.approx(met.values, abs=1e-9)
     assert clear.points[0] == pytest.approx(met.values, abs=1e-9)
-    assert touching.points[1][1] > met.values[1] > clear.points[1][1]
-    assert (touching.begun_at, clear.begun_at) == (None, CurveOrigin(1, met.name, met.values))
+    assert grazed.points[1][1] > met.values[1] > clear.points[1][1]
+    assert (grazed.begun_at, clear.begun_at) == (None, CurveOrigin(1, met.name, met.values))
     assert met.curve == 3
 
 

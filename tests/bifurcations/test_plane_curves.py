@@ -25,10 +25,10 @@ from designer.bifurcations.conditions import (
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.extended_system import CurvePoint
 from designer.bifurcations.flow_family import Family, FlowPlane
+from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.orbit_curve import map_image
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import PointKind, locate
-from designer.bifurcations.touch import StopTouch
 from designer.bifurcations.windows import window
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -122,7 +122,7 @@ def test_slopes_of_a_condition_are_those_of_its_differences(kind: PointKind) -> 
     if kind is PointKind.TORUS:
         condition = MultiplierPair.at(jacobian(x))
     if kind is PointKind.GRAZING:
-        condition, extra = Grazing(StopTouch(0, 1, True), 1, 0.5), np.array([0.31])
+        condition, extra = Grazing(GrazingContact(0, 1, True), 1, 0.5), np.array([0.31])
     slopes = condition.slopes(flow, x, extra, MapSlopes(scale, jacobian(x), change))
     assert slopes is not None
     steps = np.diag(np.concatenate([scale, np.ones(len(extra))])) * 1e-5
@@ -233,8 +233,8 @@ def test_grazing_meets_pitchfork_by_an_independent_solve() -> None:
     """The orbit, the tip's height and rate, and det(1 + H), all by another integrator."""
     (met,) = curve(PointKind.GRAZING, 0.76644).codimension_two
     z = met.point.z
-    touch = met.point.condition.touch  # type: ignore[attr-defined]
-    tip, side = float(z[4]) % 1.0, touch.side
+    contact = met.point.condition.contact  # type: ignore[attr-defined]
+    tip, side = float(z[4]) % 1.0, contact.side
     if tip > 0.5:
         tip, side = tip - 0.5, -side
 
@@ -265,9 +265,9 @@ def test_pitchfork_that_hugs_a_grazing_ends_where_both_meet_by_another_integrato
     omega, b = followed.points[0].values
     x, flow = followed.points[0].z[:4], plane.build(omega, b)
     (dip, phase), *_ = grazings(flow, x, 1, symmetric=True)
-    assert not dip.touch.tip
-    assert dip.touch.side == 1
-    image, H, at = half_period(omega, b, x, phase, dip.touch.side)
+    assert not dip.contact.tip
+    assert dip.contact.side == 1
+    image, H, at = half_period(omega, b, x, phase, dip.contact.side)
     assert image == pytest.approx(x, abs=1e-8)
     assert at == pytest.approx([b, 0.0], abs=1e-8)
     assert abs(np.linalg.det(np.eye(4) + H)) < 1e-6

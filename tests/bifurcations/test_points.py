@@ -59,8 +59,8 @@ def test_grazing_of_the_linear_response_is_where_its_amplitude_is_the_clearance(
     over = swept_model.of_model(PAPER, 1.0, "omega")
     free = start(over, linear_orbit(exact + 0.1), exact + 0.1, symmetric=True)
     branch = trace(free, exact - 0.05, exact + 0.2)
-    touching = next(p for p in branch.points if p.response == "1-1-1" and p.value < exact)
-    back = trace(start(over, touching.orbit, touching.value), exact - 0.05, exact + 0.05)
+    grazed = next(p for p in branch.points if p.response == "1-1-1" and p.value < exact)
+    back = trace(start(over, grazed.orbit, grazed.value), exact - 0.05, exact + 0.05)
     for one in (branch, back):
         found = [p for p in locate(one) if p.kind is PointKind.GRAZING]
         assert len(found) == 1

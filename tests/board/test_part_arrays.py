@@ -21,7 +21,7 @@ from designer.board.bom import bill, bill_csv
 from designer.board.component import components, to_buy
 from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.read import read_catalog_file
-from designer.centering.cure_upgrade import price
+from designer.centering.repair_upgrade import price
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_grades import arrays, bought

@@ -55,7 +55,7 @@ GOOD = '{ file = "part.lib", subckt = "PART", pins = ["inp", "inn", "vcc", "vee"
 ORDER = ("inp", "inn", "vcc", "vee", "out")
 
 
-def test_a_vendor_model_takes_the_place_of_ours_on_the_finest_rung(tmp_path: Path) -> None:
+def test_a_vendor_model_takes_the_place_of_ours_on_the_finest_fidelity(tmp_path: Path) -> None:
     """Its gain, bandwidth, limits and supply current are measured, not the catalogue's."""
     save(tmp_path)
     (tmp_path / "own.toml").write_text(entry(GOOD), encoding="utf-8")

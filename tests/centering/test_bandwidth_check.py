@@ -10,8 +10,8 @@ import pytest
 
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.bandwidth_check import LaggingBoards
-from designer.centering.distance import STREAM
-from designer.centering.ngspice_check import LISTENED, STRETCH, Agreement
+from designer.centering.ngspice_check import BOARDS_ASKED, STRETCH, Agreement
+from designer.centering.scaled_sigma import STREAM
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -23,14 +23,14 @@ from tests.shared.search_cases import made, spread
 
 
 def test_boards_settle_from_their_own_orbit_each_as_its_reduction_does() -> None:
-    boards, stand = bench()
+    boards, operating_orbit = bench()
     drawn = draw_many(made().design.circuit, spread(), 1, range(2), STREAM)
     wider = between(drawn, np.full(2, STRETCH))
-    lagging = boards.lagging(stand, range(2), STRETCH)
-    own = boards.subjects(stand, range(2), STRETCH)
+    lagging = boards.lagging(operating_orbit, range(2), STRETCH)
+    own = boards.subjects(operating_orbit, range(2), STRETCH)
     for i, (orbit, subject) in enumerate(zip(lagging, own, strict=True)):
         alone = Reduction(made().design.circuit, wider.board(i), bandwidth=True)
-        flow = Flow(alone.system(), stand.drive)
+        flow = Flow(alone.system(), operating_orbit.drive)
         want = settle(flow, alone.state(subject.orbit.start))
         assert orbit.response == want.response == "1-2-2"
         np.testing.assert_allclose(orbit.start, want.start, rtol=0.0, atol=1e-9)
@@ -39,8 +39,8 @@ def test_boards_settle_from_their_own_orbit_each_as_its_reduction_does() -> None
 
 def test_answers_are_counted_and_remembered() -> None:
     """Lost and open boards are told apart; what is known is not asked again."""
-    boards, stand = bench()
-    good = stand.orbit
+    boards, operating_orbit = bench()
+    good = operating_orbit.orbit
     shown = [good] * 12 + [
         Orbit(OrbitStatus.APERIODIC),
         Orbit(OrbitStatus.GRAZING),
@@ -56,11 +56,13 @@ def test_answers_are_counted_and_remembered() -> None:
     played = SimpleNamespace(lagging=lagging, query=boards.query)
     asks = LaggingBoards(AnswerCache())
     for _ in range(2):
-        assert asks(played, [stand, None]) == (Agreement(16, 12, 3), Agreement(0, 0))  # type: ignore[arg-type]
-    assert calls == [(stand, range(LISTENED), STRETCH)]
+        assert asks(played, [operating_orbit, None]) == (Agreement(16, 12, 3), Agreement(0, 0))  # type: ignore[arg-type]
+    assert calls == [(operating_orbit, range(BOARDS_ASKED), STRETCH)]
 
 
 @pytest.mark.slow
 def test_every_board_of_a_good_design_keeps_its_response() -> None:
-    boards, stand = bench()
-    assert LaggingBoards(AnswerCache())(boards, [stand]) == (Agreement(LISTENED, LISTENED),)
+    boards, operating_orbit = bench()
+    assert LaggingBoards(AnswerCache())(boards, [operating_orbit]) == (
+        Agreement(BOARDS_ASKED, BOARDS_ASKED),
+    )

@@ -12,13 +12,13 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.centering import levers
 from designer.centering.bandwidth_check import BANDWIDTH
-from designer.centering.candidate import ALIKE, GAIN, Candidate, RungOutcome, better
+from designer.centering.candidate import ALIKE, GAIN, Candidate, FidelityOutcome, better
 from designer.centering.design_search import BOARDS, look, search
-from designer.centering.distance import OperatingOrbit, ScaledBoards
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
-from designer.centering.ngspice_check import RUNG, Agreement
+from designer.centering.ngspice_check import FIDELITY, Agreement
 from designer.centering.operating_points import Scored, score
 from designer.centering.response_windows import OperatingPoint, Stretch
+from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.model import find_responses
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.response_table import Response
@@ -194,20 +194,20 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     wanted = parse_model_file(LOW_BAND)
 
-    def checks_of(limit: float) -> list[RungOutcome]:
-        def listen(
+    def checks_of(limit: float) -> list[FidelityOutcome]:
+        def ask_agreement(
             bench: ScaledBoards,
-            stands: Sequence[OperatingOrbit | None],
+            operating_orbits: Sequence[OperatingOrbit | None],
             progress: Callable[[], None],
         ) -> tuple[Agreement, ...]:
             fast = bench.design.errors.scales.frequency(1.0) > limit
-            assert all(s is not None for s in stands)
-            return (Agreement(16, 8 if fast else 15),) * len(stands)
+            assert all(s is not None for s in operating_orbits)
+            return (Agreement(16, 8 if fast else 15),) * len(operating_orbits)
 
-        found = search(wanted, catalog(), listen=listen)
-        lagging = [h for h in found.checks if h.rung == BANDWIDTH]
-        checks = [h for h in found.checks if h.rung == RUNG]
-        assert all(h.stands for h in lagging)
+        found = search(wanted, catalog(), ask_agreement=ask_agreement)
+        lagging = [h for h in found.checks if h.fidelity == BANDWIDTH]
+        checks = [h for h in found.checks if h.fidelity == FIDELITY]
+        assert all(h.holds for h in lagging)
         assert [h.frequency for h in lagging] == [h.frequency for h in checks]
         (kept,) = [h for h in checks if h.adopted]
         assert found.synthesis.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
@@ -231,16 +231,18 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     """ngspice bears the slower one out, but few of its boards show the response at all."""
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
 
-    def listen(
-        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], progress: Callable[[], None]
+    def ask_agreement(
+        bench: ScaledBoards,
+        operating_orbits: Sequence[OperatingOrbit | None],
+        progress: Callable[[], None],
     ) -> tuple[Agreement, ...]:
         first = bench.design.errors.scales.frequency(1.0) == pytest.approx(fastest[0])
-        return (Agreement(16, 13) if first else Agreement(10, 10),) * len(stands)
+        return (Agreement(16, 13) if first else Agreement(10, 10),) * len(operating_orbits)
 
     wanted = file(PLACE)
     fastest = [search(wanted, catalog()).synthesis.design.errors.scales.frequency(1.0)]
-    found = search(wanted, catalog(), listen=listen)
-    assert [h.adopted for h in found.checks if h.rung == RUNG] == [True, False]
+    found = search(wanted, catalog(), ask_agreement=ask_agreement)
+    assert [h.adopted for h in found.checks if h.fidelity == FIDELITY] == [True, False]
 
 
 @pytest.mark.parametrize("bears_out", [True, False])
@@ -251,26 +253,28 @@ def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     heard: list[float] = []
 
-    def listen(
-        bench: ScaledBoards, stands: Sequence[OperatingOrbit | None], _: object
+    def ask_agreement(
+        bench: ScaledBoards, operating_orbits: Sequence[OperatingOrbit | None], _: object
     ) -> Agreements:
         heard.append(bench.design.errors.scales.frequency(1.0))
-        return (Agreement(16, 16),) * len(stands)
+        return (Agreement(16, 16),) * len(operating_orbits)
 
     played = itertools.chain([8, 8], itertools.repeat(15 if bears_out else 8))
 
     def lagging(_: object) -> Callable[..., Agreements]:
-        return lambda bench, stands, progress: (Agreement(16, next(played)),) * len(stands)
+        return lambda bench, operating_orbits, progress: (
+            (Agreement(16, next(played)),) * len(operating_orbits)
+        )
 
     monkeypatch.setattr("designer.centering.design_search.LaggingBoards", lagging)
-    found = search(parse_model_file(LOW_BAND), catalog(), listen=listen)
-    answers = [h.adopted for h in found.checks if h.rung == BANDWIDTH]
+    found = search(parse_model_file(LOW_BAND), catalog(), ask_agreement=ask_agreement)
+    answers = [h.adopted for h in found.checks if h.fidelity == BANDWIDTH]
     if bears_out:
         assert answers == [False, False, True]
     else:  # the first of the best
         assert answers == [True] + [False] * (len(answers) - 1)
         assert len(answers) > 2
-    assert heard == [h.frequency for h in found.checks if h.rung == RUNG and h.adopted]
+    assert heard == [h.frequency for h in found.checks if h.fidelity == FIDELITY and h.adopted]
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:

@@ -25,7 +25,7 @@ from designer.centering.limiting_parts import (
 from designer.check import checked_design
 from designer.spread.board_quantities import Quantity, quantities
 from designer.spread.spread import Group
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.yields.margins import Limit, Margin
 from designer.yields.study import plan_study
 from tests.shared import bench_plans, paper_cases
@@ -141,7 +141,7 @@ def test_on_a_design_the_shares_add_up() -> None:
     synthesis = made()
     checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
     plan = plan_study(synthesis.modelfile, synthesis.design, checked, catalog(), samples=40, seed=2)
-    (found,) = limitings(plan, exact_rung.block(plan, range(40), 1))
+    (found,) = limitings(plan, exact_circuit.block(plan, range(40), 1))
     assert found.distance > 0.0
     assert sum(found.shares.values()) == pytest.approx(1.0)
     assert found.shares[COEFFICIENTS] > found.shares[OFFSET]

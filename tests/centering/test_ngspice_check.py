@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import STREAM, OperatingOrbit, ScaledBoards
 from designer.centering.ngspice_check import (
+    BOARDS_ASKED,
     FEWER,
     LEAST,
-    LISTENED,
     LONGEST,
     STRETCH,
     Agreement,
     AgreementCheck,
 )
 from designer.centering.response_windows import OperatingPoint
+from designer.centering.scaled_sigma import STREAM, OperatingOrbit, ScaledBoards
 from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool
@@ -33,12 +33,12 @@ from tests.shared.search_cases import made, spread
 
 
 def bench(memory: AnswerCache | None = None) -> tuple[ScaledBoards, OperatingOrbit]:
-    found = ScaledBoards(made().design, spread(), 1, LISTENED, memory=memory)
+    found = ScaledBoards(made().design, spread(), 1, BOARDS_ASKED, memory=memory)
     (response,) = made().model_responses
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
-    (stand,) = found.stands([(response.spec, place)])
-    assert stand is not None
-    return found, stand
+    (operating_orbit,) = found.operating_orbits([(response.spec, place)])
+    assert operating_orbit is not None
+    return found, operating_orbit
 
 
 @pytest.mark.parametrize(
@@ -88,14 +88,14 @@ def test_what_ngspice_says_is_counted(
     """ngspice is played: these answers."""
 
     def run_queries(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
-        assert all(q.subject.rung == "dynamic" for q in queries)
+        assert all(q.subject.fidelity == "dynamic" for q in queries)
         assert {q.expected for q in queries} == {"1-2-2"}
         return [
             NgspiceAnswer(UNDECIDED, either=a) if OR in a else NgspiceAnswer(a) for a in answers
         ]
 
-    boards, stand = bench()
-    wanted = replace(stand, spec=replace(stand.spec, **spec))
+    boards, operating_orbit = bench()
+    wanted = replace(operating_orbit, spec=replace(operating_orbit.spec, **spec))
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
@@ -104,12 +104,12 @@ def test_what_ngspice_says_is_counted(
 
 
 def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    boards, stand = bench()
+    boards, operating_orbit = bench()
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=False)]
     )
-    (found,) = AgreementCheck(None, AnswerCache())(boards, [stand])  # type: ignore[arg-type]
-    assert found == Agreement(LISTENED, 0, LISTENED)
+    (found,) = AgreementCheck(None, AnswerCache())(boards, [operating_orbit])  # type: ignore[arg-type]
+    assert found == Agreement(BOARDS_ASKED, 0, BOARDS_ASKED)
     assert found.borne_out is None
 
 
@@ -119,7 +119,7 @@ def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     def run_queries(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
         return [NgspiceAnswer("1-2-2")] * len(queries)
 
-    boards, stand = bench()
+    boards, operating_orbit = bench()
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
@@ -130,35 +130,35 @@ def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         ways = iter([LONGEST] * near + [LONGEST + 1] * (16 - near))
         monkeypatch.setattr(
-            "designer.centering.ngspice_check.way_to_rung", lambda _, ways=ways: next(ways)
+            "designer.centering.ngspice_check.way_to_fidelity", lambda _, ways=ways: next(ways)
         )
-        assert AgreementCheck(None, AnswerCache())(boards, [stand]) == (found,)  # type: ignore[arg-type]
+        assert AgreementCheck(None, AnswerCache())(boards, [operating_orbit]) == (found,)  # type: ignore[arg-type]
 
 
 def test_the_boards_are_those_of_the_prediction() -> None:
-    boards, stand = bench()
+    boards, operating_orbit = bench()
     drawn = draw_many(made().design.circuit, spread(), 1, range(3), STREAM)
     wider = between(drawn, np.full(3, STRETCH))
-    subjects = boards.subjects(stand, range(3), STRETCH)
+    subjects = boards.subjects(operating_orbit, range(3), STRETCH)
     assert len(subjects) == 3
     for i, subject in enumerate(subjects):
         mine = Reduction(made().design.circuit, wider.board(i)).system()
         assert np.allclose(subject.system.start, mine.start, rtol=0.0, atol=1e-12)
         assert subject.board.values == wider.board(i).values
         assert subject.orbit.response == "1-2-2"
-        assert subject.excitation == boards.excitation(stand.place)
-    assert boards.nominal(stand).board.values != subjects[0].board.values
+        assert subject.excitation == boards.excitation(operating_orbit.place)
+    assert boards.nominal(operating_orbit).board.values != subjects[0].board.values
 
 
 @pytest.mark.slow
 def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     memory = AnswerCache(tmp_path / "said.jsonl", "mine")
-    boards, stand = bench()
+    boards, operating_orbit = bench()
     calls: list[int] = []
     with SpicePool(2) as pool:
-        (heard,) = AgreementCheck(pool, memory)(boards, [stand], lambda: calls.append(1))
+        (heard,) = AgreementCheck(pool, memory)(boards, [operating_orbit], lambda: calls.append(1))
         nothing = AgreementCheck(pool, memory)(boards, [None])
-    assert heard == Agreement(LISTENED, LISTENED)
+    assert heard == Agreement(BOARDS_ASKED, BOARDS_ASKED)
     assert calls == [1]
     assert nothing == (Agreement(0, 0),)
 
@@ -169,4 +169,4 @@ def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("designer.centering.ngspice_check.numerics_gate.check", never)
     known = AnswerCache(tmp_path / "said.jsonl", "mine")
     with SpicePool(1) as pool:
-        assert AgreementCheck(pool, known)(boards, [stand]) == (heard,)
+        assert AgreementCheck(pool, known)(boards, [operating_orbit]) == (heard,)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from designer.centering.distance import LADDER, ScaledBoards
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.response_windows import OperatingPoint, stretches
+from designer.centering.scaled_sigma import LADDER, ScaledBoards
 from designer.dynamics.counts import Counts
 from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec
@@ -36,10 +36,10 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
         for start in [min(stretch.places, key=lambda p: abs(p.omega - omega))]
     ]
     dense = score(bench, SPEC, grid, MANY, LADDER[1:])
-    top = max(s.distance for s in dense)
+    top = max(s.reliability_index for s in dense)
     # The grid has 48 places; a pattern of finite steps may stay a little below its best one.
-    assert best.distance >= 0.95 * top
-    assert sum(s.stand is not None for s in dense) > 20
+    assert best.reliability_index >= 0.95 * top
+    assert sum(s.operating_orbit is not None for s in dense) > 20
 
 
 def test_what_is_fixed_stays_fixed() -> None:

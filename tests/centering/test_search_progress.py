@@ -56,7 +56,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Heard:
         number[0] += 1
         heard.now += MINUTE
         heard.beat()
-        scored: Any = SimpleNamespace(distance=3.0 if number[0] == 3 else 1.0)
+        scored: Any = SimpleNamespace(reliability_index=3.0 if number[0] == 3 else 1.0)
         return Candidate(choice, made().design, responses, (scored,))
 
     monkeypatch.setattr(design_search._DesignSearch, "_made", make)

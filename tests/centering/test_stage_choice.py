@@ -20,7 +20,7 @@ from designer.dynamics.counts import Counts
 from designer.model import find_responses
 from designer.model.model_file import parse_model_file
 from designer.verbs.simulate import simulate
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Verdict
 from designer.yields.study import plan_study
 from tests.shared.system_text import clearance, system_text, table
@@ -66,7 +66,7 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
         assert not stage_choice.better_stage(modelfile, other)  # none is stated there
         checked = checked_design.check(other.design, other.model_responses, None)
         plan = plan_study(stated, other.design, checked, CATALOG, samples=40, seed=11)
-        answers = exact_rung.block(plan, range(40), 2)
+        answers = exact_circuit.block(plan, range(40), 2)
         kept[kind] = sum(answer.verdict is Verdict.OK for answer in answers)
     assert kept["rectifier"] > kept["saturation"]
 

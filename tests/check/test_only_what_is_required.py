@@ -28,7 +28,7 @@ from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings, write
 from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import Spread
-from designer.verdicts.exact_rung import block
+from designer.verdicts.exact_circuit import block
 from designer.verdicts.verdict import Question, StudyPlan
 from tests.shared.stages import one_sided, rectifier, stage
 

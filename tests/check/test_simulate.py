@@ -197,10 +197,10 @@ def test_pictures(tmp_path: Path, capfd: Captured) -> None:
     arguments = ["simulate", model, "--omega", "1.43", "--omega", "0.85", "--plots", str(out)]
     files = _answer(arguments, capfd)["files"]
     wanted = {
-        f"omega-{w}-{kind}.{form}"
+        f"omega-{w}-{kind}.{file_format}"
         for w in ("1.43", "0.85")
         for kind in ("phase", "time", "section", "spectrum")
-        for form in ("png", "svg")
+        for file_format in ("png", "svg")
     } | {f"omega-{w}-{k}.csv" for w in ("1.43", "0.85") for k in ("section", "spectrum")}
     assert set(files) == wanted == {p.name for p in out.iterdir()}
     for path in out.glob("*.png"):

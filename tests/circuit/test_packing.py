@@ -22,7 +22,7 @@ from designer.folders.design_source import read_design
 from designer.model.board_table import BoardChoice
 from designer.spice import deck
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT
@@ -183,8 +183,8 @@ def test_a_board_has_whole_packages(opamp: str, spare: int) -> None:
         assert len([c for c in found if c.near == package.reference]) == 2
 
 
-@pytest.mark.parametrize("rung", ["ideal", "dynamic"])
-def test_the_deck_of_duals_runs_as_that_of_quads(rung: Rung) -> None:
+@pytest.mark.parametrize("fidelity", ["ideal", "dynamic"])
+def test_the_deck_of_duals_runs_as_that_of_quads(fidelity: Fidelity) -> None:
     """ngspice itself: the same waves, whatever the sections are called."""
     waves = []
     for opamp in ("TL074C", "TL072C", "TL071C"):
@@ -192,7 +192,7 @@ def test_the_deck_of_duals_runs_as_that_of_quads(rung: Rung) -> None:
         text = deck.write(
             circuit, nominal_board(circuit), Excitation(400.0, 1.0),
             SolverSettings("trap", 1.0 / 400.0 / 200.0),
-            title=opamp, stop_time=2.0 / 400.0, rung=rung,
+            title=opamp, stop_time=2.0 / 400.0, fidelity=fidelity,
         )  # fmt: skip
         assert f"\nX{circuit.sections[-1].name} " in text
         waves.append(open_simulator("batch").run(text, circuit.state_nets, 2.0 / 400.0))

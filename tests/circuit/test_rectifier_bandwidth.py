@@ -108,7 +108,7 @@ def test_op_amps_of_finite_bandwidth_in_ngspice_show_the_waveform() -> None:
     flow = Flow(lagging.system(), asked.excitation.drive)
     orbit = settle(flow, lagging.state(asked.orbit.start))
     assert (orbit.response, orbit.symmetric) == ("1-1-1", True)
-    slow = replace(asked, rung="dynamic", start=orbit.start[:4], discard=6)
+    slow = replace(asked, fidelity="dynamic", start=orbit.start[:4], discard=6)
     job = numerics_gate.job(slow, SolverSettings("trap", asked.period / 2000, 1e-6), keep=True)
     found = job.reduce(open_simulator("shared").run(job.netlist, job.signals, job.stop))
     assert found.trace is not None

@@ -339,7 +339,7 @@ def test_a_model_that_was_changed_in_its_folder(
     assert _tree(out) == before
 
 
-def test_rungs_of_op_amps_in_ngspice(
+def test_fidelities_of_op_amps_in_ngspice(
     finished: tuple[Path, subprocess.CompletedProcess[str]], capfd: pytest.CaptureFixture[str]
 ) -> None:
     out, _ = finished

@@ -27,7 +27,7 @@ def test_noise_that_an_earlier_version_did_not_store_is_said_once(
 ) -> None:
     indices = [{"first": 0.1, "total": 0.2, **noise}, {"first": None, "total": None}]
     response = {"blame": {"indices": indices}}
-    tables.blame_status({"blame": {"reason": ""}, "responses": [response, response]})
+    tables.attribution_status({"blame": {"reason": ""}, "responses": [response, response]})
     assert capsys.readouterr().err.count("--blame --resume") == said
 
 

@@ -11,14 +11,21 @@ from typing import Any
 
 import pytest
 
+from designer.fidelity.fidelity_errors import FidelityError, Truth
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.pieces import CHUNK, TradePieces, read_pieces, rungs, rungs_json, tally
-from designer.fidelity.rung_errors import RungError, Truth
+from designer.fidelity.pieces import (
+    CHUNK,
+    TradePieces,
+    fidelities,
+    fidelities_json,
+    read_pieces,
+    tally,
+)
 from designer.fidelity.yields import Tally
 from designer.spice.deck import SolverSettings
 
 LABEL = ResponseLabel(1, 0.85, 0.25, "1-2-2")
-ROW = RungError(
+ROW = FidelityError(
     LABEL, "ideal", "usual", {"reltol": 1e-4}, "1-2-2", "", 0.1, True,
     {"model": True}, {"model": math.nan}, {"model": 1e-3}, 1e-5, math.nan,
 )  # fmt: skip
@@ -26,7 +33,7 @@ TRUTH = Truth(LABEL, "1-2-2", True, 1e-6, 1e-5, {"model": True}, {"model": True}
 SETTINGS = SolverSettings("trap", 1e-6)
 COUNTS = Tally(decided=90, ok=80, lost=2, undecided=10, runs=123, periods=4e4, seconds=1.5)
 PIECES: dict[str, Mapping[str, Any]] = {
-    "rungs 1": rungs_json((ROW,), TRUTH, SETTINGS, 0.5),
+    "rungs 1": fidelities_json((ROW,), TRUTH, SETTINGS, 0.5),
     "boards 1, 0 to 99": asdict(COUNTS),
 }
 
@@ -47,7 +54,7 @@ def written(path: Path, name: str, change: Mapping[str, Any]) -> Path:
 def test_what_was_written_comes_back(tmp_path: Path) -> None:
     notes: list[str] = []
     found = read_pieces(written(tmp_path / "pieces", "", {}), "a", notes.append)
-    rows, truth, settings, seconds = rungs(found["rungs 1"])
+    rows, truth, settings, seconds = fidelities(found["rungs 1"])
     assert [repr(row) for row in rows] == [repr(ROW)]
     assert (truth, settings, seconds) == (TRUTH, SETTINGS, 0.5)
     assert tally(found["boards 1, 0 to 99"]) == COUNTS

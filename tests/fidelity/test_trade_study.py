@@ -1,4 +1,4 @@
-"""What accuracy costs: how rungs are judged, the yield's bound, the verb and its folder."""
+"""What accuracy costs: how fidelities are judged, the yield's bound, the verb and its folder."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.fidelity import pieces, rungs, yields
+from designer.fidelity import fidelity_answers, pieces, yields
 from designer.fidelity.cpu_clock import SpiceClock
+from designer.fidelity.fidelity_answers import FidelityAnswer
+from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, alike, compare, difference
 from designer.fidelity.label import ResponseLabel
-from designer.fidelity.rung_errors import BOARD, EQUATIONS, alike, compare, difference
-from designer.fidelity.rungs import RungAnswer
 from designer.fidelity.trade_files import front, sheet, trade_json
 from designer.fidelity.trade_study import (
     IDEAL,
@@ -51,9 +51,9 @@ from designer.fidelity.trade_study import (
     trade,
 )
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
-from designer.jobs import rung_choice
+from designer.jobs import fidelity_choice
+from designer.jobs.fidelity_choice import choose, with_fidelity
 from designer.jobs.options import Options
-from designer.jobs.rung_choice import choose, with_rung
 from designer.jobs.trade_job import NAMES
 from designer.kernels.kernel_boards import POINTS
 from designer.model.model import SiScales
@@ -91,24 +91,24 @@ def orbit(
 
 
 def said(
-    rung: str, level: str, error: float, seconds: float, kind: Orbit | None = None
-) -> RungAnswer:
+    fidelity: str, level: str, error: float, seconds: float, kind: Orbit | None = None
+) -> FidelityAnswer:
     """An answer whose displacement is off by ``error`` of the peak, RMS, and its velocities too."""
     found = orbit(up=(1.0 + error,), down=(1.0,)) if kind is None else kind
     shown = WAVEFORM + math.sqrt(2.0) * error * np.cos(2.0 * np.pi * 7 * np.arange(POINTS) / POINTS)
-    return RungAnswer(rung, level, {}, found, shown, seconds)
+    return FidelityAnswer(fidelity, level, {}, found, shown, seconds)
 
 
 ONE = ResponseLabel(1, 1.55, 0.25, "1-1-1")
 
 
 def answered(
-    *answers: RungAnswer, label: ResponseLabel = ONE, boards: BoardTrade | LeftOut | None = None
+    *answers: FidelityAnswer, label: ResponseLabel = ONE, boards: BoardTrade | LeftOut | None = None
 ) -> TradedResponse:
     return TradedResponse(*compare(label, answers), boards)
 
 
-def judged(*answers: RungAnswer, boards: BoardTrade | LeftOut | None = None) -> Trade:
+def judged(*answers: FidelityAnswer, boards: BoardTrade | LeftOut | None = None) -> Trade:
     return trade([answered(*answers, boards=boards)])
 
 
@@ -151,7 +151,7 @@ def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
     assert math.isnan(own.measured), "nothing measures itself"
 
 
-def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
+def test_where_no_fidelity_keeps_the_bound_the_nearest_is_named() -> None:
     """Not the truth itself, which is nearest to itself always."""
     found = judged(
         said("model", "exact", 0.02, 1e-6),
@@ -180,7 +180,7 @@ def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
     assert not picked(doubted, WAVE).shown
 
 
-def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
+def test_a_fidelity_whose_time_is_not_known_is_not_the_cheapest() -> None:
     untimed = said("rk4", "Δt = 0.01", 0.0, math.nan)
     found = judged(untimed, *LADDER[1:])
     assert picked(found, RESPONSE).rung == "model"
@@ -218,7 +218,7 @@ def test_of_a_motion_without_a_period_only_the_n_p_q_is_asked() -> None:
     assert math.isnan(difference(chaos[0].orbit, chaos[1].orbit))
 
 
-def test_a_rung_with_another_response_keeps_no_bound() -> None:
+def test_a_fidelity_with_another_response_keeps_no_bound() -> None:
     wrong = said("circuit", "exact", 0.0, 1e-6, orbit(1, 2, (1.0,), (1.0, 1.0)))
     found = judged(said("model", "exact", 0.02, 1e-5), wrong, *LADDER[4:])
     assert picked(found, RESPONSE).rung == "model"
@@ -271,7 +271,7 @@ def test_a_setting_that_did_not_pass_the_gate_is_never_named() -> None:
     lucky = replace(said("ideal", "step ×4", 0.0004, 1e-9), gate=False)
     named = judged(lucky, *LADDER)
     assert {c.level for c in named.cheapest if c.rung == "ideal"} == set()
-    alone = judged(lucky, *(a for a in LADDER if a.rung != "full"), *LADDER[-2:])
+    alone = judged(lucky, *(a for a in LADDER if a.fidelity != "full"), *LADDER[-2:])
     assert picked(alone, WAVE).rung != "ideal"
     passed = judged(replace(lucky, gate=True), *LADDER)
     assert picked(passed, WAVE).level == "step ×4"
@@ -296,26 +296,26 @@ def test_where_nothing_strikes_no_impact_velocity_is_asked() -> None:
     assert (both.rung, both.shown, both.note) == ("circuit", True, "without response 2: no impacts")
 
 
-@pytest.mark.parametrize("rung", ["dynamic", "full"])
-def test_the_gate_of_a_setting_asks_two_steps_and_two_methods(rung: str) -> None:
+@pytest.mark.parametrize("fidelity", ["dynamic", "full"])
+def test_the_gate_of_a_setting_asks_two_steps_and_two_methods(fidelity: str) -> None:
     def run(kind: Orbit, off: float = 0.0) -> Any:
         return Read(kind, np.full((9, 4), 1.0 + off), None)
 
     found = replace(orbit(), extremes=np.array([[-1.0, 2.0]] * 4))
-    subject: Any = SimpleNamespace(rung=rung, orbit=found)
+    subject: Any = SimpleNamespace(fidelity=fidelity, orbit=found)
     near, far = run(found, 1.9 * BOUND), run(found, 2.1 * BOUND)  # over a peak of 2
     same, other = run(found), run(replace(found, p=2))
-    assert rungs.passes(subject, same, (near, same))
-    assert rungs.passes(subject, other, (other, other))  # the rung's own n-p-q
+    assert fidelity_answers.passes(subject, same, (near, same))
+    assert fidelity_answers.passes(subject, other, (other, other))  # the fidelity's own n-p-q
     for odd in (far, other, SimulationFailed("a reason")):
-        assert not rungs.passes(subject, odd, (same, same))
-        assert not rungs.passes(subject, same, (odd, same))
-        assert not rungs.passes(subject, same, (same, odd))
+        assert not fidelity_answers.passes(subject, odd, (same, same))
+        assert not fidelity_answers.passes(subject, same, (odd, same))
+        assert not fidelity_answers.passes(subject, same, (same, odd))
     unknown = run(Orbit(OrbitStatus.NOT_SETTLED))
-    assert not rungs.passes(subject, unknown, (unknown, unknown))
-    ideal: Any = SimpleNamespace(rung="ideal", orbit=found)
-    assert not rungs.passes(ideal, other, (other, other))
-    half, gear = rungs.companions(SolverSettings("trap", 2e-6, 1e-5))
+    assert not fidelity_answers.passes(subject, unknown, (unknown, unknown))
+    ideal: Any = SimpleNamespace(fidelity="ideal", orbit=found)
+    assert not fidelity_answers.passes(ideal, other, (other, other))
+    half, gear = fidelity_answers.companions(SolverSettings("trap", 2e-6, 1e-5))
     assert (half.method, half.max_step, half.reltol) == ("trap", 1e-6, 1e-5)
     assert (gear.method, gear.max_step, gear.reltol) == ("gear", 1e-6, 1e-5)
 
@@ -326,8 +326,8 @@ def test_a_setting_passes_where_the_gate_of_a_study_passes_it() -> None:
     design = synthesised()
     response = next(r for r in design.model_responses if r.omega == 0.284)
     with SpicePool(2, timeout=900.0) as pool, SpicePool(1, timeout=900.0) as timed:
-        (word,) = numerics_gate.check(pool, [rungs.subject(design, response)])
-        found = rungs.measured(
+        (word,) = numerics_gate.check(pool, [fidelity_answers.subject(design, response)])
+        found = fidelity_answers.measured(
             design,
             response,
             pool,
@@ -335,7 +335,7 @@ def test_a_setting_passes_where_the_gate_of_a_study_passes_it() -> None:
             levels=((1.0, RELTOL), (0.5, RELTOL), (0.25, RELTOL)),
             rounds_=1,
         )
-    ideal = [a for a in found.answers if a.rung == "ideal"]
+    ideal = [a for a in found.answers if a.fidelity == "ideal"]
     assert word.tried == tuple(a.settings["steps_a_period"] for a in ideal)
     assert [a.gate for a in ideal] == [False, False, word.passed] == [False, False, True]
     assert found.settings == word.settings
@@ -376,10 +376,10 @@ def test_boards_counted_in_pieces_are_the_boards(counts: list[int], cut: int) ->
 def test_pieces_come_back_as_they_were() -> None:
     rows, truth = compare(ONE, [replace(LADDER[0], seconds=math.nan), *LADDER[1:]])
     settings = SolverSettings("trap", 1.0 / 3.0, 1e-5)
-    said = json.loads(dumps(pieces.rungs_json(rows, truth, settings, 0.1)))
-    back = pieces.rungs(said)
+    said = json.loads(dumps(pieces.fidelities_json(rows, truth, settings, 0.1)))
+    back = pieces.fidelities(said)
     assert repr(back) == repr((rows, truth, settings, 0.1))  # nan is not nan
-    lost = pieces.rungs(json.loads(dumps(pieces.rungs_json((), truth, None, math.nan))))
+    lost = pieces.fidelities(json.loads(dumps(pieces.fidelities_json((), truth, None, math.nan))))
     assert lost[2] is None
     assert math.isnan(lost[3])
 
@@ -582,22 +582,22 @@ def test_with_a_vendor_s_model_full_is_still_the_data_sheet_s() -> None:
     run = replace(orbit(), start=np.zeros(4))
     reduction = Reduction(plain, nominal_board(plain))
     one = numerics_gate.GateSubject(reduction, Excitation(400.0, 1.0), run)
-    assert set(rungs.in_ngspice(one, "full")) == {"ideal", "dynamic", "full"}
+    assert set(fidelity_answers.in_ngspice(one, "full")) == {"ideal", "dynamic", "full"}
     lines = (".subckt own inp inn out vcc vee", "E42 out 0 inp inn 1e5", ".ends own")
     vendor = VendorModel("part.lib", "own", PINS, lines, b"")
     circuit = replace(plain, figures=replace(figures, spice=vendor))
     asked = replace(one, reduction=Reduction(circuit, nominal_board(circuit)))
-    on = rungs.in_ngspice(asked, "vendor")
+    on = fidelity_answers.in_ngspice(asked, "vendor")
     settings = SolverSettings("trap", one.period / 200.0)
     decks = {name: numerics_gate.job(of, settings).netlist for name, of in on.items()}
     assert [name for name, deck in decks.items() if "E42" in deck] == ["vendor"]
-    same = replace(one, rung="full", start=on["full"].start)
+    same = replace(one, fidelity="full", start=on["full"].start)
     assert decks["full"] == numerics_gate.job(same, settings).netlist
     assert on["ideal"].start is None, "only op-amps with a bandwidth begin on its orbit"
 
 
 # ---------------------------------------------------------------------------------------------
-# The rung of a study
+# The fidelity of a study
 
 
 def folder_with(path: Path, answer: dict[str, Any] | None) -> Folder:
@@ -609,8 +609,8 @@ def folder_with(path: Path, answer: dict[str, Any] | None) -> Folder:
     return Folder(path)
 
 
-def test_a_study_takes_the_rung_that_was_measured(tmp_path: Path) -> None:
-    assert choose(Folder(tmp_path / "none")) == rung_choice.RungChoice("auto", "")
+def test_a_study_takes_the_fidelity_that_was_measured(tmp_path: Path) -> None:
+    assert choose(Folder(tmp_path / "none")) == fidelity_choice.FidelityChoice("auto", "")
     assert choose(folder_with(tmp_path / "begun", None)).rung == "auto"
     near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     choice = choose(folder_with(tmp_path / "near", near))
@@ -624,12 +624,12 @@ def test_a_study_takes_the_rung_that_was_measured(tmp_path: Path) -> None:
 
 def test_a_response_that_ideal_op_amps_do_not_show_is_named(tmp_path: Path) -> None:
     other = orbit(2, 2, (1.0, 1.0), (1.0, 1.0))
-    answers = [replace(a, orbit=other) if a.rung == "full" else a for a in LADDER]
+    answers = [replace(a, orbit=other) if a.fidelity == "full" else a for a in LADDER]
     choice = choose(folder_with(tmp_path / "d", document(judged(*answers))))
     told = "at ω = 1.55, b = 0.25 the exact circuit is not shown to have the nominal board's n-p-q"
     assert told in choice.reason
     near = of_boards(1000, 0, 0)
-    wrong = [replace(a, orbit=other) if a.rung == "circuit" else a for a in LADDER]
+    wrong = [replace(a, orbit=other) if a.fidelity == "circuit" else a for a in LADDER]
     choice = choose(folder_with(tmp_path / "c", document(judged(*wrong, boards=near))))
     assert told in choice.reason  # though a model that shows it is cheaper still
     off = of_boards(200, 60, 0)
@@ -644,33 +644,33 @@ def test_boards_that_were_left_out_say_why(tmp_path: Path) -> None:
     assert "no boards (ω = 1.55, b = 0.25: the numerics gate did not pass)" in choice.reason
 
 
-@pytest.mark.parametrize("rung", ["exact", "ngspice"])
-def test_what_was_asked_for_stands(tmp_path: Path, rung: Any) -> None:
+@pytest.mark.parametrize("fidelity", ["exact", "ngspice"])
+def test_what_was_asked_for_stands(tmp_path: Path, fidelity: Any) -> None:
     near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     folder = folder_with(tmp_path / "near", near)
-    options = Options(rung=rung)
-    assert with_rung(folder, options, Progress()) is options
+    options = Options(rung=fidelity)
+    assert with_fidelity(folder, options, Progress()) is options
     notes: list[str] = []
 
     class Heard(Progress):
         def note(self, text: str) -> None:
             notes.append(text)
 
-    assert with_rung(folder, Options(), Heard()).rung == "auto"
+    assert with_fidelity(folder, Options(), Heard()).rung == "auto"
     assert len(notes) == 1
-    assert with_rung(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
+    assert with_fidelity(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
     assert len(notes) == 1
 
 
 def test_ngspice_is_asked_about_forty_boards_at_least() -> None:
-    assert rung_choice.LEAST >= 40
+    assert fidelity_choice.LEAST >= 40
     answers: Any = [
         SimpleNamespace(sample=i, question=0, verdict="ok", response="1-1-1", radius=0.1)
         for i in range(200)
     ]
     asks = cross_check.ask_random(answers)
     asked = [a for a in asks if a.kind is cross_check.StartKind.NOMINAL]
-    assert len(asked) >= rung_choice.LEAST
+    assert len(asked) >= fidelity_choice.LEAST
 
 
 def test_a_trade_that_somebody_changed_is_refused(tmp_path: Path) -> None:
@@ -702,9 +702,14 @@ def test_trade_measures_a_design_and_keeps_it(
     answer = json.loads(capfd.readouterr().out)
     assert set(NAMES) <= {p.name for p in out.iterdir()}
     rows = answer["rungs"]
-    assert {row["rung"] for row in rows} == set(rungs.RUNGS) - {rungs.VENDOR}
+    assert {row["rung"] for row in rows} == set(fidelity_answers.FIDELITIES) - {
+        fidelity_answers.VENDOR
+    }
     assert all(row["seconds_per_period"] > 0.0 for row in rows)
-    by = {rung: [r for r in rows if r["rung"] == rung] for rung in ("rk4", "model", "ideal")}
+    by = {
+        fidelity: [r for r in rows if r["rung"] == fidelity]
+        for fidelity in ("rk4", "model", "ideal")
+    }
     assert by["model"][0]["error_of_equations"] is None
     steps = [r["error_of_equations"] for r in by["rk4"]]
     assert steps[-1] < steps[0] / 10.0  # four times eight the steps of a method of order 4
@@ -728,8 +733,8 @@ def test_trade_measures_a_design_and_keeps_it(
 def test_an_interrupted_trade_goes_on_where_it_was(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C after the rungs and the first boards; then neither is done again, and the boards are
-    those of one go."""
+    """Ctrl-C after the fidelities and the first boards; then neither is done again, and the boards
+    are those of one go."""
     model, out = tmp_path / "model.toml", tmp_path / "out"
     model.write_text(MODEL, encoding="utf-8")
     words = ["trade", str(model), "--out", str(out), "--boards", "6", "--jobs", "2", "-q"]
@@ -749,8 +754,9 @@ def test_an_interrupted_trade_goes_on_where_it_was(
     kept = json.loads((out / pieces.PIECES).read_text())["pieces"]
     assert set(kept) == {"rungs 1", "boards 1, 0 to 2"}
     monkeypatch.setattr("designer.fidelity.yields.tally", count)
-    measured = rungs.measured
-    monkeypatch.setattr("designer.fidelity.rungs.measured", None)  # to call it would fail
+    measured = fidelity_answers.measured
+    # To call it would fail.
+    monkeypatch.setattr("designer.fidelity.fidelity_answers.measured", None)
     assert entry.status(words) == 2
     assert "--resume" in capfd.readouterr().err
     # Of a damaged file the pieces that are whole are taken, and the others made again.
@@ -772,7 +778,7 @@ def test_an_interrupted_trade_goes_on_where_it_was(
     assert json.loads((out / "manifest.json").read_text())["complete"]
     assert not (out / pieces.PIECES).exists()
     assert answer["rungs"][-1]["seconds_per_period"] == kept["rungs 1"]["rows"][-1]["seconds"]
-    monkeypatch.setattr("designer.fidelity.rungs.measured", measured)
+    monkeypatch.setattr("designer.fidelity.fidelity_answers.measured", measured)
     monkeypatch.setattr("designer.jobs.trade_job.CHUNK", 100)
     once = ["trade", str(model), "--boards", "6", "--jobs", "2", "-q", "--json"]
     assert entry.status(once) == 0

@@ -18,7 +18,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, parse_json, read_bytes, read_text, reading
 from designer.base.keyed_store import KeyedStore
 from designer.base.manifest import MANIFEST, read_json
-from designer.base.parquet_entry import ParquetForm
+from designer.base.parquet_entry import ParquetCodec
 from designer.base.report_pieces import check_report_folder
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board
@@ -33,7 +33,7 @@ from designer.model.measured_values import read_measured
 from designer.model.model_file import read_model_file
 from tests.catalog.test_catalog import CSV
 from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
-from tests.folders.test_study_cache import BLAME, kept
+from tests.folders.test_study_cache import ATTRIBUTION, kept
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
@@ -67,18 +67,18 @@ def nothing(_name: str, _content: bytes) -> None:
 def parquet(path: Path) -> object:
     """A block without a seal that a manifest vouches for: its bytes reach the library."""
     schema = pa.schema([("sample", pa.int64()), ("reason", pa.string())])
-    store = KeyedStore(path.parent, ParquetForm(schema), vouch=lambda *_: True)
+    store = KeyedStore(path.parent, ParquetCodec(schema), vouch=lambda *_: True)
     return store.read(path.name, {"study": "a"})
 
 
 def parquet_bytes() -> bytes:
     schema = pa.schema([("sample", pa.int64()), ("reason", pa.string())])
     rows = [{"sample": i, "reason": "why" * i} for i in range(20)]
-    return ParquetForm(schema).encode({"study": "a", "rows": 20}, rows)
+    return ParquetCodec(schema).encode({"study": "a", "rows": 20}, rows)
 
 
 def npz_bytes(folder: Path) -> bytes:
-    kept(folder / "it.npz").put("blame", "key", BLAME)
+    kept(folder / "it.npz").put("blame", "key", ATTRIBUTION)
     return (folder / "it.npz").read_bytes()
 
 

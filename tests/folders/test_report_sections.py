@@ -27,9 +27,9 @@ TRADE = json.loads((ROOT / "reports/speed-accuracy/trade.json").read_text("utf-8
 for _row in TRADE["rungs"]:  # of an earlier version
     _row.setdefault("convergence", None)
 YIELD = {"failed": 0, "rate": 0.812, "low": 0.786, "high": 0.835}
-CURED = {"failed": 2, "rate": 0.993, "low": 0.983, "high": 0.997}
-TRIAL = {"price": 1.75, "said": ["0.1 % R1 R7", "op-amp <b>X</b>"], "measured": [CURED]}
-CURE: dict[str, Any] = {
+REPAIRED = {"failed": 2, "rate": 0.993, "low": 0.983, "high": 0.997}
+TRIAL = {"price": 1.75, "said": ["0.1 % R1 R7", "op-amp <b>X</b>"], "measured": [REPAIRED]}
+REPAIR: dict[str, Any] = {
     "format": 1,
     "reached": True,
     "why": "",
@@ -37,7 +37,7 @@ CURE: dict[str, Any] = {
     "price": 1.75,
     "said": TRIAL["said"],
     "responses": [
-        {"omega": 0.85, "expected": "1-2-2", "before": YIELD, "after": CURED, "limit": "R7"}
+        {"omega": 0.85, "expected": "1-2-2", "before": YIELD, "after": REPAIRED, "limit": "R7"}
     ],
     "front": [{"price": 0.0, "said": [], "measured": [YIELD]}, TRIAL],
     "refused": [{"upgrades": ["trimmer fitted"], "why": "no room beside U2"}],
@@ -81,7 +81,7 @@ def test_a_report_of_an_earlier_version_shows_later_answers_too(path: Path) -> N
     page = Page("Old", [], [PageSection("Yields", ["All."], "yields"), scales])
     for name, text in zip(REPORTS, (render_page(page), markdown(page)), strict=True):
         Folder(path).rewrite(name, text)
-    answered(path, "cure", CURE)
+    answered(path, "cure", REPAIR)
     html, text = reports(path)
     assert re.findall(r'<a href="#(\w+)">', html) == ["yields", "cure", "scales"]
     assert re.findall(r'<section id="(\w+)">', html) == ["yields", "cure", "scales"]
@@ -98,7 +98,7 @@ def numbers(text: str) -> set[str]:
 
 def test_every_answer_stands_in_both_files(path: Path) -> None:
     answered(path, "trade", TRADE)
-    answered(path, "cure", CURE)
+    answered(path, "cure", REPAIR)
     answer = json.loads((path / "stored.json").read_text("utf-8"))
     answered(path, "rules", answer)
     html, text = reports(path)
@@ -156,7 +156,7 @@ def _reads(value: Any, keys: set[str], path: str) -> Any:
 def test_what_a_section_reads_is_what_an_answer_has_to_have(verb: str, path: Path) -> None:
     """So that a KeyError is an error: an answer of an earlier version is known before."""
     stored = json.loads((path / "stored.json").read_text("utf-8"))
-    answer = {"cure": CURE, "rules": stored, "trade": TRADE}[verb]
+    answer = {"cure": REPAIR, "rules": stored, "trade": TRADE}[verb]
     keys: set[str] = set()
     for one in (answer, answer | {"reached": False}):
         SECTIONS[verb](_Read(one, keys), SHOWN[cast(StageName, verb)])
@@ -187,12 +187,12 @@ def test_of_an_answer_with_fewer_figures_the_report_says_how_it_is_made_anew(pat
 
 def test_a_second_time_changes_nothing_and_the_manifest_knows_the_report(path: Path) -> None:
     bare = reports(path)
-    answered(path, "cure", CURE)
-    with_cure, manifest = reports(path), (path / "manifest.json").read_bytes()
-    assert bare != with_cure
+    answered(path, "cure", REPAIR)
+    with_repair, manifest = reports(path), (path / "manifest.json").read_bytes()
+    assert bare != with_repair
     assert Folder(path).changed("study") is None
-    answered(path, "cure", CURE)
-    assert reports(path) == with_cure
+    answered(path, "cure", REPAIR)
+    assert reports(path) == with_repair
     assert (path / "manifest.json").read_bytes() == manifest
     (path / "cure.json").write_text("{}", encoding="utf-8")  # damaged: it is told of no more
     renew_report(Folder(path))
@@ -238,7 +238,7 @@ def test_records_of_boards_in_the_folder_are_shown_with_their_pages(path: Path) 
 def test_a_report_that_somebody_changed_stays(path: Path) -> None:
     html, text = path / REPORTS[0], path / REPORTS[1]
     text.write_text("Mine.", encoding="utf-8")
-    answered(path, "cure", CURE)
+    answered(path, "cure", REPAIR)
     assert text.read_text("utf-8") == "Mine."
     assert "The cheapest cure" in html.read_text("utf-8")
 
@@ -248,6 +248,6 @@ def test_without_a_finished_study_the_report_waits(path: Path) -> None:
     assert folder.manifest is not None
     folder.manifest.stages["study"].complete = False
     with folder.working({"cure": ({}, ["cure.json"])}):
-        folder.write("cure.json", dumps(CURE))
+        folder.write("cure.json", dumps(REPAIR))
     renew_report(folder)
     assert reports(path) == before

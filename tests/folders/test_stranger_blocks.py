@@ -14,11 +14,11 @@ from designer.bifurcations.basin_shares import SharePlan
 from designer.bifurcations.border_curve import BorderCurve, CurveMeeting
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.curve_switch import OtherCurve
+from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.sweep import SweepPlan
-from designer.bifurcations.touch import StopTouch
 from designer.dynamics.steady_state import TransientSettings
 from designer.folders.curve_store import CurveBlocks
 from designer.folders.share_store import ShareBlocks
@@ -37,7 +37,7 @@ BOX = np.outer(SUBJECT.scale([{"omega": 1.4}]), [-1.0, 1.0])
 SHARES = SharePlan(SUBJECT, "omega", VALUES, BOX, np.random.default_rng(3).random((3, 5)), seed=3)
 CURVES = CurvePlan(SUBJECT, "omega", "b", 0.25, PlaneWindow((1.3, 1.6), (0.2, 0.3)), depth=0)
 OTHER = OtherCurve(
-    PointKind.GRAZING, 1, True, (1.4, 0.25), (0.1,) * 4, True, StopTouch(0, 1, True), 0.3, 0.25
+    PointKind.GRAZING, 1, True, (1.4, 0.25), (0.1,) * 4, True, GrazingContact(0, 1, True), 0.3, 0.25
 )
 CURVE = BorderCurve(
     "fold", "1-1-1", True, np.array([[1.4, 0.25], [1.41, 0.26]]), (True, False),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,23 +23,26 @@ from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.verdicts.verdict import StudyPlan, Verdict
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import Attribution, NearLimit, ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Crossing, Limit, Prediction
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.bench_plans import question
 
+EARLIER = Path(__file__).parents[1] / "jobs" / "folders" / "0.1.0" / "format-1.zip"
+"""A design folder as version 0.1.0 wrote it."""
+RECORD = r'"record": \["(\w+)"'
 ORBIT = question(1).start
 READ = Read(ORBIT, np.arange(12.0).reshape(3, 4) / 7.0, (np.array([0.1]), np.ones((1, 4))))
 GATE = GateResult(SolverSettings("trap", 1e-6), True, 1e-4 / 3.0, READ, (200, 400))
 CHECK = EquationCheck(
     (EquationFinding("slope", 0.1 / 3.0, 1e-2), EquationFinding("threshold", 0.0, 1.0))
 )
-BLAMED = ResponseBlame(
+ATTRIBUTED = ResponseAttribution(
     0,
     3,
-    (BlamedPart("R1", "resistor", 1, 3, 0, 2),),
+    (PartAttribution("R1", "resistor", 1, 3, 0, 2),),
     (Index("R1", "R1", 0.1, float("nan")),),
     (NearLimit("a fold", 1.0 / 3.0),),
     Prediction(1, 2, 3, 4),
@@ -53,7 +57,7 @@ MAP = YieldMap(
     "grade", 0, (Axis("grade", (0.01, 0.05)),), np.array([True, False]), np.array([3, 0]),
     np.array([1, 4]), np.array([0, 0]), np.array([0, 0]), 4, 9, 0.01, None, (False, False), 8, 0.0,
 )  # fmt: skip
-BLAME = Blame((BLAMED,), 200, 1, 10, 20, 0.0)
+ATTRIBUTION = Attribution((ATTRIBUTED,), 200, 1, 10, 20, 0.0)
 
 
 def kept(path: Path) -> StudyCache:
@@ -81,7 +85,7 @@ def same(a: Any, b: Any) -> bool:
         Orbit(OrbitStatus.CLIPPED),
         (GATE, None),
         CHECK,
-        BLAME,
+        ATTRIBUTION,
         CROSSING,
         ((LIMIT, LIMIT), 12),
         MAP,
@@ -100,19 +104,40 @@ def test_only_its_own_key_opens_an_item(tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
     one = kept(path)
     one.put("gates", "old", (GATE,))
-    one.put("blame", "mine", BLAME)
+    one.put("blame", "mine", ATTRIBUTION)
     assert kept(path).get("gates", "new") is None
     assert kept(path).get("other", "old") is None
     one.put("gates", "new", (GATE, GATE))
     assert kept(path).get("gates", "old") is None
     assert len(kept(path).get("gates", "new") or ()) == 2
-    assert same(kept(path).get("blame", "mine"), BLAME)
+    assert same(kept(path).get("blame", "mine"), ATTRIBUTION)
 
 
-def test_a_blame_without_noise_counts_unless_noise_is_asked_for(
+def test_a_file_names_its_records_as_an_earlier_version_did(tmp_path: Path) -> None:
+    """Some of their classes have had other names since."""
+    with ZipFile(EARLIER) as folder:
+        content = folder.read("kept.npz")
+    path, (key, _) = tmp_path / "kept.npz", items_in(content)["blame"]
+    path.write_bytes(content)
+    kept(path).put("blame", key, kept(path).get("blame", key))
+    before, after = (
+        re.findall(RECORD, json.dumps(items_in(c)["blame"])) for c in (content, path.read_bytes())
+    )
+    assert before == after
+    assert {"Blame", "ResponseBlame"} < set(before)
+
+
+def items_in(content: bytes) -> dict[str, Any]:
+    """What a file says of each item."""
+    with np.load(io.BytesIO(content)) as archive:
+        items: dict[str, Any] = json.loads(str(archive["items"]))["items"]
+        return items
+
+
+def test_an_attribution_without_noise_counts_unless_noise_is_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study_stores, "blame_hash", lambda plan: "key")
+    monkeypatch.setattr(study_stores, "attribution_hash", lambda plan: "key")
     cache, plan = kept(tmp_path / "kept.npz"), cast(StudyPlan, None)
     plain, noisy = (
         study_stores.FolderStores(tmp_path, lambda: None, cache=cache, noise=noise)
@@ -123,9 +148,11 @@ def test_a_blame_without_noise_counts_unless_noise_is_asked_for(
         (Index("R1", "R1", 0.1, 0.2, 0.01, 0.02), True),
         (Index("R1", "R1", float("nan"), float("nan")), True),  # a margin that nothing moves
     ):
-        plain.put_blame(plan, replace(BLAME, responses=(replace(BLAMED, indices=(index,)),)))
-        assert plain.blame(plan, 1) is not None
-        assert (noisy.blame(plan, 1) is not None) == there
+        plain.put_attribution(
+            plan, replace(ATTRIBUTION, responses=(replace(ATTRIBUTED, indices=(index,)),))
+        )
+        assert plain.attribution(plan, 1) is not None
+        assert (noisy.attribution(plan, 1) is not None) == there
 
 
 def test_what_nobody_used_is_forgotten(tmp_path: Path) -> None:
@@ -146,7 +173,7 @@ def test_what_nobody_used_is_forgotten(tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_read_holds_nothing(content: bytes | None, tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
     if content is None:
-        kept(path).put("it", "key", BLAME)
+        kept(path).put("it", "key", ATTRIBUTION)
         path.write_bytes(path.read_bytes()[:-100])
     else:
         path.write_bytes(content)
@@ -155,7 +182,7 @@ def test_a_file_that_cannot_be_read_holds_nothing(content: bytes | None, tmp_pat
 
 def test_no_changed_byte_of_a_file_ends_in_an_error(tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
-    kept(path).put("it", "key", BLAME)
+    kept(path).put("it", "key", ATTRIBUTION)
     whole = path.read_bytes()
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x41]) + whole[place + 1 :])
@@ -171,7 +198,7 @@ def unsealed(path: Path) -> bytes:
 
 def test_a_file_without_a_seal_counts_where_somebody_vouches_for_it(tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
-    kept(path).put("it", "key", BLAME)
+    kept(path).put("it", "key", ATTRIBUTION)
     content = unsealed(path)
     notes: list[str] = []
     assert StudyCache(path, lambda *_: None, notes.append).get("it", "key") is None
@@ -180,7 +207,7 @@ def test_a_file_without_a_seal_counts_where_somebody_vouches_for_it(tmp_path: Pa
     def vouch(name: str, there: bytes) -> bool:
         return name == "kept.npz" and there == content
 
-    assert same(StudyCache(path, lambda *_: None, vouch=vouch).get("it", "key"), BLAME)
+    assert same(StudyCache(path, lambda *_: None, vouch=vouch).get("it", "key"), ATTRIBUTION)
     path.write_bytes(content[:-1] + b"x")
     assert StudyCache(path, lambda *_: None, vouch=vouch).get("it", "key") is None
 

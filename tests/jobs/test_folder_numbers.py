@@ -43,7 +43,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     def study(modelfile: Any, out: Path, options: Options, *_: Any, **__: Any) -> Any:
         raise _Asked(options)
 
-    def cured(path: Path, **options: Any) -> Any:
+    def repaired(path: Path, **options: Any) -> Any:
         raise _Asked(options)
 
     def trade(modelfile: Any, out: Path, options: Options, extent: Any, *_: Any) -> Any:
@@ -57,7 +57,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study_job, "run_into", study)
     monkeypatch.setattr(search_job, "search_into", study)
     monkeypatch.setattr(trade_job, "answer", trade)
-    monkeypatch.setattr("designer.jobs.cure_job.cure_into", cured)
+    monkeypatch.setattr("designer.jobs.repair_job.repair_into", repaired)
 
 
 def options_of(*words: object) -> Any:
@@ -105,7 +105,7 @@ def test_a_model_file_has_the_usual_numbers_unless_work_is_resumed(tmp_path: Pat
 
 @pytest.mark.usefixtures("asked")
 @pytest.mark.parametrize(
-    ("layers", "words", "blamed", "budget"),
+    ("layers", "words", "attributed", "budget"),
     [
         (["samples"], [], True, None),
         (["samples", "without blame"], [], False, None),
@@ -115,16 +115,16 @@ def test_a_model_file_has_the_usual_numbers_unless_work_is_resumed(tmp_path: Pat
         (["blame budget 900", "samples"], ["--no-blame"], False, None),
     ],
 )
-def test_the_blame_is_as_the_folder_has_it(
-    tmp_path: Path, layers: list[str], words: list[str], blamed: bool, budget: int | None
+def test_the_attribution_is_as_the_folder_has_it(
+    tmp_path: Path, layers: list[str], words: list[str], attributed: bool, budget: int | None
 ) -> None:
     out = folder(tmp_path / "out", study={**STUDY, "layers": layers})
     options = options_of("tolerance", out, *words, "-q")
-    assert (options.blame, options.blame_budget) == (blamed, budget)
+    assert (options.blame, options.blame_budget) == (attributed, budget)
 
 
 @pytest.mark.usefixtures("asked")
-def test_a_cure_has_the_folders_own_yield_and_seed(tmp_path: Path) -> None:
+def test_a_repair_has_the_folders_own_yield_and_seed(tmp_path: Path) -> None:
     inputs = {"yield": 0.97, "budget": 3.0, "without": ["trim"], "seed": 4}
     out = folder(tmp_path / "out", design={}, cure=inputs)
     options = options_of("search", out, "-q")

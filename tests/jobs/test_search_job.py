@@ -23,7 +23,7 @@ from designer.centering.levers import DesignChoice
 from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
-from designer.jobs import rung_choice
+from designer.jobs import fidelity_choice
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.search_job import confirms, to_confirm
@@ -55,8 +55,8 @@ def files(folder: Path) -> dict[str, str]:
     return {name: entry["sha256"] for name, entry in said.items()}
 
 
-def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = "") -> Folder:
-    """A folder with a finished trade that says this rung of its yields.
+def with_trade(path: Path, fidelity: str, stage: StageName = "design", model: str = "") -> Folder:
+    """A folder with a finished trade that says this fidelity of its yields.
 
     stage : what else there is, of the model file with the hash ``model``; as it is if "".
     """
@@ -66,7 +66,7 @@ def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = 
         folder.write("design.json", '{"format": 1}')
         folder.finish(stage)
     folder.begin({"trade": ({}, ["trade.json"])}, {})
-    row = {"question": SHARE, "of": IDEAL, "rung": rung, "measured": 0.005, "bound": 0.01}
+    row = {"question": SHARE, "of": IDEAL, "rung": fidelity, "measured": 0.005, "bound": 0.01}
     said = {"format": 1, "cheapest": [row], "rungs": [], "truths": []}  # as the first version wrote
     folder.write("trade.json", dumps(said))
     folder.finish("trade")
@@ -84,27 +84,27 @@ class Heard(Progress):
 
 
 @pytest.mark.parametrize(
-    ("trade", "rung", "word"),
+    ("trade", "fidelity", "word"),
     [
         ("ideal", "ngspice", "every board in ngspice"),
         ("circuit", "exact", "40 boards of each response"),
         (None, "exact", "no trade of this design"),
     ],
 )
-def test_the_final_study_takes_its_rung_by_a_trade_and_says_so(
-    tmp_path: Path, trade: str | None, rung: str, word: str
+def test_the_final_study_takes_its_fidelity_by_a_trade_and_says_so(
+    tmp_path: Path, trade: str | None, fidelity: str, word: str
 ) -> None:
     folder = Folder(tmp_path) if trade is None else with_trade(tmp_path, trade)
     heard = Heard()
-    assert rung_choice.for_search(folder, Options(), heard) == rung
+    assert fidelity_choice.for_search(folder, Options(), heard) == fidelity
     assert word in heard.notes[0]
     for asked_for in ("exact", "ngspice"):
         options = Options(rung=asked_for)
-        assert rung_choice.for_search(folder, options, heard) == asked_for
+        assert fidelity_choice.for_search(folder, options, heard) == asked_for
     assert len(heard.notes) == 1
 
 
-def test_a_cure_has_no_rung(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_repair_has_no_fidelity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("search", tmp_path, "--yield", 0.9, "--rung", "exact", "-q") == 2
     assert "--rung" in capsys.readouterr().err  # a cure is decided on the exact circuit
 
@@ -112,11 +112,11 @@ def test_a_cure_has_no_rung(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize("stage", ["design", "search"])
 def test_a_trade_counts_for_a_search_of_the_same_model_file(tmp_path: Path, stage: Any) -> None:
     folder = with_trade(tmp_path, "ideal", stage, "this")
-    word = rung_choice.before_search(folder, "this")
+    word = fidelity_choice.before_search(folder, "this")
     assert word is not None
     assert word.rung == "ngspice"
-    assert rung_choice.before_search(folder, "another") is None
-    assert rung_choice.before_search(Folder(tmp_path / "free"), "this") is None
+    assert fidelity_choice.before_search(folder, "another") is None
+    assert fidelity_choice.before_search(Folder(tmp_path / "free"), "this") is None
 
 
 def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
@@ -149,19 +149,20 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     found.begin(stages, {})
     found.write("search.json", dumps({"format": 1, "trade": {**kept, "model": "found"}}))
     found.finish("search")
-    choice = rung_choice.choose(found)
+    choice = fidelity_choice.choose(found)
     assert choice.rung == "ngspice"
     assert "stood here before" in choice.reason
     again = {**asdict(choice), "model": "found"}
     found.write("search.json", dumps({"format": 1, "trade": again}))
-    assert rung_choice.choose(found) == choice  # said once, however often it is handed on
+    assert fidelity_choice.choose(found) == choice  # said once, however often it is handed on
     found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
-    assert rung_choice.choose(found) == rung_choice.RungChoice("auto", "")  # of another design
+    # The trade was of another design.
+    assert fidelity_choice.choose(found) == fidelity_choice.FidelityChoice("auto", "")
     with_trade(tmp_path / "found", "circuit")
-    assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
+    assert fidelity_choice.choose(Folder(tmp_path / "found")).rung == "auto"
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
     with pytest.raises(InputError, match="what search wrote"):
-        rung_choice.choose(found)
+        fidelity_choice.choose(found)
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     ):
         stage = f"designer.jobs.search_stage.{name}"
         monkeypatch.setattr(stage, lambda *_, value=value, **__: value)
-    monkeypatch.setattr("designer.folders.kicad_files.beside", lambda *_: {})
+    monkeypatch.setattr("designer.folders.kicad_files.project_texts", lambda *_: {})
     design = "designer.folders.design_files"
     monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
     monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})
@@ -216,7 +217,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     final = searched_into(file, out, Options(jobs=1, resume=True), Progress())
     trade = read(out / "search.json")["trade"]
     assert (trade["rung"], trade["model"]) == ("ngspice", final.sha256)
-    assert rung_choice.choose(Folder(out)).rung == "ngspice"
+    assert fidelity_choice.choose(Folder(out)).rung == "ngspice"
     assert "kept" not in read(out / "manifest.json")["stages"]["search"]
 
 

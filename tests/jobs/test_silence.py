@@ -204,7 +204,7 @@ STAGES = {
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
     "tolerance study, 2 boards, responses: 1": "",
     "boards in ngspice, 4 runs": "",
-    "report": "",  # the yields are written before the blame
+    "report": "",  # the yields are written before the attribution
     "blame, boards asked again": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""
@@ -234,6 +234,6 @@ def test_each_usual_time_is_of_a_stage_that_there_is() -> None:
     sources = [p for p in PACKAGE.rglob("*.py") if p.name != Path(usual_times.__file__).name]
     nodes = [node for p in sources for node in ast.walk(ast.parse(p.read_text("utf-8")))]
     texts = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
-    for phase in {**usual_times.SEARCH, **usual_times.RUN, **usual_times.CURED}:
+    for phase in {**usual_times.SEARCH, **usual_times.RUN, **usual_times.REPAIRED}:
         # A title may be made of pieces, of which the first is no shorter than a word.
         assert any(t.startswith(phase) or (t in phase[: len(t)] and len(t) > 4) for t in texts)

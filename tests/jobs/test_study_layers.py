@@ -17,7 +17,7 @@ NEW = OLD | {"first_error": 0.01, "total_error": 0.02}
 
 
 def folder_of(index: dict[str, float], options: Options, complete: bool = True) -> Folder:
-    """A folder whose study has a blame with this index."""
+    """A folder whose study has an attribution with this index."""
     stage = SimpleNamespace(inputs={**INPUTS, "layers": layers_of(options)}, complete=complete)
     answer: dict[str, Any] = {"responses": [{"blame": {"indices": [index]}}, {"blame": None}]}
     manifest = SimpleNamespace(stages={"study": stage})
@@ -30,22 +30,22 @@ def folder_of(index: dict[str, float], options: Options, complete: bool = True) 
         (OLD, True, True, True),
         (OLD, False, True, False),
         (NEW, True, True, False),
-        (OLD, True, False, False),  # what goes on has its blame before it
+        (OLD, True, False, False),  # what goes on has its attribution before it
     ],
 )
 def test_noise_is_a_layer_where_it_is_asked_for_and_lacks(
     index: dict[str, float], asked: bool, complete: bool, anew: bool
 ) -> None:
     folder = folder_of(index, Options(), complete)
-    options = merged(folder, INPUTS, Options(blame_anew=asked))
-    assert options.blame_anew == anew
+    options = merged(folder, INPUTS, Options(attribution_anew=asked))
+    assert options.attribution_anew == anew
     assert (NOISE in layers_of(options)) == anew
-    other = merged(folder, {"seed": 2}, Options(blame_anew=asked))
+    other = merged(folder, {"seed": 2}, Options(attribution_anew=asked))
     assert NOISE not in layers_of(other)
 
 
 def test_a_study_whose_noise_was_made_anew_stays_the_same_study() -> None:
-    stored = Options(blame_anew=True)
-    for asked in (Options(), Options(blame_anew=True)):
+    stored = Options(attribution_anew=True)
+    for asked in (Options(), Options(attribution_anew=True)):
         options = merged(folder_of(NEW, stored), INPUTS, asked)
         assert layers_of(options) == layers_of(stored)

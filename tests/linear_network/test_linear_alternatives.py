@@ -19,7 +19,7 @@ from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import limits
-from designer.synthesis.parts_choice import _beside, best_beside
+from designer.synthesis.parts_choice import _rest_of, best_alternative
 
 # What each side condition costs is asked where a test is about it: it doubles the time.
 synthesise = partial(parts_choice.synthesise, binding=False)
@@ -36,7 +36,7 @@ def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
     within = limits(RECTIFIER, RECTIFIER.active_conditions, wanted.opamp, 13.0, PEAKS.fastest)
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
-    (above, top), (bottom, below) = _beside(block, (1e3, 1e6), "R4")
+    (above, top), (bottom, below) = _rest_of(block, (1e3, 1e6), "R4")
     others = wanted.resistors[(wanted.resistors >= 1e3) & (wanted.resistors <= 1e6)]
     covered = [(above <= v <= top) + (bottom <= v <= below) for v in others]
     assert covered == [int(v != block.values["R4"]) for v in others]
@@ -55,7 +55,7 @@ def test_the_best_of_those_tried_is_taken() -> None:
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
     first = attempt(wanted, within, block)
-    best = best_beside(wanted, within, block, first, partial(attempt, wanted, within))
+    best = best_alternative(wanted, within, block, first, partial(attempt, wanted, within))
     assert isinstance(first, Attempt)
     assert isinstance(best, Attempt)
     assert best.errors.max_error <= first.errors.max_error

@@ -41,8 +41,8 @@ from designer.paper.statements import (
     _dying,
     _each,
     _grazing,
+    _grazings,
     _order,
-    _touches,
     main_windows,
 )
 from designer.plots import bifurcation_plots
@@ -209,7 +209,7 @@ def grazing(before: str, after: str, direction: int, *stable: bool) -> Any:
     ],
 )
 def test_grazing_from_1_p_p_to_one_impact_more(point: Any, verdict: str) -> None:
-    said = _touches(SimpleNamespace(points=[point]))  # type: ignore[arg-type]
+    said = _grazings(SimpleNamespace(points=[point]))  # type: ignore[arg-type]
     assert said.verdict == verdict
 
 

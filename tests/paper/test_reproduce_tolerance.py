@@ -15,7 +15,7 @@ from designer.paper import reproduce_tolerance
 from designer.paper.circuits import OMEGA
 from designer.paper.reproduce_tolerance import KINDS, reproduce
 from designer.paper.tolerance_cases import YieldRow, cases
-from designer.verdicts.exact_rung import block
+from designer.verdicts.exact_circuit import block
 from designer.yields.yield_count import count
 
 TWO = ("rectifier-r1-c1-offsets", "corrected-r0.1-c1-level")

@@ -120,8 +120,8 @@ def test_an_orbit_with_impacts_on_one_side_is_not_symmetric() -> None:
     values = np.linspace(1.6, 1.85, 11)
     system = parse_model_file(ONE_STOP, Path("one.toml")).model
     swept = sweep.run(SweepPlan(ModelSubject(system), "omega", values, ("down",), course=QUICK))
-    (touch,) = [p for p in window_ends.locate(swept) if p.kind == "grazing"]
-    assert "1-1-0 asymmetric below, 1-0-0 symmetric above" in point_captions.caption(touch)
+    (grazing,) = [p for p in window_ends.locate(swept) if p.kind == "grazing"]
+    assert "1-1-0 asymmetric below, 1-0-0 symmetric above" in point_captions.caption(grazing)
 
 
 def _texts(figure: Any) -> str:

@@ -1,4 +1,4 @@
-"""Figures of blame, maps and the tolerance sheet: they draw what the results say."""
+"""Figures of attribution, maps and the tolerance sheet: they draw what the results say."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from designer.paper.circuits import OMEGA
 from designer.paper.reproduce_tolerance import KINDS
 from designer.paper.tolerance_cases import TITLES, YieldRow
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
-from designer.plots.blame_plots import avoided_chart, index_chart
+from designer.plots.attribution_plots import avoided_chart, index_chart
 from designer.plots.map_plots import map_chart
-from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Prediction
 from designer.yields.worst_corner import Index
 from designer.yields.yield_maps import Axis, YieldMap
@@ -30,13 +30,13 @@ from tests.shared.figure_text import clipped, overlapping
 LABELS = ["ω = 0.54   1-3-3", "ω = 0.41   1-4-4"]
 
 
-def blamed(shares: dict[str, int]) -> ResponseBlame:
+def attributed(shares: dict[str, int]) -> ResponseAttribution:
     subjects = tuple(
-        BlamedPart(name, "group" if " " in name else "resistor", avoided, 10, 0, 0)
+        PartAttribution(name, "group" if " " in name else "resistor", avoided, 10, 0, 0)
         for name, avoided in shares.items()
     )
     indices = tuple(Index(f"R{k}", f"R{k}", 0.1, 0.5 / (k + 1), 0.03, 0.05) for k in range(12))
-    return ResponseBlame(
+    return ResponseAttribution(
         0, 10, subjects, indices, (), Prediction(50, 10, 1, 0), 0, 0, None, "something"
     )
 
@@ -67,9 +67,9 @@ def rows() -> list[YieldRow]:
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    "avoided": lambda: avoided_chart(LABELS, [blamed({"all offsets": 8, "R1": 3}), None]),
-    "nothing lost": lambda: avoided_chart(LABELS, [replace(blamed({}), lost=0), None]),
-    "indices": lambda: index_chart(LABELS, [blamed({}), None]),
+    "avoided": lambda: avoided_chart(LABELS, [attributed({"all offsets": 8, "R1": 3}), None]),
+    "nothing lost": lambda: avoided_chart(LABELS, [replace(attributed({}), lost=0), None]),
+    "indices": lambda: index_chart(LABELS, [attributed({}), None]),
     "nothing limits": lambda: index_chart(LABELS, [None, None]),
     "map": lambda: map_chart("1-3-3", mapped()),
     "heat": lambda: map_chart("1-3-3", mapped(two=True)),
@@ -85,12 +85,12 @@ def test_no_text_is_cut_off_or_covered(name: str) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 9])
-def test_charts_of_blame_have_room_for_their_text(count: int) -> None:
+def test_charts_of_attribution_have_room_for_their_text(count: int) -> None:
     labels = [f"ω = 0.{k}15   1-{k}-{k}" for k in range(1, count + 1)]
-    one = blamed({"thresholds of the dead zone": 8, "R204A": 3})
+    one = attributed({"thresholds of the dead zone": 8, "R204A": 3})
     wide = tuple(replace(i, coordinate=f"U3D.offset_drift_{i.part}") for i in one.indices)
-    blames = [replace(one, indices=wide)] * count
-    for figure in (index_chart(labels, blames), avoided_chart(labels, blames)):
+    attributions = [replace(one, indices=wide)] * count
+    for figure in (index_chart(labels, attributions), avoided_chart(labels, attributions)):
         assert clipped(figure) == []
         assert overlapping(figure) == []
 
@@ -100,9 +100,12 @@ def test_figures_are_the_same_twice(name: str) -> None:
     assert figure_style.to_svg(FIGURES[name]()) == figure_style.to_svg(FIGURES[name]())
 
 
-def test_the_heat_map_of_blame_holds_the_shares_with_groups_first() -> None:
-    blames = [blamed({"R1": 3, "all offsets": 8, "R2": 5}), blamed({"R1": 9, "all offsets": 1})]
-    axes = avoided_chart(LABELS, blames).axes[0]
+def test_the_heat_map_of_attribution_holds_the_shares_with_groups_first() -> None:
+    attributions = [
+        attributed({"R1": 3, "all offsets": 8, "R2": 5}),
+        attributed({"R1": 9, "all offsets": 1}),
+    ]
+    axes = avoided_chart(LABELS, attributions).axes[0]
     image = next(a for a in axes.get_children() if isinstance(a, AxesImage))
     names = [t.get_text() for t in axes.get_yticklabels()]
     assert names == ["all offsets", "R1", "R2"]
@@ -111,7 +114,7 @@ def test_the_heat_map_of_blame_holds_the_shares_with_groups_first() -> None:
 
 
 def test_the_index_chart_draws_the_largest_totals() -> None:
-    axes = index_chart(LABELS, [blamed({}), None]).axes[0]
+    axes = index_chart(LABELS, [attributed({}), None]).axes[0]
     widths = [p.get_width() for p in axes.patches]  # type: ignore[attr-defined]
     assert widths[:3] == pytest.approx([50.0, 25.0, 100.0 / 6.0])
     assert "59 of 60" in " ".join(t.get_text() for t in axes.texts)
@@ -127,7 +130,7 @@ def test_a_map_curve_is_the_rate_and_marks_what_is_not_there() -> None:
 
 
 def test_the_page_says_every_case_and_what_is_not_there() -> None:
-    blame = {
+    attribution = {
         "responses": [
             {
                 "question": 1, "limited_by": "stability: a fold",
@@ -136,7 +139,7 @@ def test_the_page_says_every_case_and_what_is_not_there() -> None:
             }
         ]
     }  # fmt: skip
-    page = tolerance_page(rows(), {"printed": blame}, samples=10, short=10, seed=3)
+    page = tolerance_page(rows(), {"printed": attribution}, samples=10, short=10, seed=3)
     text = re.sub(" +", " ", markdown(page))
     assert text.splitlines()[2].startswith("Made by `designer reproduce tolerance --samples 10")
     assert text.count("| 1 % | 1 % | on | as built | 50 | 50 | 50 | 50 | 50 | 50 | 50 | × |") == 3

@@ -30,8 +30,8 @@ from designer.report.tolerance_tables import (
 from designer.report.write import render_html, render_markdown
 from designer.spread.spread import OpAmpDrift
 from designer.verdicts.verdict import Verdict
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import BlamedPart
+from designer.yields.loss_attribution import Attribution, NearLimit, ResponseAttribution
+from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Prediction
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
@@ -90,13 +90,13 @@ def plain() -> ReportData:
 BOTH = Index("U3C.offset", "U3C", 0.2, 0.6, 0.02, 0.05), Index("R204", "R204", -0.01, 0.3)
 
 
-def blamed(question: int, lost: int) -> ResponseBlame:
+def attributed(question: int, lost: int) -> ResponseAttribution:
     subjects = (
-        BlamedPart("all offsets", "group", 9, 10, 1, 4),
-        BlamedPart("U3C", "op-amp", 6, 10, 0, 4),
-        BlamedPart("R204", "resistor", 0, 10, 0, 4),
+        PartAttribution("all offsets", "group", 9, 10, 1, 4),
+        PartAttribution("U3C", "op-amp", 6, 10, 0, 4),
+        PartAttribution("R204", "resistor", 0, 10, 0, 4),
     )
-    return ResponseBlame(
+    return ResponseAttribution(
         question,
         lost,
         subjects if lost else (),
@@ -153,7 +153,7 @@ def full(plain: ReportData) -> ReportData:
         power_ups=tuple(reached),
         combined=(Together(), None),
         recipes=(Recipe(), Recipe("dwell for 2 s")),
-        blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
+        blame=Attribution((attributed(0, 10), attributed(1, 0)), 100, 1, 500, 300, 1.0),
         maps=(mapped(1),),
     )
 
@@ -196,8 +196,8 @@ def test_the_heading_names_the_kinds_that_there_are(full: ReportData) -> None:
 
 
 def test_without_a_loss_nobody_is_to_blame(full: ReportData) -> None:
-    one, other = (replace(blamed(q, 0), prediction=Prediction(100, 0, 0, 0)) for q in (0, 1))
-    none = Blame((one, other), 100, 1, 500, 300, 1.0)
+    one, other = (replace(attributed(q, 0), prediction=Prediction(100, 0, 0, 0)) for q in (0, 1))
+    none = Attribution((one, other), 100, 1, 500, 300, 1.0)
     text = render_markdown(changed(full, blame=none))
     assert "foretold by the margin" not in text
     assert "## What comes nearest to a loss?" in text
@@ -246,7 +246,7 @@ def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
     assert words.span(0.0, 0.0001) == ("0.00", "0.01")
 
 
-def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
+def test_the_attribution_says_who_and_how_sure_it_is(full: ReportData) -> None:
     assert len(rows_of(avoided(full))) == 1
     (_, lost, groups, parts) = rows_of(avoided(full))[0]
     assert lost == "10"
@@ -261,15 +261,17 @@ def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
     assert "500 attractors" in render_markdown(full)
 
 
-def test_a_blame_without_noise_says_once_how_to_get_it(full: ReportData) -> None:
+def test_an_attribution_without_noise_says_once_how_to_get_it(full: ReportData) -> None:
     anew = "designer tolerance 'my boards' --blame --resume"
     text = render_markdown(replace(full, folder="my boards"))
     assert text.count(anew) == text.count("stored no noise") == 1
     assert "95 % noise" not in text
-    blame = full.study.blame
-    assert blame is not None
+    attribution = full.study.blame
+    assert attribution is not None
     known = tuple(replace(index, first_error=0.02, total_error=0.05) for index in BOTH)
-    whole = replace(blame, responses=tuple(replace(r, indices=known) for r in blame.responses))
+    whole = replace(
+        attribution, responses=tuple(replace(r, indices=known) for r in attribution.responses)
+    )
     text = render_markdown(changed(full, blame=whole))
     assert "95 % noise" in text
     assert "stored no noise" not in text

@@ -19,7 +19,7 @@ from reports.makers import example_report, frequency_sweep, grazing_map, persist
 from reports.makers.backbone import backbone
 from reports.makers.bilinear import bilinear_frequency
 from reports.makers.chain_modes import chain_frequencies
-from reports.makers.first_touch import first_touches
+from reports.makers.first_grazing import first_grazings
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -56,8 +56,8 @@ def test_period_1_lives_through_grazing_where_m_is_whole(
 def test_the_grazing_amplitude_of_the_aberdeen_rig() -> None:
     model = system("aberdeen")
     assert persistence.grazing_amplitude(model, 0.8) == pytest.approx(0.709, abs=5e-4)
-    (touch,) = first_touches(model, 0.8)
-    assert persistence.grazing_amplitude(model, 0.8) == pytest.approx(1.0 / touch.b, rel=1e-12)
+    (grazing,) = first_grazings(model, 0.8)
+    assert persistence.grazing_amplitude(model, 0.8) == pytest.approx(1.0 / grazing.b, rel=1e-12)
 
 
 @pytest.mark.parametrize("amplitude", [0.51, 0.7, 3.0])
@@ -90,7 +90,7 @@ def test_a_force_shared_as_the_masses_does_not_rattle() -> None:
     assert quiet == pytest.approx(2.0 / 3.0)
     for omega in (0.5, 1.0, 1.7):
         shared = model.changed({"driver.amplitude": 1.0 - quiet, "load.amplitude": quiet})
-        assert first_touches(shared, omega)[0].b < 1e-12
+        assert first_grazings(shared, omega)[0].b < 1e-12
 
 
 def test_the_modes_of_a_chain() -> None:

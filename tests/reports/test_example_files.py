@@ -15,7 +15,7 @@ from designer.model.driven import model_flow
 from designer.model.find_responses import find
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
-from reports.makers.first_touch import first_touches, located_touch
+from reports.makers.first_grazing import first_grazings, located_grazing
 from tests.shared.event_integrator import integrate
 from tests.shared.mechanism_file import mechanism_of, omega_of
 from tests.shared.mechanisms import absolute
@@ -57,8 +57,8 @@ def test_the_wanted_responses_close_in_an_independent_integrator(path: Path) -> 
 @pytest.mark.parametrize("name", TOUCHED)
 def test_the_first_touch_is_where_the_linear_response_fills_the_gap(name: str) -> None:
     model, omega = read_model_file(EXAMPLES / f"{name}.toml").model, TOUCHED[name]
-    first = first_touches(model, omega)[0].b
-    assert located_touch(model, omega, "b", first) == pytest.approx(first, rel=1e-9)
+    first = first_grazings(model, omega)[0].b
+    assert located_grazing(model, omega, "b", first) == pytest.approx(first, rel=1e-9)
 
 
 def test_stops_that_stay_see_the_ground_move() -> None:
@@ -75,5 +75,5 @@ def test_stops_that_stay_see_the_ground_move() -> None:
     y = model.base.amplitude * np.sin(2.0 * np.pi * np.arange(points + 1) / points)
     fixed = replace(far, base=replace(model.base, stops="fixed"))
     for system, motion in ((far, z), (fixed, z + y)):
-        (touch,) = first_touches(system, omega)
-        assert touch.b == pytest.approx(-(motion + sag).min() / (0.1 - sag), rel=1e-5)
+        (grazing,) = first_grazings(system, omega)
+        assert grazing.b == pytest.approx(-(motion + sag).min() / (0.1 - sag), rel=1e-5)

@@ -82,7 +82,7 @@ NOT_RUN = {
     "explore": "serves a page until Ctrl-C; tests/explorer has it in a browser",
     "reproduce": "hours; tests/paper has smaller ones",
     "search examples/robust.toml": "minutes; tests/jobs/test_search_job.py has a smaller one",
-    "search out/paper --yield": "minutes; tests/jobs/test_cure_whole.py has a smaller one",
+    "search out/paper --yield": "minutes; tests/jobs/test_repair_whole.py has a smaller one",
     "trade out/paper": "minutes in ngspice; tests/fidelity/test_trade_study.py has a smaller one",
     "tolerance out/paper --samples 100000": "a cluster; tests/jobs/test_dask_runner.py",
     "bench out/": "a record of an oscilloscope: tests/jobs/test_bench_job.py",

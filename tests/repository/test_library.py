@@ -26,7 +26,7 @@ from designer.base.frames import MOST_ROWS, frame, table_html
 from designer.board.bom import bill_csv
 from designer.cli.app import VERBS
 from designer.folders.board_files import bills
-from designer.jobs import cure_job, search_job, trade_job
+from designer.jobs import repair_job, search_job, trade_job
 from designer.model.measured_values import MeasuredBoards
 from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
 from designer.verdicts.verdict import Verdict
@@ -266,7 +266,7 @@ def test_search_and_cure_and_trade_ask_for_the_same_as_the_command_line(
 
     for module, name in (
         (search_job, "search_into"),
-        (cure_job, "cure_into"),
+        (repair_job, "repair_into"),
         (trade_job, "answer"),
     ):
         monkeypatch.setattr(module, name, stop)

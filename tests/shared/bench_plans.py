@@ -13,7 +13,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.counts import Counts
 from designer.model.response_table import Response
 from designer.spread.spread import Spread
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, Question, StudyPlan
 from designer.yields.yield_count import Yield, count
 from tests.shared.paper_cases import OMEGA, subject
@@ -40,7 +40,7 @@ def study_yields(of: StudyPlan, rows: Sequence[Answer]) -> tuple[Yield, ...]:
 
 def answers(of: StudyPlan, indices: range) -> list[Answer]:
     """As built."""
-    return exact_rung.block(of, indices, 2)
+    return exact_circuit.block(of, indices, 2)
 
 
 def ensemble(boards: Sequence[Board], p: int = 1) -> Ensemble:

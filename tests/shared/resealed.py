@@ -9,7 +9,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from designer.base.parquet_entry import HEAD, ParquetForm
+from designer.base.parquet_entry import HEAD, ParquetCodec
 from designer.base.seal import intact, sealed
 
 Change = Callable[[list[dict[str, Any]]], list[dict[str, Any]]]
@@ -19,8 +19,8 @@ def reseal(path: Path, change: Change) -> None:
     """Put what ``change`` makes of a block's rows in their place."""
     table = pq.read_table(path)
     head = json.loads(table.schema.metadata[HEAD])
-    form = ParquetForm(table.schema.remove_metadata())
-    path.write_bytes(sealed(form.encode(head, change(table.to_pylist()))))
+    codec = ParquetCodec(table.schema.remove_metadata())
+    path.write_bytes(sealed(codec.encode(head, change(table.to_pylist()))))
     assert intact(path.read_bytes())
 
 

@@ -13,7 +13,7 @@ from designer.folders import design_files
 from designer.folders.design_source import read_design
 from designer.jobs import (
     bifurcation_job,
-    cure_job,
+    repair_job,
     rules_job,
     study_stage,
     synthesise_job,
@@ -38,7 +38,7 @@ def work_stopped(folder: Path) -> Iterator[None]:
         patched.setattr(rules_job, "checked", stop)
         patched.setattr(simulation, "simulate", stop)
         patched.setattr(bifurcation_job, "_make", stop)
-        patched.setattr(cure_job, "find_cure", stop)
+        patched.setattr(repair_job, "find_repair", stop)
         patched.setattr(trade_job, "_document", stop)
         patched.setattr(synthesise_job, "_comparison", stop)
         patched.setattr(record_formats, "read_record", stop)

@@ -20,26 +20,26 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
-from designer.spice.opamp_model import RUNGS, Rung, recovery, second_pole
+from designer.spice.opamp_model import FIDELITIES, Fidelity, recovery, second_pole
 from designer.spice.worker import open_simulator
 from tests.circuit.test_reduction import EXACT, circuit_of
 
 CATALOG = load_catalog()
 NAMES = [o.name for o in CATALOG.opamps]
 CIRCUIT = circuit_of(EXACT)
-WITH_MEMORY = [r for r in RUNGS if r != "ideal"]
+WITH_MEMORY = [r for r in FIDELITIES if r != "ideal"]
 
 each = pytest.mark.parametrize("name", NAMES)
-every_rung = pytest.mark.parametrize("rung", RUNGS)
-every_rung_with_memory = pytest.mark.parametrize("rung", WITH_MEMORY)
+every_fidelity = pytest.mark.parametrize("fidelity", FIDELITIES)
+every_fidelity_with_memory = pytest.mark.parametrize("fidelity", WITH_MEMORY)
 
 
 @each
-@every_rung
-def test_static_figures(name: str, rung: Rung) -> None:
+@every_fidelity
+def test_static_figures(name: str, fidelity: Fidelity) -> None:
     """Open-loop gain within 0.1 %, offset within 1 ppm plus 1/gain, bias within 1 fA."""
     opamp = CATALOG.opamp(name)
-    bench = OpAmpBench.of(opamp, rung)
+    bench = OpAmpBench.of(opamp, fidelity)
     assert bench.open_loop_gain() == pytest.approx(opamp.gain.nominal, rel=1e-3)
     offset = opamp.offset.nominal
     assert bench.offset() == pytest.approx(offset, rel=1e-6 + 2.0 / opamp.gain.nominal, abs=1e-11)
@@ -49,10 +49,10 @@ def test_static_figures(name: str, rung: Rung) -> None:
 
 
 @each
-@pytest.mark.parametrize("rung", ["ideal", "dynamic"])
-def test_swing(name: str, rung: Rung) -> None:
+@pytest.mark.parametrize("fidelity", ["ideal", "dynamic"])
+def test_swing(name: str, fidelity: Fidelity) -> None:
     """Below ``full`` the limits are those of the pin, whatever the load; each rail its own."""
-    bench = OpAmpBench.of(CATALOG.opamp(name), rung)
+    bench = OpAmpBench.of(CATALOG.opamp(name), fidelity)
     low, high = 0.9 * bench.rails[0], 0.97 * bench.rails[1]
     bench = replace(bench, rails=(low, high))
     for load in (2e3, 10e3):
@@ -141,12 +141,12 @@ def test_the_old_tl074_reverses_and_the_new_does_not() -> None:
 
 
 @each
-@every_rung_with_memory
-def test_frequency_response(name: str, rung: Rung) -> None:
+@every_fidelity_with_memory
+def test_frequency_response(name: str, fidelity: Fidelity) -> None:
     """Gain-bandwidth within 2 % a decade below unity gain."""
     opamp = CATALOG.opamp(name)
     at = opamp.gbw.nominal / 10.0
-    frequency, gain = OpAmpBench.of(opamp, rung).response(at, 2.0 * at)
+    frequency, gain = OpAmpBench.of(opamp, fidelity).response(at, 2.0 * at)
     assert abs(gain[0]) * frequency[0] == pytest.approx(opamp.gbw.nominal, rel=0.02)
 
 
@@ -158,33 +158,33 @@ def test_one_pole(name: str) -> None:
 
 
 @each
-@every_rung_with_memory
-def test_slew(name: str, rung: Rung) -> None:
+@every_fidelity_with_memory
+def test_slew(name: str, fidelity: Fidelity) -> None:
     """Both edges within 1 % of the figure."""
     opamp = CATALOG.opamp(name)
-    for edge in OpAmpBench.of(opamp, rung).slew():
+    for edge in OpAmpBench.of(opamp, fidelity).slew():
         assert edge == pytest.approx(opamp.slew.nominal, rel=0.01)
 
 
 @each
-@every_rung_with_memory
-def test_recovery_is_the_parameter(name: str, rung: Rung) -> None:
+@every_fidelity_with_memory
+def test_recovery_is_the_parameter(name: str, fidelity: Fidelity) -> None:
     """No data sheet fixes it for every circuit: swept over two decades, it follows within 4 %.
 
     A second pole adds its own time constant. The middle of the sweep is the catalogue's figure, of
     which ``test_every_figure_agrees_with_its_model`` asks the same.
     """
-    bench = OpAmpBench.of(CATALOG.opamp(name), rung)
+    bench = OpAmpBench.of(CATALOG.opamp(name), fidelity)
     for factor in (0.1, 10.0):
         wanted = factor * recovery(bench.opamp)
         figure = Figure(None, wanted, None, "a test")
         swept = replace(bench, opamp=replace(bench.opamp, recovery=figure))
-        lag = 0.0 if rung == "dynamic" else 0.5 / np.pi / second_pole(bench.opamp)
+        lag = 0.0 if fidelity == "dynamic" else 0.5 / np.pi / second_pole(bench.opamp)
         assert swept.recovery() == pytest.approx(wanted + lag / 2, rel=0.04, abs=lag)
 
 
-@every_rung
-def test_a_deck_of_every_rung(rung: Rung) -> None:
+@every_fidelity
+def test_a_deck_of_every_fidelity(fidelity: Fidelity) -> None:
     """It passes the filter, and four periods from a point of the orbit end near that point."""
     board = nominal_board(CIRCUIT)
     excitation = Excitation(400.0, 0.6)
@@ -193,7 +193,7 @@ def test_a_deck_of_every_rung(rung: Rung) -> None:
     start = flow.run(np.zeros(4), 60).strobes[-1]
     text = deck.write(
         CIRCUIT, board, excitation, SolverSettings("trap", 1 / 400.0 / 400),
-        title="test", stop_time=4 / 400.0, initial=start, rung=rung,
+        title="test", stop_time=4 / 400.0, initial=start, fidelity=fidelity,
     )  # fmt: skip
     check_netlist(text)
     assert not any(line.startswith("+") for line in text.splitlines())
@@ -226,8 +226,8 @@ def unity_gain(text: str, section: str, gbw: float) -> tuple[float, float]:
     return Taken(**{**bench.__dict__, "opamp": opamp}).unity_gain()
 
 
-@every_rung_with_memory
-def test_every_section_has_a_bandwidth_of_its_own(rung: Rung) -> None:
+@every_fidelity_with_memory
+def test_every_section_has_a_bandwidth_of_its_own(fidelity: Fidelity) -> None:
     """Half the gain-bandwidth: half the unity-gain frequency at the same phase margin, in the
     deck's own lines. Others keep theirs, and a deck without the figure is what it was."""
     circuit = replace(CIRCUIT, figures=CATALOG.opamp("TL074C"))
@@ -238,7 +238,7 @@ def test_every_section_has_a_bandwidth_of_its_own(rung: Rung) -> None:
     def text(board: Board) -> str:
         return deck.write(
             circuit, board, Excitation(400.0, 0.6), SolverSettings("trap", 1e-5),
-            title="t", stop_time=1e-2, rung=rung,
+            title="t", stop_time=1e-2, fidelity=fidelity,
         )  # fmt: skip
 
     drawn = text(replace(board, gain_bandwidth={slow: typical / 2.0}))
@@ -270,25 +270,25 @@ def test_a_vendor_s_model_keeps_its_bandwidth() -> None:
     )  # fmt: skip
     text = deck.write(
         circuit, board, Excitation(400.0, 0.6), SolverSettings("trap", 1e-5),
-        title="t", stop_time=1e-3, rung="full",
+        title="t", stop_time=1e-3, fidelity="full",
     )  # fmt: skip
     assert "gbw" not in text
     assert open_simulator("shared").run(text, circuit.state_nets, 1e-3).axis[-1] > 0.99e-3
 
 
-def test_a_rung_without_figures() -> None:
+def test_a_fidelity_without_figures() -> None:
     bare = replace(CIRCUIT, figures=None)
     with pytest.raises(ValueError, match="figures"):
         deck.write(
             bare, nominal_board(bare), Excitation(400.0, 1.0), SolverSettings("trap", 1e-6),
-            title="t", stop_time=1e-3, rung="dynamic",
+            title="t", stop_time=1e-3, fidelity="dynamic",
         )  # fmt: skip
 
 
 @each
-@every_rung
-def test_every_figure_agrees_with_its_model(name: str, rung: Rung) -> None:
-    found = checks(CATALOG.opamp(name), rung)
+@every_fidelity
+def test_every_figure_agrees_with_its_model(name: str, fidelity: Fidelity) -> None:
+    found = checks(CATALOG.opamp(name), fidelity)
     assert [c.figure for c in found if not c.agrees] == []
     assert len({c.figure for c in found}) == len(found) >= 6
 

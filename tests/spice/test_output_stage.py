@@ -34,7 +34,7 @@ def swept(circuit: Circuit, top: float) -> tuple[np.ndarray, np.ndarray]:
     board = nominal_board(circuit)
     text = deck.write(
         circuit, board, Excitation(400.0, 0.0), SolverSettings("trap", 1e-5), title="t",
-        stop_time=1e-3, rung="full",
+        stop_time=1e-3, fidelity="full",
     )  # fmt: skip
     stage = re.compile(r"(R20\d|R210|XU3|VCC|VEE) ?")
     model = text[text.index(".subckt opamp") : text.index(".ends opamp") + len(".ends opamp")]

@@ -174,8 +174,8 @@ def test_grazing_is_undecided(depth: float) -> None:
     assert got.status is OrbitStatus.GRAZING
     clear = read(waveforms(free, orbit.start, 10), reading_of(0.9, b=top * 1.01)).orbit
     assert clear.response == "1-0-0"
-    touching = read(waveforms(free, orbit.start, 10), reading_of(0.9, b=top * 0.99)).orbit
-    assert touching.response == "1-1-1"
+    grazed = read(waveforms(free, orbit.start, 10), reading_of(0.9, b=top * 0.99)).orbit
+    assert grazed.response == "1-1-1"
 
 
 @pytest.mark.parametrize("omega", [1.55, 0.85])

@@ -12,7 +12,7 @@ from benchmarks.ngspice_figures import SETTLED, memory, warm, warm_job
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import MOST_DISCARDED
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
 from designer.spice.settling_periods import PROBE, periods
@@ -48,7 +48,7 @@ def test_the_prediction_is_the_first_strobe_that_is_near_enough(
     assert found / n <= least + 2
 
 
-def test_a_rung_that_is_slower_than_the_exact_circuit_is_seen() -> None:
+def test_a_fidelity_that_is_slower_than_the_exact_circuit_is_seen() -> None:
     found, rho = periods(way(0.05, 0.97), 1, 0.2, PEAK)
     assert rho == pytest.approx(0.97, abs=1e-6)
     assert 0.05 * 0.97**found <= STROBE_TOLERANCE
@@ -89,18 +89,20 @@ def test_ideal_from_the_third_period_on(pool: SpicePool, p: int) -> None:
 
 
 WITH_MEMORY = 1, 3, 8
-"""p of the responses that rungs with a memory are asked for."""
+"""p of the responses that fidelities with a memory are asked for."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rung", ["dynamic", "full"])
-def test_rungs_with_a_memory_after_what_is_predicted(pool: SpicePool, rung: Rung) -> None:
+@pytest.mark.parametrize("fidelity", ["dynamic", "full"])
+def test_fidelities_with_a_memory_after_what_is_predicted(
+    pool: SpicePool, fidelity: Fidelity
+) -> None:
     """What is said to be discarded is enough, and the response is the wanted one.
 
     The settled strobe is that of a run ten times as long, of at least sixty periods.
     """
     exact = [subject(p) for p in WITH_MEMORY]
-    asked = numerics_gate.warmed(pool, [replace(who, rung=rung) for who in exact])
+    asked = numerics_gate.warmed(pool, [replace(who, fidelity=fidelity) for who in exact])
     discarded = [who.discard for who in asked]
     assert all(numerics_gate.DISCARD <= d < MOST_DISCARDED for d in discarded)
     jobs = [

@@ -11,7 +11,7 @@ from designer.circuit.netlist import Excitation, Reference
 from designer.spice import deck
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.deck import SHUNT_REFERENCE, SolverSettings, shunt_reference
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import Fidelity
 from tests.shared.stages import rectifier, stage
 
 ENTRY = load_catalog().reference("LM4040C50")
@@ -53,14 +53,14 @@ def test_another_sample_another_voltage() -> None:
     assert voltages([1e-3], 4.98)[0] == pytest.approx(4.9805, abs=1e-4)
 
 
-@pytest.mark.parametrize("rung", ["dynamic", "full"])
-def test_a_feed_that_is_too_large_shows_on_the_board(rung: Rung) -> None:
+@pytest.mark.parametrize("fidelity", ["dynamic", "full"])
+def test_a_feed_that_is_too_large_shows_on_the_board(fidelity: Fidelity) -> None:
     """Of a rectifier whose feeds cannot carry the load, the references sag; a source would not."""
     for feed, wanted in ((2.2e3, 5.0), (100e3, None)):
         circuit = stage("rectifier", "both", {**rectifier(), "R206": feed, "R207": feed})
         text = deck.write(
             circuit, nominal_board(circuit), Excitation(400.0, 0.0), SolverSettings("trap", 1e-6),
-            title="feeds", stop_time=1e-4, rung=rung,
+            title="feeds", stop_time=1e-4, fidelity=fidelity,
         ).replace(".save ", ".save v(vrp) v(vrn) ")  # fmt: skip
         waves = BatchNgspice().run(text, ("vrp", "vrn"), 1e-4)
         for net, sign in (("vrp", 1.0), ("vrn", -1.0)):

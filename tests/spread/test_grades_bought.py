@@ -17,9 +17,9 @@ from designer.base.eseries import series_values
 from designer.base.manifest import file_hash
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
-from designer.centering.cure_slots import part_slots
-from designer.centering.cure_upgrade import Upgrades, upgraded_file
 from designer.centering.design_search import look
+from designer.centering.repair_slots import part_slots
+from designer.centering.repair_upgrade import Upgrades, upgraded_file
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Circuit
 from designer.cli import entry

@@ -219,7 +219,7 @@ def test_ngspices_finest_op_amps_show_the_response_of_the_warm_board(celsius: fl
     board = draw(circuit, replace(at(celsius), tempco={}), 4, 0)
     asked = subject(circuit, board, "both", 0.54)
     assert asked.orbit.status is OrbitStatus.PERIODIC
-    full = replace(asked, rung="full")
+    full = replace(asked, fidelity="full")
     job = numerics_gate.job(full, SolverSettings("trap", asked.period / 2000))
     first = parameters(job.netlist, circuit.sections[0].name)
     assert first["gbw"] == pytest.approx(3e6 * (1.0 - 2e-3 * (celsius - ROOM)))

@@ -127,7 +127,7 @@ def test_the_generator_makes_the_forces_of_the_model(name: str) -> None:
     drive = design.excitation(response.b, response.omega).drive
     angle = np.linspace(0.0, 2.0 * np.pi, 500)
     gains = design.errors.drive_gain, design.errors.second_gain
-    volts = drive.at(angle), drive.beside_at(angle)
+    volts = drive.at(angle), drive.second_at(angle)
     found = -sum(np.outer(v, gain) for v, gain in zip(volts, gains, strict=True))
     wanted = sum(
         np.outer(np.sin(w.order * angle), w.sine) + np.outer(np.cos(w.order * angle), w.cosine)
@@ -156,7 +156,7 @@ def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
     grid = np.arange(2, 800) / 400 * period
     wanted = flow.run(orbit.start, 2, mode=orbit.mode, points=400).strobes[2:800]
     angle = flow.drive.omega * grid
-    volts = np.stack([flow.drive.at(angle), flow.drive.beside_at(angle)], axis=1)
+    volts = np.stack([flow.drive.at(angle), flow.drive.second_at(angle)], axis=1)
     wanted = np.hstack([wanted, volts[:, : len(circuit.generators)]])
     for k, net in enumerate(nets):
         got = np.interp(grid, waves.axis, waves.signals[net])
@@ -184,7 +184,7 @@ def test_decks_for_other_simulators_have_the_same_generator(name: str) -> None:
     ]
     for waves in both:
         angle = excitation.drive.omega * waves.axis
-        wanted = excitation.drive.at(angle), excitation.drive.beside_at(angle)
+        wanted = excitation.drive.at(angle), excitation.drive.second_at(angle)
         for net, volts in zip(nets, wanted, strict=False):
             assert waves.signals[net] == pytest.approx(volts, abs=1e-3 * np.abs(volts).max())
 
@@ -253,7 +253,7 @@ def test_loads_know_both_channels() -> None:
     for start, periods in ((orbit.start, orbit.n), (np.zeros(4), 20)):
         run = flow.run(start, periods, points=500)
         angle = 2.0 * np.pi * np.arange(len(run.strobes)) / 500
-        volts = zip(flow.drive.at(angle), flow.drive.beside_at(angle), strict=True)
+        volts = zip(flow.drive.at(angle), flow.drive.second_at(angle), strict=True)
         peaks: dict[str, float] = {}
         for x, (u, w), phase in zip(run.strobes, volts, angle, strict=True):
             key = flow.mode_at(x, float(phase))

@@ -155,9 +155,9 @@ def test_channels_of_a_board_with_a_law_are_told_with_a_doubt() -> None:
     prediction, named = BoardPrediction(made), 0
     for drawn in drawn_records(made, range(8), 3):
         try:
-            motion = recorded_motion(drawn.record, prediction, told=drawn.told)
+            motion = recorded_motion(drawn.record, prediction, stated=drawn.channels)
         except InputError:
             continue
         named += 1
-        assert drawn.told or motion.doubt
+        assert drawn.channels or motion.doubt
     assert named

@@ -141,7 +141,7 @@ def test_symmetry_of_even_periods() -> None:
     )
 
 
-# A small study on the exact rung.
+# A small study on the exact circuit.
 
 
 @cache

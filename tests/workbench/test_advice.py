@@ -9,7 +9,7 @@ import pytest
 
 from designer.circuit.ensemble import Ensemble
 from designer.model.tuning_bands import Bands
-from designer.verdicts.exact_rung import settled
+from designer.verdicts.exact_circuit import settled
 from designer.verdicts.verdict import Verdict
 from designer.workbench import advice as advice_module
 from designer.workbench.advice import SURE, Advice, advise

@@ -18,7 +18,7 @@ from designer.spread.spread import Spread, draw_many
 from designer.workbench.board_fit import BoardFit, NoSuchBoard, fit_board, orbit_slopes
 from designer.workbench.board_orbits import NetOrbit, follow
 from designer.workbench.board_prior import Prior
-from designer.workbench.fitted_board import NORMAL, board_figures, figures, told_figures
+from designer.workbench.fitted_board import NORMAL, board_figures, determined_figures, figures
 from designer.workbench.observation import observe
 from designer.workbench.record import Record, RecordedMotion
 from tests.shared.paper_cases import subject
@@ -116,7 +116,7 @@ def test_gaps_and_force_are_those_of_the_board(
     fitted: tuple[BoardFit, dict[str, float]],
 ) -> None:
     fit, truth = fitted
-    told = {figure.name: figure for figure in told_figures(fit)}
+    told = {figure.name: figure for figure in determined_figures(fit)}
     for gap in ("upper gap", "lower gap"):
         assert told[gap].value == pytest.approx(truth[gap], abs=0.01)
     force = told["constant force"]
@@ -127,7 +127,7 @@ def test_intervals_hold_the_truth_and_what_is_not_told_is_left_out(
     fitted: tuple[BoardFit, dict[str, float]],
 ) -> None:
     fit, truth = fitted
-    every, told = figures(fit), {figure.name for figure in told_figures(fit)}
+    every, told = figures(fit), {figure.name for figure in determined_figures(fit)}
     for figure in every:
         sigma = (figure.high - figure.low) / (2.0 * NORMAL)
         assert abs(figure.value - truth[figure.name]) < 3.5 * sigma, figure

@@ -27,7 +27,7 @@ def cut(number: int, net: str, share: float, sides: tuple[int, ...] = (1, -1)) -
     truth = stored(number)
     told = {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
     record = clipped_record(number, net, share, sides)
-    return identify_response(recorded_motion(record, prediction(), told=told), prediction())
+    return identify_response(recorded_motion(record, prediction(), stated=told), prediction())
 
 
 def clipped_record(number: int, net: str, share: float, sides: tuple[int, ...] = (1, -1)) -> Record:
@@ -68,14 +68,14 @@ def test_what_is_cut_off_is_held_against_the_equations_by_the_rest(number: int, 
     right = balance.balance(truth.nets)
     assert right.misfit < 2.0
     others = [each for each in balance.assignments(6000) if each.nets != truth.nets]
-    assert all(each.told < right.told for each in others if each.misfit < 5.0)
+    assert all(each.explained < right.explained for each in others if each.misfit < 5.0)
 
 
 def test_an_output_that_is_cut_off_unseen_does_not_shift_the_stops() -> None:
     """Short tops are cut off before the noise comes in, which nothing shows. Through the dead zone
     the output moved the curve by four errors, and 1-8-6 was surely 1-8-5."""
     (truth,) = drawn_records(synthesised(), range(12, 13), 77)
-    motion = recorded_motion(truth.record, prediction(), told=truth.told)
+    motion = recorded_motion(truth.record, prediction(), stated=truth.channels)
     name = identify_response(motion, prediction())
     assert truth.clipped == "fv"
     assert truth.response in (name.response, *name.others)

@@ -97,7 +97,7 @@ def test_a_setting_that_is_in_no_file(number: int) -> None:
     recorded (one chaotic, one 1-1-1 whose v1 looks like the predicted v3), 1-1-1 at 366 Hz without
     it, and 3-5-5 whose laps were taken for drive periods."""
     truth = drawn(number)
-    motion = recorded_motion(truth.record, prediction(), told=truth.told)
+    motion = recorded_motion(truth.record, prediction(), stated=truth.channels)
     name = identify_response(motion, prediction())
     assert name.motion.frequency == pytest.approx(truth.frequency, rel=2e-4)
     assert name.motion.channels == {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
@@ -110,7 +110,7 @@ def test_corners_without_noise_are_no_longer_period() -> None:
     (truth,) = drawn_records(synthesised(), range(10, 11), 20261)
     assert truth.clean
     name = identify_response(
-        recorded_motion(truth.record, prediction(), told=truth.told), prediction()
+        recorded_motion(truth.record, prediction(), stated=truth.channels), prediction()
     )
     assert (name.response, name.sure) == (truth.response, True)
 
@@ -169,13 +169,13 @@ def test_without_what_tells_the_drive_nothing_is_sure() -> None:
     """fv alone, 297 Hz: one period of it may be of one drive period or of several."""
     truth = drawn(46)
     assert truth.nets == ("fv",)
-    motion = recorded_motion(truth.record, prediction(), told={"fv": "CH1"})
+    motion = recorded_motion(truth.record, prediction(), stated={"fv": "CH1"})
     name = identify_response(motion, prediction())
     assert not name.sure
     assert "the drive frequency" in name.reason
     assert "--omega" in name.would_tell
     said = recorded_motion(
-        truth.record, prediction(), told={"fv": "CH1"}, frequency=0.99 * truth.frequency
+        truth.record, prediction(), stated={"fv": "CH1"}, frequency=0.99 * truth.frequency
     )
     name = identify_response(said, prediction())
     assert (name.response, name.sure) == (truth.response, True)
@@ -188,7 +188,7 @@ def test_one_channel_that_was_not_said_is_not_sure() -> None:
     assert not open_.sure
     assert "--channels v1=CH1" in open_.would_tell
     said = identify_response(
-        recorded_motion(truth.record, prediction(), told={"v1": "CH1"}), prediction()
+        recorded_motion(truth.record, prediction(), stated={"v1": "CH1"}), prediction()
     )
     assert (said.response, said.sure) == (truth.response, True)
     assert said.motion.frequency == pytest.approx(truth.frequency, rel=2e-4)

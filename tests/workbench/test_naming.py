@@ -67,7 +67,7 @@ def test_the_stops_are_those_of_the_board() -> None:
 def test_one_channel_is_enough_where_contacts_are_deep(nets: tuple[str, ...]) -> None:
     truth = stored(3)
     told = {net: f"CH{truth.nets.index(net) + 1}" for net in nets}
-    motion = recorded_motion(truth.record, prediction(), frequency=truth.frequency, told=told)
+    motion = recorded_motion(truth.record, prediction(), frequency=truth.frequency, stated=told)
     name = identify_response(motion, prediction())
     assert name.response == truth.response
     assert not name.dead_zones
@@ -84,7 +84,7 @@ def test_a_sine_that_drifts_is_no_period() -> None:
         noisy = base + more + 0.02 * rng.normal(size=len(time))
         record = Record(time, {"CH1": noisy}, "made")
         motion = recorded_motion(
-            record, prediction(), frequency=truth.frequency, told={"v1": "CH1"}
+            record, prediction(), frequency=truth.frequency, stated={"v1": "CH1"}
         )
         assert identify_response(motion, prediction()).response == response
 
@@ -98,7 +98,7 @@ def test_laps_that_drift_within_the_noise_are_not_sure(drift: float, sure: bool)
     height = 6.0 + drift * noise * np.sin(2.0 * np.pi * 0.19 * frequency * time)
     volts = height * np.sin(2.0 * np.pi * frequency * time) + noise * rng.normal(size=len(time))
     record = Record(time, {"CH1": volts}, "made")
-    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    motion = recorded_motion(record, prediction(), frequency=frequency, stated={"v1": "CH1"})
     name = identify_response(motion, prediction())
     assert (name.response.split("-")[0], name.sure) == ("1", sure)
     assert sure or "laps" in name.reason
@@ -134,7 +134,7 @@ def test_steps_of_a_converter_are_no_longer_period(
     record = corners(points, periods, noise, subharmonic)
     told = {"v1": "CH1", "fv": "CH2"}
     name = identify_response(
-        recorded_motion(record, prediction(), frequency=80.0, told=told), prediction()
+        recorded_motion(record, prediction(), frequency=80.0, stated=told), prediction()
     )
     assert name.response.split("-")[0] == n
     assert ("3 drive periods" in name.reason) == (noise < 1e-3)
@@ -152,7 +152,7 @@ def test_corners_between_few_samples_are_not_surely_aperiodic(n: int) -> None:
     cycles = 1.0 + np.arange(int((periods - 1) * samples)) / samples
     corner = (laps[:, None] + place).ravel(), height[laps % len(height)].ravel()
     record = Record(cycles / frequency, {"CH1": np.interp(cycles, *corner)}, "made")
-    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    motion = recorded_motion(record, prediction(), frequency=frequency, stated={"v1": "CH1"})
     # What is doubtful of its drive is left out here.
     name = identify_response(replace(motion, doubt="", remedy=""), prediction())
     assert (name.response, name.sure) == ("aperiodic", not n)
@@ -169,7 +169,7 @@ def test_a_few_laps_of_three_periods_are_not_sure(laps: float, sure: bool) -> No
     angle = 2.0 * np.pi * frequency * time
     volts = 7.0 * np.sin(angle) + np.sin(angle / 3.0) + 0.02 * rng.normal(size=len(time))
     record = Record(time, {"CH1": volts}, "made")
-    motion = recorded_motion(record, prediction(), frequency=frequency, told={"v1": "CH1"})
+    motion = recorded_motion(record, prediction(), frequency=frequency, stated={"v1": "CH1"})
     name = identify_response(motion, prediction())
     assert (name.response.split("-")[0], name.sure) == ("3", sure)
     assert sure or name.would_tell == "a record of 30 drive periods or more"
@@ -191,7 +191,7 @@ def test_what_cannot_be_is_refused(told: dict[str, str], field: str, found: str)
         signals={name: signal[:600] for name, signal in record.signals.items()},
     )
     with pytest.raises(InputError) as error:
-        recorded_motion(short, prediction(), told=told)
+        recorded_motion(short, prediction(), stated=told)
     assert error.value.field == field
     assert found in str(error.value)
 

@@ -13,7 +13,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.spread.spread import draw
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.yields.study_identity import study_hash
 from designer.yields.tolerance_study import lagging_plan
 from tests.shared.bench_plans import plan
@@ -31,7 +31,7 @@ def test_boards_with_bandwidth_start_on_its_nominal_orbit_and_are_judged_alone()
     moved = question.start.start - without.questions[0].start.start
     assert max(abs(moved)) > 1e-3  # volts: bandwidth is in it
 
-    for answer in exact_rung.block(asked, range(3), 1):
+    for answer in exact_circuit.block(asked, range(3), 1):
         board = draw(asked.circuit, asked.spread, asked.seed, answer.sample)
         system = Reduction(asked.circuit, board, bandwidth=True).system()
         orbit = settle(Flow(system, drive), question.start.start)

@@ -22,7 +22,7 @@ from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.worker import open_simulator
 from designer.spread.spread import draw
-from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.exact_circuit import Case, settled
 from designer.yields.power_up import follow, switched_on, until_strobe
 from designer.yields.start_recipe_search import candidates, phase
 from tests.shared import bench_plans

@@ -186,7 +186,7 @@ def test_another_study_is_not_read(
     ]
     assert len({study_hash(p) for p in [plan, *others]}) == len(others) + 1
     assert all(_store(tmp_path, other).read(block) == [] for other in others)
-    # ngspice's settings are no matter of the exact rung's.
+    # ngspice's settings are no matter of the exact circuit's.
     other = replace(plan, questions=(replace(question, settings=None),))
     assert study_hash(other) == study_hash(plan)
     assert study_hash(other, "ngspice") != study_hash(plan, "ngspice")

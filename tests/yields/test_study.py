@@ -28,12 +28,12 @@ from designer.folders import model_source, study_json
 from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
-from designer.verdicts import exact_rung, ngspice_runs
+from designer.verdicts import exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
 from designer.yields import layers, tolerance_study
-from designer.yields.blame_analysis import blame
 from designer.yields.layers import CHUNK, LocalRunner
+from designer.yields.loss_attribution import attribute
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
@@ -42,7 +42,7 @@ from tests.folders.test_study_cache import MAP
 from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan
-from tests.yields.test_blame_analysis import _Memory
+from tests.yields.test_loss_attribution import _Memory
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -218,9 +218,9 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     assert "boundary" in [s.name for s in both.strata]
 
 
-@pytest.mark.parametrize("rung", ["auto", "ngspice"])
+@pytest.mark.parametrize("fidelity", ["auto", "ngspice"])
 def test_boards_that_differ_are_explained_by_their_own_orbit(
-    rung: Any, monkeypatch: pytest.MonkeyPatch
+    fidelity: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
     one."""
@@ -243,7 +243,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), rung)
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), fidelity)
     study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
@@ -301,7 +301,7 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
     made: Any = SimpleNamespace(
         modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
     )
-    tolerance(made, samples=3, rung="exact", checked=(), progress=said)
+    tolerance(made, samples=3, fidelity="exact", checked=(), progress=said)
     assert len(notes) == (spread is not None)
     assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
@@ -399,7 +399,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def exact(home: Path) -> Path:
-    """A design folder with a study on the exact rung."""
+    """A design folder with a study on the exact circuit."""
     out = home / "exact"
     assert entry.status([*_words(home, out), "-q"]) == 0
     return out
@@ -421,7 +421,7 @@ def _files(folder: Path) -> dict[str, object]:
     return out
 
 
-def test_the_exact_rung_needs_no_ngspice(
+def test_the_exact_circuit_needs_no_ngspice(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """No program on the path, and a library that is not there."""
@@ -473,7 +473,7 @@ def _refused(*_: Any, **__: Any) -> Any:
     raise AssertionError("this was known")
 
 
-def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
+def test_another_layer_asks_for_no_attribution_again_and_other_boards_do(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "exact"
@@ -483,9 +483,9 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
 
     def counted(*args: Any, **options: Any) -> Any:
         asked.append(len(args[1]))
-        return blame(*args, **options)
+        return attribute(*args, **options)
 
-    monkeypatch.setattr(tolerance_study, "blame", counted)
+    monkeypatch.setattr(tolerance_study, "attribute", counted)
     monkeypatch.setattr(StudyWork, "powered_up", lambda _, study: study)
     assert entry.status([*_words(home, out), "--reached", "-q"]) == 0
     assert asked == []
@@ -504,7 +504,7 @@ def test_a_model_without_a_title_has_the_same_name_in_its_folder(exact: Path) ->
     assert (exact / "kicad" / "small.kicad_sch").is_file()
 
 
-def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
+def test_yields_stand_before_the_attribution_and_it_goes_on_after_an_interruption(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -522,7 +522,7 @@ def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(tolerance_study, "blame", interrupted)
+        patched.setattr(tolerance_study, "attribute", interrupted)
         assert entry.status(["tolerance", str(out), "--resume"]) == 130
     assert "100.0   76–100" in capfd.readouterr().err
     early = json.loads((out / "tolerance.json").read_text())
@@ -534,21 +534,21 @@ def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
     assert (out / PIECES).exists()
     assert entry.status(["tolerance", str(out)]) == 2
     assert "--resume" in capfd.readouterr().err
-    (out / PIECES).unlink()  # what was put there is none of this blame
+    (out / PIECES).unlink()  # what was put there is none of this attribution
     assert entry.status([*_words(home, out), "--resume", "--json"]) == 0
     (line,) = [json.loads(capfd.readouterr().out)]
     assert line["blame"] == {"status": "whole", "share": 1.0, "budget": None, "reason": ""}
     assert _files(out) == _files(exact)
 
 
-def test_a_study_without_blame_gets_it_later_and_loses_it_never(
+def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     out = tmp_path / "exact"
     shutil.copytree(exact, out)
     with monkeypatch.context() as patched:
-        patched.setattr(tolerance_study, "blame", _refused)
+        patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status(["tolerance", str(out), "--no-blame", "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["blame"]["status"] == "whole"
         assert _files(out) == _files(exact)
@@ -558,7 +558,7 @@ def test_a_study_without_blame_gets_it_later_and_loses_it_never(
         without = json.loads((out / "tolerance.json").read_text())
         assert without["blame"]["status"] == "left out"
         assert "Blame left out" in (out / "report.md").read_text()
-        # The folder's own samples, and its own choice of no blame.
+        # The folder's own samples, and its own choice of no attribution.
         assert entry.status(["tolerance", str(out), "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["samples"] == 13
     assert (
@@ -584,7 +584,7 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
     with monkeypatch.context() as patched:
         patched.setattr(numerics_gate, "check", _refused)
         patched.setattr(equation_check, "check", _refused)
-        patched.setattr(tolerance_study, "blame", _refused)
+        patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status([*words, "--reached"]) == 0
     added = _files(out)
     once = tmp_path / "once" / "auto"
@@ -657,14 +657,14 @@ def test_a_deleted_folder_is_said_at_the_next_block(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    block = exact_rung.block
+    block = exact_circuit.block
 
     def deleted(plan: Any, indices: range, jobs: int, progress: Any) -> Any:
         rows = block(plan, indices, jobs, progress)
         shutil.rmtree(out)
         return rows
 
-    monkeypatch.setattr(exact_rung, "block", deleted)
+    monkeypatch.setattr(exact_circuit, "block", deleted)
     without_starts(monkeypatch)
     assert entry.status([*_words(home, out), "-q"]) == 2
     assert "the folder" in capfd.readouterr().err

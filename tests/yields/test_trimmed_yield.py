@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.toml_writer import toml_text
 from designer.board.board_parts import drive_resistance, driven_nodes
-from designer.centering.cure_upgrade import with_same_parts
+from designer.centering.repair_upgrade import with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
 from designer.circuit.board_parts_only import Trimmer
@@ -27,7 +27,7 @@ from designer.folders.study_json import study_json
 from designer.model.distributions import Normal
 from designer.model.model_file import parse_model_file
 from designer.spread.spread import OpAmpDrift, Spread, draw, draw_many
-from designer.verdicts import exact_rung
+from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan, Verdict, judge
 from designer.yields.adjustment import rest_distances
 from designer.yields.tolerance_study import tolerance
@@ -176,7 +176,7 @@ def test_a_constant_force_is_trimmed_away() -> None:
     position = settings(of, boards, 11, range(1))
     # The drive is ± 1; the ends of the trimmer are ± REACH.
     assert abs(position[0] - 0.5) * 2.0 * REACH == pytest.approx(ratio, abs=5e-3)
-    (there,) = exact_rung.of_boards(asked, of.at(boards, position), range(1), 1)
+    (there,) = exact_circuit.of_boards(asked, of.at(boards, position), range(1), 1)
     assert there.verdict is Verdict.OK
     assert there.penetration == pytest.approx(known.orbit.penetration, rel=0.2)
 
@@ -203,7 +203,7 @@ def test_one_setting_a_board_for_all_its_responses(rows: list[Trimmed]) -> None:
 
 def test_trimming_helps(rows: list[Trimmed]) -> None:
     of = plan(3, 6, spread=ROUGH)
-    built = exact_rung.block(of, range(10), 2)
+    built = exact_circuit.block(of, range(10), 2)
     works = sum(a.verdict is Verdict.OK for a in built)
     assert works < sum(r.verdict is Verdict.OK for r in rows)
 
@@ -297,7 +297,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
     data["board"] = {"dc_trim": "fitted"}
     data["response"] = [r for r in data["response"] if r["omega"] in (1.55, 0.85)]
     fitted = with_same_parts(made, parse_model_file(toml_text(data)))
-    study = tolerance(fitted, samples=6, rung="exact", blamed=False, jobs=1)
+    study = tolerance(fitted, samples=6, fidelity="exact", attributed=False, jobs=1)
     assert study.trimmed is not None
     assert len(study.trimmed) == 12
     answer = study_json(study, {}, {})
@@ -308,7 +308,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
         assert shown["at_end"] == 0
     whole = all_on_one(study.trimmed)
     assert answer["all_on_one_board"]["trimmed"]["ok"] == whole.ok
-    plain = tolerance(made, samples=2, rung="exact", blamed=False, jobs=1)
+    plain = tolerance(made, samples=2, fidelity="exact", attributed=False, jobs=1)
     assert plain.trimmed is None
     assert study_json(plain, {}, {})["responses"][0]["trimmed"] is None
 
