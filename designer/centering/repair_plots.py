@@ -51,7 +51,7 @@ def front_chart(repair: Repair) -> Figure:
     top.set_ylabel("yield of the worst response [%]")
     top.set_title(f"{repair.base.modelfile.title}: yield {over}", loc="left")
     top.grid(color=GRID, lw=0.7)
-    top.legend(loc="lower right")
+    figure.legend(loc="outside upper right", ncols=4)
     _listed(bottom, front, repair.base.modelfile)
     return figure
 

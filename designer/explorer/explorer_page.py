@@ -14,6 +14,7 @@ from designer.base.html_templates import page_templates
 from designer.base.script_policy import script_source
 from designer.explorer import plots
 from designer.explorer.controls import Control, controls, length_unit, units_note
+from designer.explorer.folder_losses import FolderLosses
 from designer.explorer.omega_strip import PERIODS
 from designer.explorer.place import OMEGA, first_place
 from designer.explorer.response_view import IN_SIGHT, shown_motions
@@ -37,21 +38,26 @@ def _templates() -> Environment:
     return page_templates("designer.explorer")
 
 
-def page(modelfile: ModelFile) -> str:
-    """The page that ``server`` gives out; it loads ``ASSETS`` from beside itself."""
+def page(modelfile: ModelFile, losses: FolderLosses | None = None) -> str:
+    """The page that ``server`` gives out; it loads ``ASSETS`` from beside itself. losses : of the
+    model's folder."""
     css, *scripts = ("explore.css", "bokeh.js", "explore.js")
     return _render(
         modelfile,
         styles=Markup(f'<link rel="stylesheet" href="{css}">'),
         scripts=Markup("".join(f'<script src="{name}"></script>' for name in scripts)),
         shown=controls(modelfile),
+        losses=losses,
     )
 
 
-def recorded_page(modelfile: ModelFile, recording: Message) -> str:
+def recorded_page(
+    modelfile: ModelFile, recording: Message, losses: FolderLosses | None = None
+) -> str:
     """The page as one file: it carries ``ASSETS``, and the answers that it shows.
 
-    recording : what ``saved_page.message_of`` makes. Only the slider of ω is there.
+    recording : what ``saved_page.message_of`` makes. Only the slider of ω is there. losses : of
+    the model's folder.
     """
     scripts = [asset("bokeh.js"), asset("explore.js")]
     loads = "".join(f"<script>{script}</script>" for script in scripts)
@@ -61,6 +67,7 @@ def recorded_page(modelfile: ModelFile, recording: Message) -> str:
         scripts=Markup(loads),
         shown=tuple(each for each in controls(modelfile) if each.name == OMEGA),
         recording=recording,
+        losses=losses,
         allowed=[script_source(script) for script in scripts],
     )
 
@@ -72,6 +79,7 @@ def _render(
     scripts: Markup,
     shown: tuple[Control, ...],
     recording: Message | None = None,
+    losses: FolderLosses | None = None,
     allowed: Sequence[str] = (),
 ) -> str:
     each = controls(modelfile)
@@ -87,6 +95,7 @@ def _render(
         {
             "plots": items,
             "recording": recording,
+            "losses": None if losses is None else losses.message(),
             "settled_within": PERIODS,
             "in_sight": IN_SIGHT,
             "length": {"unit": unit, "scale": scale},
@@ -106,6 +115,7 @@ def _render(
             upward=next(control.name for control in each if control.name != OMEGA),
             fixed=[control for control in each if control not in shown],
             recorded=recording is not None,
+            losses=losses,
             allowed=allowed,
             styles=styles,
             data=Markup(data),

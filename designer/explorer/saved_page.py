@@ -23,6 +23,7 @@ from designer.check import checked_design
 from designer.dynamics.orbit import SETTLED, Orbit
 from designer.explorer.controls import Control, controls
 from designer.explorer.explorer_page import recorded_page
+from designer.explorer.folder_losses import folder_losses
 from designer.explorer.omega_strip import COURSE, piece
 from designer.explorer.place import OMEGA, ModelPlace, first_place
 from designer.explorer.response_view import (
@@ -309,13 +310,14 @@ def save_page(
     Raises
     ------
     InputError : the file is there and is not to be replaced, or cannot be written; an option that
-    cannot be.
+    cannot be; a study of the model's folder that cannot be read.
     """
     options.check()
     _check_place(path, options.overwrite)
+    losses = folder_losses(modelfile)
     branch = record(modelfile, places(modelfile), options.workers, progress)
     counted = yields(modelfile, options, progress)
-    page = recorded_page(modelfile, message_of(branch, counted))
+    page = recorded_page(modelfile, message_of(branch, counted), losses)
     with appearing(path, FIELD) as partial:
         partial.write_text(page, encoding="utf-8")
     progress.note(f"{path} shows {modelfile.title} at {len(branch.omegas)} drive frequencies")

@@ -24,6 +24,7 @@ from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.explorer.board_box import PartsProcess
 from designer.explorer.explorer_page import ASSETS, asset, page
+from designer.explorer.folder_losses import FolderLosses, folder_losses
 from designer.explorer.job_processes import JobProcesses
 from designer.explorer.questions import boards, planes, read_question, save_model, viewed
 from designer.explorer.wire import Message, text_of
@@ -67,6 +68,8 @@ class Explorer:
     """What a page has to know; "" where any page on this machine may ask."""
     report: Callable[[BaseException], None] = lambda _: None
     """Told of defects that a page's question met."""
+    losses: FolderLosses | None = None
+    """What the model's folder says of rare losses."""
     sockets: set[_Socket] = field(default_factory=set)
     """The open pages."""
     compiling: bool = False
@@ -128,10 +131,11 @@ def serve(
 
     Raises
     ------
-    InputError : a port that is taken, an address that is none here.
+    InputError : a port that is taken, an address that is none here, a study that cannot be read.
     """
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
+    losses = folder_losses(modelfile)
     listening = _listening(host, port)
     number = listening.getsockname()[1]
     address = _address(host, number, token)
@@ -139,7 +143,7 @@ def serve(
     def report(error: BaseException) -> None:
         progress.note(f"a page's question failed: {type(error).__name__}: {error}")
 
-    explorer = Explorer(modelfile, WorkQueue(report), Path.cwd(), host, token, report)
+    explorer = Explorer(modelfile, WorkQueue(report), Path.cwd(), host, token, report, losses)
 
     def started() -> None:
         progress.note(f"{address} shows {modelfile.title}; Ctrl-C ends it")
@@ -254,7 +258,7 @@ class _Page(_Guarded):
             self.set_cookie(
                 self._cookie, self.explorer.token, httponly=True, samesite="Strict", path="/"
             )
-        self.write(page(self.explorer.modelfile))
+        self.write(page(self.explorer.modelfile, self.explorer.losses))
 
 
 class _Asset(_Guarded):

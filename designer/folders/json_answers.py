@@ -24,7 +24,9 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.model.model_file import ModelFile
     from designer.spread.part_grades import BetterGrade
 
-STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "blame", "boards", "maps")
+STUDY_KEYS = (
+    "samples", "until", "narrow", "all_on_one_board", "any_lost", "blame", "boards", "maps",
+)  # fmt: skip
 """What ``run`` prints of a study beside its responses."""
 
 

@@ -1,10 +1,10 @@
 """What a study need not do again when it gets another layer: its checks and its attribution.
 
-One file in the design folder, beside the rows, and another with the parts of an attribution and of
-maps that are not whole yet: each item under a name with a hash of all that decides it, and it
-counts for that hash alone. Numbers are kept to the last bit, so that a study made in two goes is
-the one made at once. A file that cannot be read, or was damaged, holds nothing
-(``base.keyed_store``).
+One file in the design folder, beside the rows, and another with the parts of an attribution, of
+maps and of estimates of rare losses that are not whole yet: each item under a name with a hash of
+all that decides it, and it counts for that hash alone. Numbers are kept to the last bit, so that a
+study made in two goes is the one made at once. A file that cannot be read, or was damaged, holds
+nothing (``base.keyed_store``).
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from designer.yields.loss_attribution import Attribution, NearLimit, ResponseAtt
 from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Crossing, Limit, Prediction
 from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
+from designer.yields.stored_parts import GivenAnswers
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 
@@ -53,8 +54,8 @@ _RECORDS: dict[str, type[Any]] = {
 } | {
     kind.__name__: kind
     for kind in (
-        Axis, Corner, Crossing, EquationCheck, EquationFinding, GateResult, Index, Limit,
-        LossRegion, NearLimit, Normal, OpAmpDrift, Orbit, Prediction, RareLosses, Read,
+        Axis, Corner, Crossing, EquationCheck, EquationFinding, GateResult, GivenAnswers, Index,
+        Limit, LossRegion, NearLimit, Normal, OpAmpDrift, Orbit, Prediction, RareLosses, Read,
         SolverSettings, ToleranceMargin, YieldMap,
     )
 }  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,7 @@ def study_json(
             "trimmed": _yield(study.on_one_board(study.trimmed)),
             "reached": _yield(study.on_one_board(study.power_ups)),
         },
+        **({"any_lost": _any_lost(study)} if study.rare else {}),
         "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [
@@ -181,6 +183,10 @@ def _rare(study: Study, index: int) -> dict[str, Any] | None:
     if found is None:
         return None
     return {k: v for k, v in found.as_dict().items() if k not in ("question", "seconds")}
+
+
+def _any_lost(study: Study) -> dict[str, float] | None:
+    return None if study.any_lost is None else asdict(study.any_lost)
 
 
 def _map(yields: YieldMap) -> dict[str, Any]:

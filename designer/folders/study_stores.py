@@ -33,7 +33,7 @@ MAPS = "maps.json"
 BOARDS = "boards.csv"
 """A row for each measured board."""
 PIECES = "study-pieces.npz"
-"""What is known of an attribution and of maps that are not whole."""
+"""What is known of an attribution, of maps and of estimates of rare losses that are not whole."""
 
 
 class FolderStores(Stores):
@@ -103,6 +103,9 @@ class FolderStores(Stores):
         if self._cache is None:
             return StoredParts()
         return _FolderPieces(self._cache, study_hash(plan, "rare"), self._guard)
+
+    def rare_answers(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(study_hash(plan, "rare"))
 
     def _pieces_of(self, key: str) -> StoredParts:
         if self._pieces is None:

@@ -42,6 +42,7 @@ from designer.jobs.study_stage import (
 from designer.model.measured_values import read_measured
 from designer.model.model_file import ModelFile, errors_in, need_responses
 from designer.spread.part_rules import spread_of
+from designer.yields.tolerance_study import need_drawn_boards
 
 THE_BOARD = "board"
 """Name of the only board of a list that names none."""
@@ -77,6 +78,8 @@ def design_and_study(
     argument = model.modelfile if isinstance(model, Synthesis) else model
     argument = argument if isinstance(argument, ModelFile) else Path(argument)
     modelfile, folder = source(argument, out)
+    if options.rare:
+        need_drawn_boards(modelfile)
     options = folder_numbers.of_study(argument, folder, modelfile, options, words)
     place = None if out is None else Path(out)
     usual = usual_times.RUN if whole_job else usual_times.STUDIED

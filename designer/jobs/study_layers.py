@@ -97,7 +97,7 @@ def study_files(options: Options, responses: int, census: bool) -> list[str]:
     names = layers_of(options)
     blocks = [f"{folder}/" for name, folder in BLOCK_FOLDERS.items() if name in names]
     boards = [BOARDS] if census else []
-    pieces = [PIECES] if options.blame or options.map_ else []
+    pieces = [PIECES] if options.blame or options.map_ or options.rare else []
     maps = [f"map-{over}-{i + 1}.png" for over in options.map_ for i in range(responses)]
     maps += [MAPS] if maps else []
     return [TOLERANCE, *REPORTS, CACHE, *boards, *pieces, *maps, *blocks]

@@ -23,6 +23,7 @@ from designer.base.page import (
     bullets,
     table,
 )
+from designer.base.rare_words import boards_at
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
@@ -344,7 +345,8 @@ def _rare(data: ReportData, pictures: Pictures) -> PageSection:
     note = SmallPrint(
         "Boards are drawn where they are lost, and each counts by how likely it is (importance "
         "sampling). The laws of the parts are bounded, so no board outlies its tolerances. What no "
-        "search met is not counted; the plain boards that were lost elsewhere, if any, bound it."
+        "search met is not counted; the plain boards that were lost elsewhere, if any, bound it. "
+        f"Boards differ as in the study above, {boards_at(data.plan.spread.temperature)}."
     )
     wider = SmallPrint(
         "Where one part alone is moved, all others are as they should be. Below 1 it is lost "
@@ -402,7 +404,7 @@ def _attribution(data: ReportData, pictures: Pictures) -> PageSection:
         return PageSection("", [])
     lost = any(b.lost for b in attribution.responses)
     avoided = tolerance_tables.avoided(data)
-    blocks: list[Block] = [SmallPrint(_attribution_note(attribution, lost=lost)), limits]
+    blocks: list[Block] = [SmallPrint(_attribution_note(data, attribution, lost=lost)), limits]
     if avoided is not None:
         blocks.append(PageSection("Losses avoided", [avoided, pictures.get("avoided")]))
     if indices is not None:
@@ -434,7 +436,7 @@ def _indices_note(data: ReportData, attribution: Attribution) -> list[Block]:
     ]
 
 
-def _attribution_note(attribution: Attribution, *, lost: bool) -> str:
+def _attribution_note(data: ReportData, attribution: Attribution, *, lost: bool) -> str:
     replays = "No board was lost, so none was asked again. "
     if lost:
         replays = (
@@ -443,7 +445,8 @@ def _attribution_note(attribution: Attribution, *, lost: bool) -> str:
         )
     return replays + (
         "The margin is the distance to the loss, linear in the parts; its indices tell whose "
-        "spread moves it, and are worth as much as the verdicts that it foretells. Cost: "
+        "spread moves it, and are worth as much as the verdicts that it foretells. Boards are "
+        f"{boards_at(data.plan.spread.temperature)}, the nominal one at 25 °C. Cost: "
         f"{words.plural(attribution.attractors, 'attractor')} and "
         f"{words.plural(attribution.orbits, 'step')} of following orbits."
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from designer.base.page import (
     Bar,
@@ -21,6 +21,7 @@ from designer.base.page import (
     Remedies,
     SmallPrint,
 )
+from designer.base.rare_words import any_lost_words, loss_words
 from designer.base.si_unit import value_text
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
@@ -304,6 +305,12 @@ def _yields(data: ReportData) -> list[Block]:
             f"{words.all_of(len(data.checked))} responses on one and the same board: {joint.ok} of "
             f"{joint.samples - joint.failed}; of a thousand, {_of_a_thousand(joint)}."
         )
+    if data.study.rare:
+        most = max(data.study.rare, key=lambda each: (each.lost, each.high))
+        name = words.name(data.checked[data.study.response_indices[most.question]])
+        out.append(f"{name}: {loss_words(most.as_dict())}.")
+        if data.study.any_lost is not None:
+            out.append(f"{any_lost_words(asdict(data.study.any_lost))}.")
     failed = sum(y.failed for _, y in rows)
     if failed:
         out.append(f"{words.plural(failed, 'run')} gave no answer, which the yields leave out.")

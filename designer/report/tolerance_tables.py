@@ -242,7 +242,12 @@ def rare(data: ReportData) -> Table | None:
         ),
         "may be unseen": lambda r: f"up to {_millions(r.unseen)}",
     }
-    return table_of(data.study.rare, columns, ("of these lost", "effective number"))
+    rows = [[cell(r) for cell in columns.values()] for r in data.study.rare]
+    if (joint := data.study.any_lost) is not None:
+        cells = [f"{_millions(joint.least)} to {_millions(joint.most)}"]
+        cells.append(f"{_millions(joint.low)} to {_millions(joint.high)}, by the ends above")
+        rows.append(["at least one, on one board", *cells, *[words.NONE] * (len(columns) - 3)])
+    return table(list(columns), rows, (4, 5))
 
 
 def loss_regions(data: ReportData) -> Table | None:

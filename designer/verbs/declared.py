@@ -75,6 +75,9 @@ Blame = Annotated[
 BlameBudget = Annotated[
     int | None, option("--blame-budget", "STEPS", "Most steps of the attribution [20000].")
 ]
+Rare = Annotated[
+    bool, option("--rare", None, "Also how many of a million are lost, drawn where they are.")
+]
 Seed = Annotated[int, option("--seed", "N", "Seed of the random numbers.")]
 OwnSeed = Annotated[
     int | None, option("--seed", "N", "Seed of the random numbers [1, or the folder's own].")

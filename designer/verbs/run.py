@@ -13,6 +13,7 @@ from designer.verbs.declared import (
     Out,
     Overwrite,
     OwnSeed,
+    Rare,
     Resume,
     Samples,
     Source,
@@ -30,6 +31,7 @@ def run(
     out: Out = None,
     *,
     samples: Samples = None,
+    rare: Rare = False,
     blame: Blame = None,
     blame_budget: BlameBudget = None,
     seed: OwnSeed = None,
@@ -61,6 +63,7 @@ def run(
         jobs=jobs,
         overwrite=overwrite,
         resume=resume,
+        rare=rare,
         attribution_anew=bool(blame),
         **stated_options(words),
     )

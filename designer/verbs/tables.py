@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.attribution_noise import lacks_noise
+from designer.base.rare_words import any_lost_words
 from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
@@ -29,7 +30,7 @@ def design_written(
     printed. tables : shows it. after : what may be done next."""
     if outcome.shown:
         attribution_status(answer)
-        _rare(answer.get("responses", ()))
+        _rare(answer)
     else:
         tables(answer)
     if outcome.folder is not None:
@@ -162,7 +163,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         say(f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
     _further(answer)
-    _rare(rows)
+    _rare(answer)
 
 
 def _counts(row: Mapping[str, Any]) -> dict[str, str]:
@@ -232,8 +233,9 @@ def _further(answer: Mapping[str, Any]) -> None:
         say(f"All on one board: {', '.join(counts)}")
 
 
-def _rare(rows: Sequence[Mapping[str, Any]]) -> None:
+def _rare(answer: Mapping[str, Any]) -> None:
     """How many of a million boards are lost, where that was asked for."""
+    rows = answer.get("responses", ())
     asked = [r for r in rows if r.get("rare")]
     if not asked:
         return
@@ -253,6 +255,8 @@ def _rare(rows: Sequence[Mapping[str, Any]]) -> None:
         }
 
     table("Rare losses", ({**response_cells(r, rows), **cells(r)} for r in asked), gap=1)
+    if any_lost := answer.get("any_lost"):
+        say(any_lost_words(any_lost))
     unseen = 1e6 * max(r["rare"]["unseen"] for r in asked)
     if unseen:
         say(f"A region of losses that no search met may hold up to {unseen:.3g} of a million more")

@@ -18,6 +18,7 @@ from designer.verbs.declared import (
     Out,
     Overwrite,
     OwnSeed,
+    Rare,
     Resume,
     Samples,
     Verb,
@@ -36,6 +37,7 @@ STUDY_KEYS = (
     "until",
     "narrow",
     "all_on_one_board",
+    "any_lost",
     "blame",
     "boards",
     "equation_check",
@@ -72,9 +74,7 @@ def tolerance(
     reached: Annotated[
         bool, option("--reached", None, "Also from power-up, by the start recipe.")
     ] = False,
-    rare: Annotated[
-        bool, option("--rare", None, "Also how many of a million are lost, drawn where they are.")
-    ] = False,
+    rare: Rare = False,
     map_: Annotated[
         Sequence[Over],
         option(

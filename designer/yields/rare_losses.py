@@ -36,6 +36,7 @@ from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.loss_walks import LossWalk, Shown, independent, walk
 from designer.yields.margins import nominal_limits
+from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
 from designer.yields.yield_count import Yield
@@ -182,6 +183,29 @@ class RareLosses:
 
 
 @dataclass(frozen=True)
+class AnyLost:
+    """How many boards lose at least one of several responses, as far as the estimates of the single
+    ones say: at least as many as lose the one that most lose, at most as many as all those together
+    (M. Fréchet, Fund. Math. 25, 1935)."""
+
+    least: float
+    """Share of the boards, at least."""
+    most: float
+    """Share of them, at most."""
+    low: float
+    """The least share, by the lower ends of the intervals."""
+    high: float
+    """The largest share, by their upper ends."""
+
+    @classmethod
+    def of(cls, found: Sequence[RareLosses]) -> AnyLost:
+        """From one estimate at least."""
+        lost = [each.lost for each in found]
+        high = min(sum(each.high for each in found), 1.0)
+        return cls(max(lost), min(sum(lost), 1.0), max(each.low for each in found), high)
+
+
+@dataclass(frozen=True)
 class _Region:
     """A component of the mixture, and what led to it."""
 
@@ -227,12 +251,15 @@ class _Sample:
 
 @dataclass(frozen=True)
 class _Drawing:
-    """What draws boards of one question and asks them."""
+    """What draws boards of one question and asks them. Boards are given by points (N, coordinates)
+    of the cube; wide : (N,) by how much more off than they may be, None for not at all."""
 
     plan: StudyPlan
     question: Question
     jobs: int
     progress: Callable[[], None]
+    log: AnswerLog
+    """Has what was answered before an interruption."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -261,11 +288,40 @@ class _Drawing:
             self.progress()
         return orbits
 
-    def boards(self, points: Array) -> Boards:
-        return self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
+    def boards(self, points: Array, wide: Array | None = None) -> Boards:
+        boards = self.plan.modelled(self.plan.spread.from_cube(self.plan.circuit, points))
+        return boards if wide is None else between(boards, wide)
 
-    def asked(self, boards: Boards, *, within: int | None = None) -> list[tuple[Verdict, str]]:
+    def asked(
+        self, points: Array, wide: Array | None = None, *, within: int | None = None
+    ) -> list[tuple[Verdict, str]]:
         """The verdict of each board and what it shows. within : as of ``Ensemble.respond``."""
+
+        def ask() -> list[str]:
+            answers = self._verdicts(self.boards(points, wide), within)
+            return [f"{verdict} {response}" for verdict, response in answers]
+
+        lines = self._known(("asked", within), points, wide, ask)
+        pairs = (line.partition(" ") for line in lines)
+        return [(Verdict(verdict), response) for verdict, _, response in pairs]
+
+    def foretold(self, points: Array, wide: Array, *, whole: bool) -> list[str]:
+        """The kind of loss of each board, "" where it is fine. whole : whether boards are asked
+        that the compiled way leaves open; they count as fine otherwise."""
+
+        def ask() -> list[str]:
+            return self._kinds(self.boards(points, wide), whole=whole)
+
+        return self._known(("foretold", whole), points, wide, ask)
+
+    def _known(
+        self, how: object, points: Array, wide: Array | None, ask: Callable[[], list[str]]
+    ) -> list[str]:
+        question = [repr(how).encode("ascii"), points.tobytes()]
+        question += [] if wide is None else [wide.tobytes()]
+        return self.log.answer(b"".join(question), len(points), ask)
+
+    def _verdicts(self, boards: Boards, within: int | None) -> list[tuple[Verdict, str]]:
         q = self.question
         out: list[tuple[Verdict, str]] = []
         for first in range(0, len(boards), BLOCK):
@@ -276,9 +332,7 @@ class _Drawing:
             out += [(verdict, orbit.response) for orbit, verdict, _ in rows]
         return out
 
-    def foretold(self, boards: Boards, *, whole: bool) -> list[str]:
-        """The kind of loss of each board, "" where it is fine. whole : whether boards are asked
-        that the compiled way leaves open; they count as fine otherwise."""
+    def _kinds(self, boards: Boards, *, whole: bool) -> list[str]:
         out = [""] * len(boards)
         slow = list(range(len(boards)))
         if self.quick:
@@ -288,25 +342,22 @@ class _Drawing:
                 if orbit is not None and self.question.judge(orbit)[0] is not Verdict.OK:
                     out[k] = _kind_of(orbit.response)
         if slow and (whole or not self.quick):
-            asked = self.asked(boards.take(np.array(slow)), within=self.within)
+            asked = self._verdicts(boards.take(np.array(slow)), self.within)
             for k, (verdict, response) in zip(slow, asked, strict=True):
                 out[k] = "" if verdict is Verdict.OK else _kind_of(response)
         return out
 
     def scouted(self, points: Array, component: Index, wide: Array | None = None) -> _Sample:
         """These boards asked briefly, which is enough to find where to draw: one that takes long to
-        settle is lost here. wide : (N,) by how much more off than they may be."""
-        boards = self.boards(points)
-        if wide is not None:
-            boards = between(boards, wide)
-        verdicts = self.asked(boards, within=self.within)
+        settle is lost here."""
+        verdicts = self.asked(points, wide, within=self.within)
         lost = np.array([v is not Verdict.OK for v, _ in verdicts], dtype=bool)
         responses = tuple(response for _, response in verdicts)
         return _Sample(points, component, lost, np.zeros_like(lost), responses)
 
     def sample(self, points: Array, component: Index) -> _Sample:
         """These boards asked."""
-        verdicts = self.asked(self.boards(points))
+        verdicts = self.asked(points)
         failed = np.array([v is Verdict.FAILED for v, _ in verdicts], dtype=bool)
         fine = np.array([v is Verdict.OK for v, _ in verdicts], dtype=bool)
         responses = tuple(response for _, response in verdicts)
@@ -322,13 +373,15 @@ def rare_losses(
     bound: float | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
+    log: AnswerLog | None = None,
 ) -> RareLosses:
     """How many boards lose question ``number`` of a plan, on the exact circuit.
 
     most : boards that the estimate may take; ``MOST_BOARDS`` where none is given. target :
     half-width of the 95 % interval over the estimate at which it ends. bound : a share; it ends as
     well where the interval lies on one side of it, which favours that side a little. progress :
-    called once a board that was asked.
+    called once a board that was asked. log : has what boards answered before an interruption, and
+    gets what they answer now.
 
     Raises
     ------
@@ -339,7 +392,8 @@ def rare_losses(
     began = time.perf_counter()
     most = MOST_BOARDS if most is None else most
     question = plan.questions[number]
-    drawing = _Drawing(plan, question, jobs, progress)
+    log = AnswerLog(StoredParts(), "") if log is None else log
+    drawing = _Drawing(plan, question, jobs, progress, log)
     stream = crc32(question.stream.encode("utf-8"))
     rng = np.random.default_rng([plan.seed, stream, TAG])
     doing("regions of loss")
@@ -529,7 +583,7 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
             continue
         strength = _strength(way, float(middle[j]))
         tilts = np.clip(np.outer(strength * np.array(PATH), way), -STEEPEST, STEEPEST)
-        verdicts = drawing.asked(drawing.boards(mean_of(tilts)))
+        verdicts = drawing.asked(mean_of(tilts))
         lost = [k for k, (v, _) in enumerate(verdicts) if v not in (Verdict.OK, Verdict.FAILED)]
         if lost:
             yield _Region(tilts[lost[0]], limit.what)
@@ -555,7 +609,7 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
         def kinds(points: Array, widths: Array) -> list[str]:
             nonlocal asked
             asked += len(points)
-            return drawing.foretold(between(drawing.boards(points), widths), whole=whole)
+            return drawing.foretold(points, widths, whole=whole)
 
         return kinds
 
@@ -750,13 +804,12 @@ def _corner(tilt: Array) -> Array:
 def _widenings(drawing: _Drawing, points: Array) -> list[float | None]:
     """For each point (coordinates,) the width of the tolerances at which its board is lost first;
     None where it is not up to ``WIDEST``."""
-    boards = drawing.boards(points)
+    rows = np.repeat(points, STEPS, axis=0)
     low, high = np.full(len(points), 1.0 / WIDEST), np.full(len(points), WIDEST)
     found = np.ones(len(points), dtype=bool)
     for _ in range(2):
         widths = np.geomspace(low, high, STEPS, axis=1)
-        rows = boards.take(np.repeat(np.arange(len(points)), STEPS))
-        verdicts = drawing.asked(between(rows, widths.ravel()))
+        verdicts = drawing.asked(rows, widths.ravel())
         lost = np.array([v not in (Verdict.OK, Verdict.FAILED) for v, _ in verdicts])
         lost = lost.reshape(widths.shape)
         found &= lost.any(axis=1)

@@ -23,7 +23,7 @@ from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
 from designer.yields import two_engine_yield
 from designer.yields.loss_attribution import Attribution, AttributionStatus
 from designer.yields.power_up import PowerUp
-from designer.yields.rare_losses import RareLosses
+from designer.yields.rare_losses import AnyLost, RareLosses
 from designer.yields.row_store import Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
@@ -185,6 +185,14 @@ class Study:
     def rare_of(self, index: int) -> RareLosses | None:
         """The estimate for response number ``index``, if there is one."""
         return next((r for r in self.rare if self.response_indices[r.question] == index), None)
+
+    @property
+    def any_lost(self) -> AnyLost | None:
+        """How many boards lose one response at least; None unless there are two at least and each
+        has an estimate."""
+        if len(self.rare) < max(len(self.checked), 2):
+            return None
+        return AnyLost.of(self.rare)
 
     @property
     def blame_status(self) -> AttributionStatus:

@@ -24,7 +24,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.orbit import SETTLED
-from designer.model.model_file import need_responses
+from designer.model.model_file import ModelFile, need_responses
 from designer.model.tuning_bands import Bands
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
@@ -43,7 +43,7 @@ from designer.yields.rare_losses import counted_losses, rare_losses
 from designer.yields.row_store import BlockStore
 from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe_search import find_recipes
-from designer.yields.stored_parts import StoredParts
+from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.study import Study, plan_study
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
@@ -130,6 +130,10 @@ class Stores:
         """Where the finished estimates of rare losses are."""
         return StoredParts()
 
+    def rare_answers(self, plan: StudyPlan) -> StoredParts:
+        """Where the answers of boards are that an estimate of rare losses has asked so far."""
+        return StoredParts()
+
 
 def check(
     synthesis: Synthesis,
@@ -192,10 +196,8 @@ def tolerance(
     at_least("--samples", samples, 1)
     at_least("--seed", seed, 0)
     at_least("--jobs", jobs, 1)
-    listed = synthesis.modelfile.measured if rare else None
-    if listed is not None and listed.labels:
-        expected = "no list of measured boards, which are as many as there are"
-        raise InputError(None, "--rare", "spread.measured", expected)
+    if rare:
+        need_drawn_boards(synthesis.modelfile)
     pool = None if fidelity == "exact" else pool
     checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
@@ -265,6 +267,14 @@ def tolerance(
     if rare:
         study = work.drawn_where_lost(study)
     return work.mapped(study, maps, warm) if maps else study
+
+
+def need_drawn_boards(modelfile: ModelFile) -> None:
+    """InputError where the boards of a model file are those of a list, whose rare losses nobody
+    can estimate."""
+    if modelfile.measured is not None and modelfile.measured.labels:
+        expected = "no list of measured boards, which are as many as there are"
+        raise InputError(None, "--rare", "spread.measured", expected)
 
 
 def _why_not(checked: CheckedResponse) -> str:
@@ -410,6 +420,7 @@ class StudyWork:
         """The study with an estimate of each response's losses, by boards that are drawn where they
         are lost."""
         found, parts = [], self.stores.rare(study.plan)
+        answers = self.stores.rare_answers(study.plan)
         for number, index in enumerate(study.response_indices):
             name = f"rare {number}"
             result = parts.get(name)
@@ -418,8 +429,10 @@ class StudyWork:
                 result = counted_losses(number, counted)
             if result is None:
                 step = self.progress.stage(f"boards where they are lost, response {index + 1}")
-                result = rare_losses(study.plan, number, jobs=self.jobs, progress=step)
+                log = AnswerLog(answers, name)
+                result = rare_losses(study.plan, number, jobs=self.jobs, progress=step, log=log)
                 parts.put({name: replace(result, seconds=0.0)})
+                log.forget()
             found.append(result)
         return replace(study, rare=tuple(found))
 

@@ -24,6 +24,7 @@ from designer.report.tolerance_tables import (
     limits,
     maps,
     over_temperature,
+    rare,
     recipes,
     what_temperature_moves,
 )
@@ -33,6 +34,7 @@ from designer.verdicts.verdict import Verdict
 from designer.yields.loss_attribution import Attribution, NearLimit, ResponseAttribution
 from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Prediction
+from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.report.test_write import Page, words_of
@@ -315,3 +317,34 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     assert sum("Sobol" in a for a in alts) == 1
     assert sum(a.startswith("Yield over omega") for a in alts) == 1
     assert "exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)" in page.text
+
+
+def estimate(question: int, lost: float) -> RareLosses:
+    """One region, one part."""
+    region = LossRegion("a contact", "2-2-2", 0.8, 90, ("R203 high", "C1 low"))
+    margin = ToleranceMargin("R203", 1.3)
+    return RareLosses(
+        question, lost, 0.5 * lost, 2.0 * lost, 0.0, 1500, 3000, 90, 60.0, 3.0, 40.0, 1e-3, True,
+        (region,), (margin,), 0.0,
+    )  # fmt: skip
+
+
+def test_boards_of_a_million_stand_in_the_first_answer(plain: ReportData) -> None:
+    """The response that most lose, with what it becomes and the part that loses it; how many lose
+    one of both; at which temperature."""
+    warm = replace(plain.plan, spread=replace(plain.plan.spread, temperature=(-20.0, 60.0)))
+    data = changed(plain, rare=(estimate(0, 2e-5), estimate(1, 5e-5)), plan=warm)
+    text = render_markdown(data)
+    assert (
+        f"{words.name(data.checked[1])}: 50 of a million boards are lost (25 to 100), of them 80 % "
+        "by R203 high, C1 low, which show 2-2-2; R203 alone loses it at 1.3 times its tolerance."
+    ) in text
+    assert "is lost on 50 to 70 of a million boards (25 to 140 by the ends" in text
+    assert "Boards differ as in the study above, at −20 to 60 °C, each at its own." in text
+    table = rare(data)
+    assert table is not None
+    last = dict(zip(table.columns, table.rows[-1], strict=True))
+    assert last["response"] == "at least one, on one board"
+    assert last["lost of a million"] == "50 to 70"
+    single = changed(data, rare=(estimate(0, 2e-5),))
+    assert "at least one" not in render_markdown(single).lower()

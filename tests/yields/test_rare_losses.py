@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,12 +18,14 @@ from scipy.integrate import quad
 from designer.base.arrays import Array
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
+from designer.folders.study_cache import StudyCache
+from designer.folders.study_stores import PIECES
 from designer.model.model_file import parse_model_file
-from designer.spread.board_quantities import between
 from designer.verdicts.verdict import Verdict
-from designer.yields import loss_walks, rare_losses
+from designer.yields import loss_walks, rare_losses, stored_parts
 from designer.yields.margins import Margin
-from designer.yields.rare_losses import counted_losses
+from designer.yields.rare_losses import AnyLost, RareLosses, counted_losses
+from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.study import plan_study
 from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.tolerance_study import check
@@ -90,12 +92,10 @@ def estimated(
     """The estimate where a board's coordinates decide: ``lost`` names what each shows, "" where it
     is fine. No linear limit is known."""
 
-    def asked(
-        _: object, boards: _Boards, *, within: int | None = None
-    ) -> list[tuple[Verdict, str]]:
+    def verdicts(_: object, boards: _Boards, within: int | None) -> list[tuple[Verdict, str]]:
         return [(Verdict.LOST if r else Verdict.OK, r) for r in lost(boards.points)]
 
-    def foretold(_: object, boards: _Boards, *, whole: bool) -> list[str]:
+    def kinds(_: object, boards: _Boards, *, whole: bool) -> list[str]:
         return lost(boards.points)
 
     def wider(boards: _Boards, share: Array) -> _Boards:
@@ -108,8 +108,8 @@ def estimated(
         census=False, labels=(), seed=seed, questions=(question,), spread=spread, circuit=None,
         modelled=lambda boards: boards,
     )  # fmt: skip
-    monkeypatch.setattr(rare_losses._Drawing, "asked", asked)
-    monkeypatch.setattr(rare_losses._Drawing, "foretold", foretold)
+    monkeypatch.setattr(rare_losses._Drawing, "_verdicts", verdicts)
+    monkeypatch.setattr(rare_losses._Drawing, "_kinds", kinds)
     monkeypatch.setattr(rare_losses._Drawing, "quick", True)
     monkeypatch.setattr(rare_losses, "between", wider)
     return rare_losses.rare_losses(plan, 0, **how)
@@ -260,6 +260,85 @@ def test_plenty_of_losses_are_counted_as_they_are() -> None:
     assert counted.low < counted.lost < counted.high
 
 
+class _InFile(StoredParts):
+    """Parts in a file that is read anew."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = StudyCache(path, lambda name, content: write(path, name, content))
+
+    def get(self, name: str) -> Any | None:
+        return self._file.get(name, "key")
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        self._file.put_all(values, "key")
+
+
+def write(path: Path, name: str, content: bytes) -> None:
+    path.with_name(name).write_bytes(content)
+
+
+class _Asked:
+    """Boards of twelve coordinates that are lost where the sum is above a threshold; Ctrl-C comes
+    where more than ``most`` are asked."""
+
+    def __init__(self, most: float = math.inf) -> None:
+        self.most, self.count = most, 0
+
+    def __call__(self, points: Array) -> list[str]:
+        if self.count + len(points) > self.most:
+            raise KeyboardInterrupt
+        self.count += len(points)
+        return ["clipped" if s > 9.6 else "" for s in points.sum(axis=1)]
+
+
+STOPS = (0.1, 0.3, 0.5, 0.8, 0.97)
+"""Shares of all boards: while kinds of loss are met, on walks, in pilot rounds, in the estimate."""
+
+
+def test_an_interrupted_estimate_goes_on_where_it_was(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """No board that was answered is asked again, and the end is the same to the last digit."""
+    monkeypatch.setattr(stored_parts, "EVERY", 0.0)
+    monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
+    whole = _Asked()
+    expected = replace(estimated(monkeypatch, 12, whole, 1), seconds=0.0)
+    path, done = tmp_path / "pieces.npz", 0
+    for share in STOPS:
+        asked = _Asked(share * whole.count - done)
+        with pytest.raises(KeyboardInterrupt):
+            estimated(monkeypatch, 12, asked, 1, log=AnswerLog(_InFile(path), "a"))
+        done += asked.count
+        assert 0 < done < whole.count
+    rest, parts = _Asked(), _InFile(path)
+    found = estimated(monkeypatch, 12, rest, 1, log=AnswerLog(parts, "a"))
+    assert replace(found, seconds=0.0) == expected
+    assert done + rest.count == whole.count
+    # What others were asked says nothing here.
+    other = estimated(monkeypatch, 12, _Asked(), 2, log=AnswerLog(parts, "a"))
+    fresh = estimated(monkeypatch, 12, _Asked(), 2)
+    assert replace(other, seconds=0.0) == replace(fresh, seconds=0.0) != expected
+
+
+@given(st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=1, max_size=12))
+def test_what_all_responses_lose_lies_between_the_bounds(boards: list[list[bool]]) -> None:
+    """Of boards that are counted one by one, for each of three responses whether it is lost."""
+    single = [Yield(len(boards) - sum(lost), sum(lost), 0, 0) for lost in zip(*boards, strict=True)]
+    bounds = AnyLost.of([share_of(each) for each in single])
+    truth = sum(map(any, boards)) / len(boards)
+    assert bounds.low <= bounds.least <= truth + 1e-12
+    assert truth - 1e-12 <= bounds.most <= bounds.high <= 1.0
+
+
+def share_of(counted: Yield) -> RareLosses:
+    low, high = counted.interval
+    lost = counted.lost / counted.samples
+    return RareLosses(
+        0, lost, 1.0 - high, 1.0 - low, 0.0, counted.samples, 0, counted.lost, 1.0, 1.0, 1.0, 0.0,
+        True, (), (), 0.0,
+    )  # fmt: skip
+
+
 # ---------------------------------------------------------------------------------------------
 # On boards
 
@@ -269,7 +348,8 @@ def drawing_of(text: str) -> rare_losses._Drawing:
     modelfile = parse_model_file(text)
     made = synthesise(modelfile)
     plan = plan_study(modelfile, made.design, check(made, None), made.catalog, samples=1, seed=1)
-    return rare_losses._Drawing(plan, plan.questions[0], 1, lambda: None)
+    log = AnswerLog(StoredParts(), "")
+    return rare_losses._Drawing(plan, plan.questions[0], 1, lambda: None, log)
 
 
 def test_what_is_foretold_of_boards_is_what_they_show() -> None:
@@ -278,12 +358,12 @@ def test_what_is_foretold_of_boards_is_what_they_show() -> None:
     drawing = drawing_of(SMALL)
     assert drawing.quick
     points = np.random.default_rng(5).random((96, len(drawing.names)))
-    boards = between(drawing.boards(points), np.full(96, 8.0))
-    known = drawing.asked(boards, within=rare_losses.SCOUTED)
+    wide = np.full(96, 8.0)
+    known = drawing.asked(points, wide, within=rare_losses.SCOUTED)
     lost = ["" if v is Verdict.OK else rare_losses._kind_of(r) for v, r in known]
     assert {"", "clipped", rare_losses.OTHER} < set(lost)
-    assert replace(drawing, jobs=3).foretold(boards, whole=True) == lost
-    quickly = drawing.foretold(boards, whole=False)
+    assert replace(drawing, jobs=3).foretold(points, wide, whole=True) == lost
+    quickly = drawing.foretold(points, wide, whole=False)
     assert all(a in (b, "") for a, b in zip(quickly, lost, strict=True))
     assert {"", "1-1-1"} == set(quickly)
 
@@ -313,20 +393,31 @@ def test_the_verb_writes_it_and_takes_it_over(
     monkeypatch.setattr(rare_losses, "EXPLORED", 128)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
     monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
+    monkeypatch.setattr(stored_parts, "EVERY", 0.0)
     model, folder = tmp_path / "model.toml", tmp_path / "d"
     model.write_text(SMALL, "utf-8")
     command = ["tolerance", str(model), "--out", str(folder), "--rung", "exact", "--samples", "20"]
-    assert entry.status([*command, "--no-blame", "--rare"]) == 0
+    command += ["--no-blame", "--rare"]
+    margins = rare_losses._margins
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("drawn twice")
+
+    monkeypatch.setattr(rare_losses, "_margins", stopped)
+    assert entry.status(command) == 130
+    monkeypatch.setattr(rare_losses, "_margins", margins)
+    monkeypatch.setattr(rare_losses._Drawing, "_verdicts", never)
+    assert entry.status([*command, "--resume"]) == 0
+    assert not (folder / PIECES).exists()
     assert "Rare losses" in capsys.readouterr().err
     document = json.loads((folder / "tolerance.json").read_text("utf-8"))
     found = [r["rare"] for r in document["responses"]]
     assert all(r["low"] <= r["lost"] <= r["high"] for r in found)
     assert "Boards of a million" in (folder / "report.md").read_text("utf-8")
     assert document["cost"]["rare_seconds"] > 0.0
-
-    def never(*_: object, **__: object) -> None:
-        raise AssertionError("drawn twice")
-
     monkeypatch.setattr("designer.yields.tolerance_study.rare_losses", never)
     assert entry.status(["tolerance", str(folder), "--tuned"]) == 0
     again = json.loads((folder / "tolerance.json").read_text("utf-8"))
@@ -339,9 +430,10 @@ def test_boards_of_a_list_are_counted_and_not_drawn(
     (tmp_path / "boards.csv").write_text("part,value,board\nR100,10k,a\nR100,10.1k,b\n", "utf-8")
     model = tmp_path / "model.toml"
     model.write_text(SMALL + '\n[spread]\nmeasured = "boards.csv"\n', "utf-8")
-    command = ["tolerance", str(model), "--out", str(tmp_path / "d"), "--rung", "exact", "--rare"]
-    assert entry.status(command) == 2
-    assert "--rare" in capsys.readouterr().err
+    for verb in ("tolerance", "run"):
+        assert entry.status([verb, str(model), "--out", str(tmp_path / "d"), "--rare"]) == 2
+        assert "--rare" in capsys.readouterr().err
+        assert not (tmp_path / "d").exists()
 
 
 def test_no_limit_is_asked_for_without_a_period(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@
   const BOARD = -2; // number of the question about parts
   const MAP = -1000; // numbers of those about the map start here and fall
   const page = JSON.parse(document.getElementById("page").textContent);
-  const recording = page.recording;
+  const { recording, losses } = page;
   const by = (id) => document.getElementById(id);
   const root = document.documentElement;
 
@@ -169,6 +169,7 @@
       for (const name of ["portrait", "trace"]) {
         by(name).setAttribute("aria-label", `${name}: ${message.summary}`);
       }
+      if (losses) by("moved").hidden = isOfLosses(message.words);
       draw(message);
       history.replaceState(null, "", address());
       followMap();
@@ -679,11 +680,18 @@
     return line;
   };
 
-  // --- the recording, where there is no server --------------------------------------------------
+  // --- what is known of certain drive frequencies -----------------------------------------------
   const goTo = (omega) => { named.omega.show(String(omega)); want(); };
   const listed = (name, rows) => document.querySelector(`#${name} ul`).replaceChildren(
     ...rows.map((each) => row(`${each.summary}: ${each.words}`,
       each.omega === null ? null : ["Show", () => goTo(each.omega)])));
+  // Rare losses are of the file's values at the frequencies of its responses.
+  const isOfLosses = (words) => controls.every((c) => (c.name === "omega"
+    ? losses.rows.some((each) => each.omega === Number(words.omega))
+    : Number(words[c.name]) === Number(c.own)));
+  if (losses) listed("losses", losses.rows);
+
+  // --- the recording, where there is no server --------------------------------------------------
   const recorded = () => ({
     open: true,
     connect() {
