@@ -131,3 +131,14 @@ def designs_are_made_once() -> Iterator[None]:
 
     with made_once():
         yield
+
+
+@pytest.fixture
+def quick_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports are files of one word: their pictures take longer than all else."""
+
+    def write(_data: object, html: Path, text: Path, _sections: object) -> None:
+        for path in (html, text):
+            path.write_text("report")
+
+    monkeypatch.setattr("designer.report.write.write_report", write)

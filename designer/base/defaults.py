@@ -16,6 +16,8 @@ OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade", "temperature")
 """What a yield map is made over."""
 SEED = 1
 """Of the random numbers."""
+MOST_SEED = 2**63 - 1
+"""Larger ones would be written into files that no reader of JSON takes."""
 SAMPLES = 200
 """Boards of a tolerance study."""
 SEARCH_SAMPLES = 4000
@@ -38,3 +40,10 @@ def at_least(name: str, value: int, least: int) -> None:
     """InputError unless an option is large enough."""
     if value < least:
         raise InputError(None, name, value, f"a whole number >= {least}")
+
+
+def check_seed(seed: int) -> None:
+    """InputError unless an option is a seed."""
+    at_least("--seed", seed, 0)
+    if seed > MOST_SEED:
+        raise InputError(None, "--seed", seed, f"at most {MOST_SEED}")

@@ -25,6 +25,7 @@ from designer.base.guarded_reading import decode
 from designer.base.input_differences import differences
 from designer.base.manifest import (
     MANIFEST as MANIFEST,
+    REPLACED_STAGE,
     Manifest,
     ManifestStage,
     StageName as StageName,
@@ -183,11 +184,12 @@ class Folder:
         if "design" in wanted:
             manifest.stages = {n: s for n, s in manifest.stages.items() if not of_design(n)}
             manifest.files = {
-                n: ("replaced" if of_design(s) else s, d) for n, (s, d) in manifest.files.items()
+                n: (REPLACED_STAGE if of_design(s) else s, d)
+                for n, (s, d) in manifest.files.items()
             }
         for stage, (inputs, names) in wanted.items():
             manifest.files = {
-                n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
+                n: (REPLACED_STAGE if s == stage else s, d) for n, (s, d) in manifest.files.items()
             }
             manifest.stages[stage] = ManifestStage(inputs, resume_data=dict(resume_data or {}))
             manifest.files |= dict.fromkeys(names, (stage, None))
@@ -268,7 +270,7 @@ class Folder:
         folders = [
             name
             for name, (owner, _) in manifest.files.items()
-            if name.endswith("/") and owner in (stage, "replaced")
+            if name.endswith("/") and owner in (stage, REPLACED_STAGE)
         ]
         manifest.files |= dict.fromkeys(blocks, (stage, None))
         for name, (owner, _) in list(manifest.files.items()):
@@ -280,7 +282,7 @@ class Folder:
                 del manifest.files[name]
         manifest.stages[stage].complete = True
         manifest.stages[stage].resume_data = {}
-        obsolete = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
+        obsolete = [n for n, (owner, _) in manifest.files.items() if owner == REPLACED_STAGE]
         for name in folders:
             del manifest.files[name]
             obsolete += [n for n in self._there(name) if n not in manifest.files]

@@ -56,7 +56,7 @@ class InputError(DesignerError):
         self.found = found
         self.expected = expected
         prefix = f"{one_line(self.file)}: " if self.file else ""
-        text = found if isinstance(found, str) else repr(found)
+        text = found if isinstance(found, str) else _written(found)
         stands = " is missing" if found is MISSING else f": found {_clip(text, self.longest_found)}"
         super().__init__(f"{prefix}{one_line(field)}{stands}, expected {printable(expected)}")
 
@@ -105,6 +105,13 @@ class EnvironmentMissing(DesignerError):
     """A program or library that the work needs is not on this machine; says what to install."""
 
     exit_status = 3
+
+
+def _written(found: object) -> str:
+    try:
+        return repr(found)
+    except ValueError:  # more digits than Python writes
+        return f"a very large {type(found).__name__}"
 
 
 def _clip(text: str, limit: int) -> str:

@@ -69,6 +69,8 @@ def of_design(stage: str) -> bool:
     return stage in OF_DESIGN or stage.startswith(f"{ORDERS}/")
 
 
+REPLACED_STAGE = "replaced"
+"""Of a file whose stage begins anew, until something is written in its place."""
 REPLACED = ("without ", "blame budget ")
 """How items of an input's list begin that may give way to another: what is not there may come, and
 a budget may grow."""
@@ -212,6 +214,8 @@ def read_manifest(path: Path) -> Manifest | None:
         stage, digest = entry.get("stage"), entry.get("sha256")
         if not (isinstance(stage, str) and (digest is None or isinstance(digest, str))):
             raise InputError(file, field, entry, "a stage and a sha256")
+        if stage not in entries and stage != REPLACED_STAGE:
+            raise InputError(file, f"{field}.stage", stage, f"one of {', '.join(entries)}")
         files[_inside(path, name)] = (stage, digest)
     if ORDERS in entries:
         stages |= _orders(_stage(entries[ORDERS], file, f"stages.{ORDERS}"))
@@ -242,7 +246,11 @@ def _stage(value: object, file: Path, field: str) -> ManifestStage:
     layers = inputs.get("layers", [])
     if not (isinstance(layers, list) and all(isinstance(each, str) for each in layers)):
         raise InputError(file, f"{field}.inputs.layers", layers, "a list of names")
-    return ManifestStage(inputs, complete, resume_data)
+    stage = ManifestStage(inputs, complete, resume_data)
+    if entry.get("inputs_sha256", stage.hash) != stage.hash:  # a seed of one bit more, say
+        found = "others than their inputs_sha256 says"
+        raise InputError(file, f"{field}.inputs", found, "the manifest as it was written")
+    return stage
 
 
 def _object(value: object, file: Path, field: str) -> dict[str, Any]:

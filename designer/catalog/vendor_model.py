@@ -36,7 +36,7 @@ MOST_EXPANDED, MOST_CHARACTERS = 10_000, 1_000_000
 """Statements of one op-amp, and their characters, with calls and functions written out: both can
 double with every line of a file."""
 
-_FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*\(?\s*file|\bd?pwlfile\b", re.IGNORECASE)
+_FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*+\(?\s*+file|\bd?pwlfile\b", re.IGNORECASE)
 _FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\(([^()]*)\)\s*=?", re.IGNORECASE)
 _TOKEN = re.compile(r"[a-z_]\w*|\S")
 _NAME = re.compile(r"[A-Za-z0-9_.+-]+")

@@ -7,7 +7,7 @@ import itertools
 import logging
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -16,7 +16,7 @@ import typer
 import typer.core
 
 from designer.base.errors import DesignerError, InputError, ResponseNotFound
-from designer.base.printed import printable
+from designer.base.printed import printable, tell
 from designer.base.progress import Progress, Show, progress_for
 from designer.base.version import __version__
 from designer.verbs.declared import GROUPS, Kind, Verb, Word
@@ -90,6 +90,7 @@ def register(
     app: typer.Typer, name: str, verb: Verb, *, kind: Kind | None = None, hidden: bool = False
 ) -> None:
     """Give an application a verb by its declaration, or one of the things that it does."""
+    own = tuple(verb.words(kind))
 
     def command(
         *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
@@ -99,6 +100,8 @@ def register(
         given |= {} if kind is None else kind.given
         try:
             with _logged(log), progress_for(quiet) as progress:
+                for parameter, word, _ in own:
+                    _look(given.get(parameter.name), word.names[-1] if word.names else word.metavar)
                 _refuse_at_once(given.get(SOURCE))
                 tellers = {
                     "progress": progress,
@@ -118,7 +121,7 @@ def register(
             verb.show(result)
         return 0 if verb.satisfied(result) else 1
 
-    parameters = [_parameter(*each) for each in verb.words(kind)]
+    parameters = [_parameter(*each) for each in own]
     parameters += [p for p in _EVERY if p.name != "json" or verb.json is not None]
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
@@ -175,6 +178,23 @@ def _early(verb: Verb, progress: Progress, *, tables: bool) -> Show:
     return show
 
 
+class _LogFile(logging.FileHandler):
+    """A log that work does without where it can no longer be written: the disk is full."""
+
+    lost = False
+    """Whether that has been said."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        if not self.lost:
+            self.lost, error = True, sys.exc_info()[1]
+            reason = getattr(error, "strerror", None) or error
+            tell(f"designer: {self.baseFilename}: the log ends here: {reason}")
+
+    def close(self) -> None:
+        with suppress(OSError):  # what was said already
+            super().close()
+
+
 class _LogLine(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         return printable(super().format(record))
@@ -190,7 +210,7 @@ def _logged(log: Path | None) -> Iterator[None]:
     logger.addHandler(logging.NullHandler())
     if log is not None:
         try:
-            handler = logging.FileHandler(log, encoding="utf-8")
+            handler = _LogFile(log, encoding="utf-8")
         except OSError as error:
             raise InputError(
                 log, "--log", error.strerror or str(error), "a file that can be written"
@@ -211,6 +231,24 @@ def _logged(log: Path | None) -> Iterator[None]:
             each.close()
         logger.handlers.clear()
         logger.addHandler(logging.NullHandler())
+
+
+def _look(value: object, field: str | None) -> None:
+    """Refuse paths at which there is nothing to be seen: no verb need then be ready for that.
+
+    Raises
+    ------
+    InputError : a name that is too long, a folder that may not be entered, links in a circle.
+    """
+    for path in value if isinstance(value, list) else [value]:
+        if isinstance(path, Path):
+            try:
+                path.stat()
+            except (FileNotFoundError, NotADirectoryError):  # it may be made, or is missed later
+                continue
+            except OSError as error:
+                found = error.strerror or str(error)
+                raise InputError(path, str(field), found, "a path that can be followed") from None
 
 
 def _refuse_at_once(source: object) -> None:

@@ -16,6 +16,8 @@ from designer.base.errors import DesignerError
 from designer.base.printed import tell
 
 INTERRUPTED = 130
+MOST_TOLD = 2000
+"""Characters of a usage error: it repeats the word that it is about."""
 _INTERRUPTED = "interrupted; --resume goes on with what has been written, if anything was"
 
 
@@ -67,7 +69,7 @@ def _unexpected(error: Exception, arguments: Sequence[str]) -> int:
     format_message = getattr(error, "format_message", None)
     code = getattr(error, "exit_code", None)
     if callable(format_message) and isinstance(code, int):
-        _say(f"error: {format_message()}")
+        _say(f"error: {str(format_message())[:MOST_TOLD]}")
         return code
     if type(error).__name__ == "Abort":
         _say(_INTERRUPTED)

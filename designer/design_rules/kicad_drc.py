@@ -11,20 +11,21 @@ says of them counts.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import re
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from designer.base.errors import InputError
-from designer.base.guarded_reading import parse_json, read_text
+from designer.base.guarded_reading import UNREADABLE, parse_json, read_text, reason
 from designer.base.progress import doing
 from designer.board.footprints import FootprintShape
 from designer.board.kicad_footprint import module
@@ -124,6 +125,48 @@ def check(
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
         text = rules_text([*rules, canary()])
         answer = report(_with_canary(board), text, Path(scratch) / "board", files)
+    return understood(answer, version, reported, board, rules, sheet=_SHEET in files)
+
+
+def understood(
+    answer: Mapping[str, Any],
+    version: str,
+    reported: frozenset[str],
+    board: BoardFile,
+    rules: Sequence[CustomRule],
+    *,
+    sheet: bool,
+) -> DesignRuleCheck:
+    """What a report on a board says.
+
+    version : of KiCad. reported : rules that it reports on a board that breaks them. sheet :
+    whether the report is on parity too.
+
+    Raises
+    ------
+    KicadFailed : the report is none, or KiCad has dropped the rules.
+    """
+    with _understandable():
+        return _read(answer, version, reported, board, rules, sheet)
+
+
+@contextlib.contextmanager
+def _understandable() -> Iterator[None]:
+    """KicadFailed for a report in which other things stand where KiCad writes what is met."""
+    try:
+        yield
+    except UNREADABLE as error:
+        raise KicadFailed(f"kicad-cli wrote a report of another kind: {reason(error)}") from None
+
+
+def _read(
+    answer: Mapping[str, Any],
+    version: str,
+    reported: frozenset[str],
+    board: BoardFile,
+    rules: Sequence[CustomRule],
+    sheet: bool,
+) -> DesignRuleCheck:
     if not any(_is_canary(v) for v in answer["violations"]):
         raise KicadFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
@@ -134,7 +177,7 @@ def check(
         _shorts(answer),
         tuple(map(_typed, _others(answer, rules, "error", _aside(board)))),
         Counter(str(each.get("type")) for each in _others(answer, rules, "warning", _aside(board))),
-        tuple(map(_typed, answer[_PARITY])) if _SHEET in files else None,
+        tuple(map(_typed, answer[_PARITY])) if sheet else None,
     )
 
 
@@ -145,9 +188,10 @@ def _understood(rules: tuple[CustomRule, ...], version: str, program: str | None
     with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
         text = rules_text([*rules, canary()])
         broken = report(specimen(rules, breaking=True), text, Path(scratch) / "specimen")
-    reported = {v.rule for v in violations(broken, rules)}
-    reported |= {OPEN} if _unconnected(broken) else set()
-    reported |= {SHORT} if _shorts(broken) else set()
+    with _understandable():
+        reported = {v.rule for v in violations(broken, rules)}
+        reported |= {OPEN} if _unconnected(broken) else set()
+        reported |= {SHORT} if _shorts(broken) else set()
     return frozenset(reported)
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
+
+from designer.base.printed import one_line
 
 PROGRAM = "kicad-cli"
 MISSING = "kicad-cli is not installed (KiCad 9 or newer)"
@@ -25,7 +28,12 @@ def kicad_version() -> str | None:
         return None
     try:
         process = subprocess.run(
-            [PROGRAM, "--version"], capture_output=True, text=True, timeout=60, check=False
+            [PROGRAM, "--version"],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=60,
+            check=False,
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
@@ -42,8 +50,9 @@ def needed_version() -> str:
     version = kicad_version()
     if version is None:
         raise KicadFailed(MISSING)
-    if not version.split(".")[0].isdigit() or int(version.split(".")[0]) < NEEDED:
-        raise KicadFailed(f"kicad-cli {version} is older than KiCad {NEEDED}")
+    major = re.match(r"\d{1,4}(?!\d)", version, re.ASCII)
+    if major is None or int(major[0]) < NEEDED:
+        raise KicadFailed(f"kicad-cli {one_line(version[:40])} is older than KiCad {NEEDED}")
     return version
 
 

@@ -28,6 +28,8 @@ def fastest(flow: Flow, orbit: Orbit) -> float:
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
     run = flow.run(start, periods, mode=orbit.mode or None, points=POINTS)
     shown = run.strobes[:-1, 1::2]
+    if not len(shown):  # the flow gave up at once, as where a force is past all that it resolves
+        return flow.drive.omega
     return _highest(shown, settled) * flow.drive.omega / periods
 
 

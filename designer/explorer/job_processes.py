@@ -122,13 +122,21 @@ class JobProcesses:
         stream = job.process.stderr
         assert stream is not None
         log = job.folder.with_name(job.folder.name + LOG)
-        with stream, log.open("w", encoding="utf-8") as copy:
-            for line in _lines(stream):
-                copy.write(f"{line}\n")
-                job.line = line.removeprefix("designer: ")[:300]
-                self._changed(job.message())
+        with stream:
+            lines = self._told(job, stream)
+            with contextlib.suppress(OSError), log.open("w", encoding="utf-8", buffering=1) as copy:
+                copy.writelines(f"{line}\n" for line in lines)
+            for _ in lines:  # the log cannot be written: what the job says is told all the same
+                pass
         job.status = job.process.wait()
         self._changed(job.message())
+
+    def _told(self, job: Job, stream: IO[str]) -> Iterator[str]:
+        """The lines that a job says, each once it has been passed on."""
+        for line in _lines(stream):
+            job.line = line.removeprefix("designer: ")[:300]
+            self._changed(job.message())
+            yield line
 
 
 def _lines(stream: IO[str]) -> Iterator[str]:

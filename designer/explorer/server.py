@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hmac
+import re
 import secrets
 import socket
 import webbrowser
@@ -37,6 +38,8 @@ MOST_PORT = 65_535
 LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
 """Addresses that no other machine reaches; written as in an address (``_written``), the names by
 which a browser may call them."""
+TOKEN = re.compile(r"[A-Za-z0-9_.~-]{1,200}")
+"""What stands in an address and in a cookie as it is."""
 LARGEST = 65_536
 """Bytes of one message from a page."""
 POLICY = (
@@ -135,6 +138,8 @@ def serve(
     """
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
+    elif not TOKEN.fullmatch(token):
+        raise InputError(None, "--token", token, "letters, digits, _, -, . and ~, at most 200")
     losses = folder_losses(modelfile)
     listening = _listening(host, port)
     number = listening.getsockname()[1]
@@ -178,6 +183,10 @@ def _listening(host: str, port: int | None) -> socket.socket:
     """A listening socket; at any free port where none is asked for and the usual one is taken."""
     if port is not None and not 0 <= port <= MOST_PORT:
         raise InputError(None, "--port", port, f"a number from 0 to {MOST_PORT}")
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        raise InputError(None, "--host", host, "an address or a name of this machine") from None
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in (PORT, 0) if port is None else (port,):
         try:

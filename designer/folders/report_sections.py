@@ -83,11 +83,12 @@ def renew_report(folder: Folder, note: Note = quiet) -> None:
 
     sections = later_sections(folder)
     for name, insert in zip(REPORTS, (inserted_html, inserted_markdown), strict=True):
-        _, digest = folder.manifest.files.get(name, ("", None))
-        if digest is None or not (folder / name).is_file():
+        if name not in folder.manifest.files or not (folder / name).is_file():
             continue
+        _, digest = folder.manifest.files[name]
         content = (folder / name).read_bytes()
-        if file_hash(name, content) == digest:
+        # No digest: the tool was about to write it anew and was killed.
+        if digest in (None, file_hash(name, content)):
             folder.rewrite(name, insert(content.decode("utf-8"), sections))
         else:
             note(f"{name} was changed since it was written: it stays as it is")

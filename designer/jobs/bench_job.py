@@ -12,6 +12,7 @@ from designer.base.atomic_write import appearing
 from designer.base.design_folder import is_design_folder
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.plain_json import dumps
+from designer.base.printed import one_line
 from designer.base.progress import Progress
 from designer.circuit.design import GeneratorSetting
 from designer.dynamics.counts import read_counts
@@ -185,7 +186,7 @@ def fitted_boards(
 
 def board_name(record: Path, several: bool) -> str:
     """The name of a record's board: among several that of its folder, "" where there is one."""
-    return record.resolve().parent.name if several else ""
+    return one_line(record.resolve().parent.name) if several else ""
 
 
 def check_places(
@@ -231,7 +232,7 @@ def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> 
     wave = None if overlay is None else overlay.ngspice
     omega = 2.0 * math.pi * motion.frequency * seconds
     return {
-        "file": benched.path.name,
+        "file": one_line(benched.path.name),
         "kind": record.kind,
         "samples": len(record.time),
         "periods": motion.periods,

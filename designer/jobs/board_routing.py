@@ -108,10 +108,11 @@ def write_design(
 
 
 def _as_written(folder: Folder, name: str, content: bytes) -> bool:
-    """Whether the file is what the manifest says."""
+    """Whether the file is what the manifest says, or was about to be written anew when the tool was
+    killed, of which the manifest says nothing."""
     assert folder.manifest is not None
-    _, digest = folder.manifest.files.get(name, ("", None))
-    return digest is not None and digest == file_hash(name, content)
+    _, digest = folder.manifest.files.get(name, ("", ""))
+    return digest is None or digest == file_hash(name, content)
 
 
 def _replace(path: Path, text: str) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SAMPLES, SEED, Over, StudyEngine, at_least, cores
+from designer.base.defaults import SAMPLES, SEED, Over, StudyEngine, at_least, check_seed, cores
 from designer.base.errors import InputError
 
 MOST_SAMPLES = 1_000_000
@@ -77,7 +77,7 @@ class Options:
             raise InputError(None, "--until", self.until, "a width above 0, at most 1")
         if self.cluster is not None and not self.cluster.startswith(("tcp://", "tls://")):
             raise InputError(None, "--cluster", self.cluster, "a scheduler's address, tcp://…")
-        at_least("--seed", self.seed, 0)
+        check_seed(self.seed)
         if self.blame_budget is not None:
             at_least("--blame-budget", self.blame_budget, 1)
             if not self.blame:

@@ -27,6 +27,7 @@ from designer.model.si_units import MECHANICAL_UNITS
 NEAR = 1e-12
 """Of the largest entry: coefficients of both files that differ by rounding alone."""
 _HEADER = re.compile(r"\s*\[\[?\s*([A-Za-z_.]+)\s*\]\]?\s*(#.*)?")
+_LINE = re.compile(r"(\s*([A-Za-z0-9_]+)\s*=\s*)([^#]*)(.*)")
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,13 @@ def _each(value: Any, change: Callable[[float], float]) -> Any:
 
 def _changed(line: str, changes: Mapping[str, Callable[[Any], Any]]) -> str:
     """A line ``key = value`` with another value; its comment stays."""
-    match = re.fullmatch(r"(\s*)([A-Za-z0-9_]+)(\s*=\s*)([^#]*?)(\s*(?:#.*)?)", line)
+    match = _LINE.fullmatch(line)
     if match is None or match[2] not in changes:
         return line
-    value = parse_toml(f"value = {match[4]}", None)["value"]
-    return f"{match[1]}{match[2]}{match[3]}{json.dumps(changes[match[2]](value))}{match[5]}"
+    before, key, stated, comment = match.groups()
+    written = stated.rstrip()
+    value = parse_toml(f"value = {written}", None)["value"]
+    return f"{before}{json.dumps(changes[key](value))}{stated[len(written) :]}{comment}"
 
 
 def _elements(modelfile: ModelFile) -> Iterator[str]:

@@ -18,6 +18,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
+from designer.base.printed import one_line
 from designer.base.progress import Progress, Show, quiet
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
@@ -233,7 +234,7 @@ class StudyStage:
             starts, board = design_files.starts(folder), kicad_files.own_board(folder)
             design = design_answer(folder)
             warnings, failed = tuple(design["warnings"]), tuple(design["failed_rules"])
-            name = folder.path.resolve().name
+            name = one_line(folder.path.resolve().name)
             self.data = ReportData(result, self.command, starts, board, warnings, failed, name)
         else:
             self.data = self.data.of_study(result)

@@ -63,6 +63,8 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 1_000_000
 """A model file is a page of text; anything larger is something else."""
+LONGEST_TITLE = 200
+"""Characters."""
 SIDES = {1: "upper", -1: "lower"}
 
 
@@ -269,7 +271,7 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         )
     tables.spread.check(circuit.resistor_grade, circuit.capacitor_grade, file)
     return ModelFile(
-        title=tables.title or (source.stem if source is not None else "untitled"),
+        title=tables.title or _named_after(source),
         model=model,
         mechanical=tables.mechanical,
         si=si,
@@ -283,6 +285,12 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         rules=_rules(tables.rules, file),
         search=tables.search,
     )
+
+
+def _named_after(source: Path | None) -> str:
+    """A title for a file that states none. A file's name may be anything that is no slash."""
+    stem = "" if source is None else source.stem[:LONGEST_TITLE]
+    return "".join(ch if ch.isprintable() else "?" for ch in stem).strip() or "untitled"
 
 
 _FORMAT = whole_number(
@@ -310,7 +318,7 @@ class _Tables(FileTable):
 
     format: Annotated[int, _FORMAT]
     """1 for the paper's two masses, 2 for any system."""
-    title: Annotated[str | None, line("text of one line")] = None
+    title: Annotated[str | None, line("text of one line", LONGEST_TITLE)] = None
     """Title of the reports; without it the file's name."""
     response: tuple[ResponseTable, ...] = ()
     """The responses that the board shall show."""

@@ -154,6 +154,8 @@ class Reader:
         """
         try:
             plain = float(value)
+        except OverflowError:  # a whole number, of a page or of Python
+            raise InputError(None, option, value, "a number that a float can hold") from None
         except ValueError:
             return self._with_unit(option, name, str(value))
         return self.omega(option, plain) if name == "omega" and not self.units else plain

@@ -31,6 +31,9 @@ from designer.spice.simulator import (
     require_version,
 )
 
+LONGEST_START, LONGEST_RUN = 60.0, 300.0
+"""Time [s] in which the program says its version, and ends a run; one that hangs is ended."""
+
 
 class BatchNgspice:
     """Runs each deck in a process and a folder of its own.
@@ -80,7 +83,11 @@ class BatchNgspice:
         check_netlist(netlist)
         with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
             Path(folder, "deck.cir").write_bytes(netlist.encode("utf-8") + b"\n")
-            run = _call([self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"], folder)
+            try:
+                words = [self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"]
+                run = _call(words, folder, LONGEST_RUN)
+            except subprocess.TimeoutExpired:
+                raise SimulationFailed(f"ngspice gave no answer within {LONGEST_RUN:g} s") from None
             log = run.stdout.decode("utf-8", "replace") + run.stderr.decode("utf-8", "replace")
             raw = Path(folder, "deck.raw")
             content = raw.read_bytes() if raw.exists() else b""
@@ -112,12 +119,16 @@ def program_version() -> str:
 @functools.cache
 def _version_of(program: str) -> str:
     with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
-        text = _call([program, "-n", "--version"], folder).stdout.decode("utf-8", "replace")
-    match = re.search(r"ngspice-(\d[\w.+-]*)", text)
+        try:
+            said = _call([program, "-n", "--version"], folder, LONGEST_START).stdout
+        except subprocess.TimeoutExpired:
+            found = f"{program} does not say its version within {LONGEST_START:g} s"
+            raise EnvironmentMissing(f"{found}; {HOW_TO_INSTALL}") from None
+    match = re.search(r"ngspice-(\d[\w.+-]{0,39})", said.decode("utf-8", "replace"))
     return match[1] if match else ""
 
 
-def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]:
+def _call(command: list[str], folder: str, patience: float) -> subprocess.CompletedProcess[bytes]:
     environment = dict(os.environ)
     for name, value in clean_environment(folder).items():
         if value is None:
@@ -131,6 +142,7 @@ def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,
+            timeout=patience,
             check=False,
         )
     except OSError as error:
@@ -177,14 +189,15 @@ def read_raw(content: bytes) -> list[RawPlot]:
         header = content[position:end].decode("utf-8", "replace")
         position = end + len(b"\nBinary:\n")
         fields, _, table = header.partition("\nVariables:")
-        value = dict(re.findall(r"^([^:\n]+):[ \t]*(.*?)[ \t]*$", fields, re.MULTILINE))
+        lines = (line.partition(":") for line in fields.split("\n"))
+        value = {key: text.strip(" \t") for key, colon, text in lines if colon}
         names = [line.split("\t")[2] for line in table.split("\n") if line.count("\t") >= 3]
         try:
             columns, rows = int(value["No. Variables"]), int(value["No. Points"])
             name, flags = value["Plotname"], value["Flags"].split()
         except (KeyError, ValueError) as error:
             raise ValueError(f"raw file: bad header ({error})") from error
-        if len(names) != columns or columns < 0 or rows < 0:
+        if len(names) != columns or columns < 1 or rows < 0:
             raise ValueError(f"raw file: {columns} variables announced, {len(names)} named")
         number = np.dtype(np.complex128 if "complex" in flags else np.float64)
         size = rows * columns * number.itemsize

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from designer.base.guarded_reading import UNREADABLE, reason
 from designer.catalog.entries import OpAmp
 from designer.catalog.fields import Figure
 from designer.catalog.output_stage import HEAVY_LOAD, RATED_LOAD
@@ -26,6 +27,7 @@ from designer.spice.opamp_model import (
     recovery,
     subcircuit,
 )
+from designer.spice.simulator import SimulationFailed
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
 HARD = 0.25
@@ -223,10 +225,17 @@ def checks(opamp: OpAmp, fidelity: Fidelity = "full") -> list[FigureCheck]:
 
     Raises
     ------
-    SimulationFailed : ngspice has no answer for one of them.
+    SimulationFailed : ngspice has no answer for one of them, or one that is none.
     EnvironmentMissing : ngspice is missing.
     """
-    bench, out = OpAmpBench.of(opamp, fidelity), []
+    try:
+        return _measured(opamp, fidelity)
+    except (*UNREADABLE, StopIteration) as error:
+        raise SimulationFailed(f"ngspice's answer is none: {reason(error)}") from error
+
+
+def _measured(opamp: OpAmp, fidelity: Fidelity) -> list[FigureCheck]:
+    bench, out = OpAmpBench.of(opamp, fidelity), list[FigureCheck]()
 
     def add(name: str, unit: str, figure: Figure | None, measured: float, tolerance: float) -> None:
         if figure is not None:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.errors import DesignerError, EnvironmentMissing
+from designer.base.printed import one_line
 
 Backend = Literal["shared", "batch"]
 Analysis = Literal["tran", "ac", "dc"]
@@ -124,9 +125,10 @@ def require_version(found: str) -> str:
     ------
     EnvironmentMissing : it is not, or it is no version at all.
     """
-    major = re.match(r"\d+", found)
+    major = re.match(r"\d{1,4}(?!\d)", found, re.ASCII)
     if major is None or int(major[0]) < OLDEST_NGSPICE:
-        raise EnvironmentMissing(f"ngspice {found or 'of unknown version'} found; {HOW_TO_INSTALL}")
+        told = one_line(found[:40]) or "of unknown version"
+        raise EnvironmentMissing(f"ngspice {told} found; {HOW_TO_INSTALL}")
     return found
 
 

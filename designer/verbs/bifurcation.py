@@ -175,7 +175,7 @@ def bifurcation(
         box=tuple(_limits(each) for each in box),
         seed=seed,
     )
-    options = Options(jobs=jobs, overwrite=overwrite, resume=resume)
+    options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     place = None if out is None else Path(out)
     return requested(model, request, place, options, Progress() if progress is None else progress)
 

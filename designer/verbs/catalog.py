@@ -63,9 +63,10 @@ def catalog(
         return CatalogAnswer(entries, None, ())
     from designer.spice.opamp_check import checks
 
+    opamp = entries.opamp(check)
     if progress is not None:
         progress.stage(f"{check} in ngspice")
-    return CatalogAnswer(entries, check, tuple(checks(entries.opamp(check))))
+    return CatalogAnswer(entries, check, tuple(checks(opamp)))
 
 
 def show(result: CatalogAnswer) -> None:

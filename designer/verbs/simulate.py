@@ -263,8 +263,15 @@ def _several(name: str, given: object, example: str) -> list[float | str]:
         if isinstance(value, bool) or not isinstance(value, Real | str):
             expected = f"one value or a list of them: {name}={example} or {name}=[{example}, …]"
             raise InputError(None, name, repr(value), expected)
-        values.append(value if isinstance(value, str) else float(value))
+        values.append(value if isinstance(value, str) else _float(name, value))
     return values
+
+
+def _float(name: str, value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(None, name, value, "a number that a float can hold") from None
 
 
 def tables(answer: Mapping[str, Any]) -> None:

@@ -87,7 +87,7 @@ def trade(
     from designer.fidelity.fidelity_answers import TOP, VENDOR
     from designer.folders.model_source import source
     from designer.jobs import folder_numbers, trade_job
-    from designer.jobs.options import Options, stated_options
+    from designer.jobs.options import MOST_SAMPLES, Options, stated_options
     from designer.model.model_file import ModelFile, read_model_file
 
     argument = model if isinstance(model, ModelFile) else Path(model)
@@ -97,6 +97,8 @@ def trade(
     if numbers["truth"] not in (TOP, VENDOR):
         raise InputError(None, "--truth", numbers["truth"], f"{TOP} or {VENDOR}")
     at_least("--boards", numbers["boards"], 0)
+    if numbers["boards"] > MOST_SAMPLES:
+        raise InputError(None, "--boards", numbers["boards"], f"at most {MOST_SAMPLES}")
     options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
     options.check()
     folder: Path | None = None

@@ -15,6 +15,7 @@ from designer.base.defaults import (
     Over,
     StudyEngine,
     at_least,
+    check_seed,
     cores,
 )
 from designer.base.errors import InputError
@@ -194,7 +195,7 @@ def tolerance(
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     at_least("--samples", samples, 1)
-    at_least("--seed", seed, 0)
+    check_seed(seed)
     at_least("--jobs", jobs, 1)
     if rare:
         need_drawn_boards(synthesis.modelfile)

@@ -29,6 +29,7 @@ from designer.folders.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
 from designer.verbs.declared import GROUPS
 from designer.verdicts.cross_check import OWN_SAMPLES
+from tests.shared.folder_contents import without_cost
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,16 +64,6 @@ def _tree(folder: Path) -> dict[str, bytes]:
         for p in sorted(folder.rglob("*"))
         if p.is_file()
     }
-
-
-def _without_cost(folder: Path) -> dict[str, object]:
-    """The files of a design folder; JSON without its one object that may differ."""
-    out: dict[str, object] = {}
-    for name, content in _tree(folder).items():
-        out[name] = content
-        if name.endswith(".json"):
-            out[name] = {k: v for k, v in json.loads(content).items() if k != "cost"}
-    return out
 
 
 def _strict(text: str) -> Any:
@@ -706,7 +697,7 @@ def test_killed_study_goes_on_and_ends_the_same(
     answer = _strict(capfd.readouterr().out)
     assert (out / "samples.parquet" / "block-000000.parquet").stat().st_mtime_ns == first
     assert answer["responses"] == _strict(done.stdout)["responses"]
-    assert _without_cost(out) == _without_cost(whole)
+    assert without_cost(out) == without_cost(whole)
 
 
 @pytest.mark.slow

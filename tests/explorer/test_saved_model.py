@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from designer import InputError, ModelFile, parse_model_file, read_model_file
-from designer.explorer.job_processes import JobProcesses
+from designer.explorer.job_processes import Job, JobProcesses
 from designer.explorer.place import read_place
 from designer.explorer.questions import read_question, save_model
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
@@ -173,3 +174,13 @@ def test_a_job_has_a_folder_of_its_own_and_says_how_it_ended(tmp_path: Path) -> 
     assert jobs.report("mine-run-2") is None
     assert jobs.report("../mine-run") is None
     assert "response" in (tmp_path / "mine-run-2.log").read_text("utf-8")
+
+
+def test_a_job_is_told_of_to_its_end_where_its_log_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "mine-run.log").symlink_to("/dev/full")
+    script = "for n in 1 2 3; do echo designer: step $n >&2; done"
+    process = subprocess.Popen(["sh", "-c", script], stderr=subprocess.PIPE, text=True)
+    told: list[dict[str, Any]] = []
+    JobProcesses(told.append)._heed(Job("run", tmp_path / "mine-run", process))
+    assert [message["line"] for message in told[:-1]] == ["step 1", "step 2", "step 3"]
+    assert told[-1]["status"] == 0

@@ -118,7 +118,7 @@ MANIFEST_TEXT = json.dumps(
                 "kept": {"trade": None},
             }
         },
-        "files": {"model.toml": {"stage": "design", "sha256": None}},
+        "files": {"tolerance.json": {"stage": "study", "sha256": None}},
         "provenance": {"seed": 1},
     }
 )

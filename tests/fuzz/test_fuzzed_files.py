@@ -13,35 +13,53 @@ import tomllib
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from designer.base.errors import InputError
+from designer.base.guarded_reading import reading
 from designer.base.manifest import MANIFEST, read_manifest
 from designer.base.printed import printable
+from designer.base.seal import BLANK, sealed
 from designer.board.bom_layouts import layouts
-from designer.board.kicad_reader import read_board
+from designer.board.kicad_reader import BoardFile, read_board
+from designer.board.kicad_rules import canary
 from designer.board.sexpr import read
 from designer.catalog.fab import fabs
 from designer.catalog.read import FABS, LAYOUTS, read_catalog_file
 from designer.catalog.stock_list import stock_rows
 from designer.catalog.vendor_model import read_vendor_model
+from designer.design_rules.kicad_drc import understood
+from designer.design_rules.kicad_program import KicadFailed
+from designer.explorer.board_box import expected
+from designer.explorer.place import read_place
+from designer.explorer.questions import read_question
+from designer.explorer.response_map import read_map
+from designer.explorer.saved_model import PinnedResponse, place_for, read_pins, saved_text
+from designer.folders.study_cache import StudyCache
+from designer.jobs.second_format import second_format
 from designer.jobs.template import SECOND, TEXT
 from designer.model.measured_values import read_measured
-from designer.model.model_file import read_model_file
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.routing.board_copper import read_copper
 from designer.routing.specctra import with_session
+from designer.spice.batch_backend import read_raw
+from designer.spice.simulator import offending_line
 from designer.workbench.record_formats import read_record
 from tests.catalog.test_catalog import CSV
 from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
 from tests.folders.test_readers import BOARD, MANIFEST_TEXT, MEASURED
 from tests.shared.damaged import cells_swapped, damaged, json_of, lists_swapped, swapped, toml_of
 from tests.shared.exploring import EXPLORING
+from tests.shared.model_text import PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 CATALOGS = ROOT / "catalogs"
@@ -121,6 +139,55 @@ def parsed(folder: str) -> list[dict[str, Any]]:
     return [tomllib.loads(p.read_text("utf-8")) for p in sorted(CATALOGS.glob(f"{folder}/*.toml"))]
 
 
+PAPER = read_model_file(ROOT / "examples" / "paper.toml")
+WORDS = {"omega": 0.85, "b": "0.25", "zeta": "0.1", "start": "0,0,0.1,-1e-3", "shown": 0}
+ASKED: list[dict[str, Any]] = [
+    {"kind": "view", "id": 1, "words": WORDS},
+    {"kind": "map", "id": 2, "words": {}, "map": {"x": "omega", "y": "b", "x_low": "0.7"}},
+    {"kind": "board", "id": 3, "words": WORDS, "expect": "1-2-2"},
+    {"kind": "save", "id": 4, "words": WORDS, "name": "mine", "pins": ["0.85~1-2-2~0.25"]},
+    {"kind": "run", "id": 5, "words": WORDS, "name": "it.toml", "pins": [], "overwrite": True},
+]
+RAW = (
+    b"Title: t\nDate: today\nPlotname: Transient Analysis\nFlags: real\n"
+    b"No. Variables: 2\nNo. Points: 3       \nVariables:\n"
+    b"\t0\ttime\ttime\n\t1\tv(A)\tvoltage\nBinary:\n" + np.arange(6.0).tobytes()
+)
+LOG = """Circuit: * a title
+Note: No compatibility mode selected!
+Doing analysis at TEMP = 27.000000 and TNOM = 27.000000
+Initial Transient Solution
+v1                      0.001
+error                   -1.5e-05
+Warning: Dynamic gmin stepping failed
+No. of Data Rows : 1234
+"""
+ITEMS = [
+    {"uuid": "1", "pos": {"x": 1.0, "y": 2.5}, "description": "Track [/v1] on F.Cu, length 1 mm"},
+    {"uuid": "2", "pos": {"x": -100.0, "y": -100.0}, "description": "Pad 1 [GND] of R4"},
+]
+MET = [
+    {"type": "clearance", "severity": "error", "items": ITEMS,
+     "description": "Clearance violation (rule 'summing-gap' clearance 0.5 mm; actual 0.2 mm)"},
+    {"type": "track_width", "severity": "error", "items": ITEMS[:1],
+     "description": f"Track width (board setup min width {canary().limit:.4f} mm; actual 0.1 mm)"},
+    {"type": "shorting_items", "severity": "warning", "items": [], "description": "shorted"},
+]  # fmt: skip
+REPORT = {"violations": MET, "unconnected_items": MET[:1], "schematic_parity": MET[2:]}
+KEPT_HEAD = {
+    "format": 1,
+    "items": {
+        "it": [
+            "key",
+            {"record": ["Orbit", {
+                "status": {"word": ["OrbitStatus", "periodic"]}, "n": 1, "p": 2, "q": 2,
+                "start": {"array": 0}, "extremes": {"array": 1}, "multipliers": {"tuple": [0.5]},
+                "more": {"tuple": [{"tuple": [1, 2]}]}, "reason": "",
+            }]},
+        ]
+    },
+}  # fmt: skip
+
 MODELS = [p.read_text("utf-8") for p in sorted((ROOT / "examples").glob("*.toml"))]
 MODELS += [TEXT, SECOND, MATRICES]
 TREES = read(BOARD), read(SESSION)
@@ -172,6 +239,74 @@ def session(path: Path) -> object:
     return read_copper(read(with_session(BOARD, path)))
 
 
+def question(path: Path) -> object:
+    """What a page asks, as far as the server reads it; nothing is computed, nothing is written."""
+    asked = read_question(path.read_bytes())
+    if asked is None:
+        return None
+    more = asked.more
+    place = read_place(PAPER, asked.words)
+    if asked.kind in ("map", "borders"):
+        return read_map(PAPER, place, more.get("map")).plan
+    if asked.kind == "board":
+        pin = PinnedResponse(place.omega, expected(more.get("expect")), place.model.b)
+        return saved_text(PAPER, place, [pin])
+    if asked.kind == "view":
+        return place.state
+    saved = place_for(path.parent, more.get("name", ""))
+    assert saved.parent == path.parent
+    return saved_text(PAPER, place, read_pins(PAPER, more.get("pins", [])))
+
+
+def raw_file(path: Path) -> object:
+    """A raw file of ngspice; what is none is a ``ValueError`` there, a run that does not count."""
+    with reading(path, "a raw file"):
+        return [plot.vectors for plot in read_raw(path.read_bytes())]
+
+
+def other_header(dice: Random) -> bytes:
+    header = RAW[: RAW.index(b"Binary")].decode("ascii")
+    return encoded(cells_swapped(header, dice, dice.choice((":", "\t", " "))))
+
+
+def log_file(path: Path) -> object:
+    return offending_line(path.read_bytes().decode("utf-8", "replace"))
+
+
+def report(path: Path) -> object:
+    """A report of KiCad; what is none is a ``KicadFailed``."""
+    answer = json.loads(path.read_bytes())
+    try:
+        return understood(answer, "9.0.0", frozenset(), board_of_report(), (canary(),), sheet=True)
+    except KicadFailed as why:
+        raise InputError(path, "the report", str(why), "a report of KiCad") from None
+
+
+@cache
+def board_of_report() -> BoardFile:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "it.kicad_pcb")
+        path.write_text(BOARD, encoding="utf-8")
+        return read_board(path)
+
+
+def kept(path: Path) -> object:
+    return StudyCache(path, lambda *_: None).get("it", "key")
+
+
+def kept_archive(dice: Random) -> bytes:
+    """An orbit as a study keeps it, and as somebody else would: sealed all the same."""
+    head = swapped(KEPT_HEAD, dice)
+    stream = io.BytesIO()
+    arrays: dict[str, Any] = {
+        f"array{k}": dice.choice((np.eye(2), np.arange(3), np.array("a"))) for k in range(4)
+    }
+    np.savez_compressed(stream, items=np.array(json.dumps(head)), **arrays)
+    with ZipFile(stream, "a") as archive:
+        archive.comment = BLANK.encode("ascii")
+    return sealed(stream.getvalue())
+
+
 @dataclass(frozen=True)
 class Fuzzed:
     """A reader, and what makes the files that it is given."""
@@ -180,7 +315,7 @@ class Fuzzed:
     """Name of the file, below the folder of a test."""
     read: Callable[[Path], object]
     make: Make
-    slow: int = 5000
+    slow: int = 4000
     """Files of the long test where failures are looked for; in CI it has a fifth, the short one a
     hundredth."""
 
@@ -189,18 +324,18 @@ SHARE = 1 if EXPLORING else 5
 """One file of so many is made by the long test."""
 
 FUZZED: Mapping[str, Fuzzed] = {
-    "model file, bytes": Fuzzed("it.toml", model, of_bytes(*MODELS), 8000),
-    "model file, values": Fuzzed("it.toml", model, of_toml([*map(tomllib.loads, MODELS)]), 8000),
+    "model file, bytes": Fuzzed("it.toml", model, of_bytes(*MODELS), 6000),
+    "model file, values": Fuzzed("it.toml", model, of_toml([*map(tomllib.loads, MODELS)]), 6000),
     "matrix": Fuzzed("it.npy", matrix_file, of_bytes(npy([1.0, 0.5]), npy(np.eye(2)))),
     "catalogue, bytes": Fuzzed(
         "it.toml", read_catalog_file, of_bytes(*map(toml_of, small_tables()))
     ),
-    "catalogue, values": Fuzzed("it.toml", read_catalog_file, of_toml(small_tables()), 9000),
+    "catalogue, values": Fuzzed("it.toml", read_catalog_file, of_toml(small_tables()), 7000),
     "catalogue, cells": Fuzzed("it.csv", read_catalog_file, of_cells(CSV)),
     "stock list, bytes": Fuzzed("it.csv", stock_rows, of_bytes(STOCK)),
     "stock list, cells": Fuzzed("it.csv", stock_rows, of_cells(STOCK)),
-    "fab": Fuzzed(f"{FABS}/it.toml", fab, of_toml(parsed(FABS)), 3000),
-    "layout": Fuzzed(f"{LAYOUTS}/it.toml", layout, of_toml(parsed(LAYOUTS)), 3000),
+    "fab": Fuzzed(f"{FABS}/it.toml", fab, of_toml(parsed(FABS)), 2500),
+    "layout": Fuzzed(f"{LAYOUTS}/it.toml", layout, of_toml(parsed(LAYOUTS)), 2500),
     "vendor model, bytes": Fuzzed("it.lib", vendor, of_bytes(VENDOR.encode("latin-1"))),
     "vendor model, words": Fuzzed("it.lib", vendor, of_cells(VENDOR, " ")),
     "measured values, bytes": Fuzzed("it.csv", read_measured, of_bytes(MEASURED)),
@@ -209,15 +344,26 @@ FUZZED: Mapping[str, Fuzzed] = {
     "board, lists": Fuzzed(
         "it.kicad_pcb", board, lambda dice: encoded(lists_swapped(TREES[0], dice))
     ),
-    "session, bytes": Fuzzed("it.ses", session, of_bytes(SESSION), 2000),
+    "session, bytes": Fuzzed("it.ses", session, of_bytes(SESSION), 1500),
     "session, lists": Fuzzed(
-        "it.ses", session, lambda dice: encoded(lists_swapped(TREES[1], dice)), 2000
+        "it.ses", session, lambda dice: encoded(lists_swapped(TREES[1], dice)), 1500
     ),
     "manifest": Fuzzed(
         MANIFEST,
         lambda path: read_manifest(path.parent),
         lambda dice: json_of(swapped(json.loads(MANIFEST_TEXT), dice)),
     ),
+    "page's question, bytes": Fuzzed("it.json", question, of_bytes(*map(json_of, ASKED)), 3000),
+    "page's question, values": Fuzzed(
+        "it.json", question, lambda dice: json_of(swapped(dice.choice(ASKED), dice)), 5000
+    ),
+    "ngspice's raw file, bytes": Fuzzed("it.raw", raw_file, of_bytes(RAW, RAW + RAW)),
+    "ngspice's raw file, words": Fuzzed(
+        "it.raw", raw_file, lambda dice: other_header(dice) + RAW[RAW.index(b"Binary") :], 2000
+    ),
+    "ngspice's log": Fuzzed("it.log", log_file, of_bytes(LOG), 1000),
+    "KiCad's report": Fuzzed("it.json", report, lambda dice: json_of(swapped(REPORT, dice)), 3000),
+    "kept archive": Fuzzed("kept.npz", kept, kept_archive, 2000),
     "record, bytes": Fuzzed("it.csv", read_record, of_bytes(SCOPE, scope_text(";")), 1500),
     "record, cells": Fuzzed("it.csv", read_record, of_cells(SCOPE), 1500),
     "record, array": Fuzzed(
@@ -396,6 +542,13 @@ def test_a_long_cell_of_digits_is_refused_with_its_line(tmp_path: Path) -> None:
     error = met(read_record, path)
     assert error is not None
     assert error.field == "line 20002"
+
+
+@pytest.mark.timeout(20)
+def test_blanks_in_a_list_are_rewritten_in_no_time() -> None:
+    blanks = " " * 100_000
+    text = f'format = 1\n{PAPER_TABLE}[circuit]\nresistors = ["E24",{blanks}"E96"]\n'
+    assert blanks in second_format(parse_model_file(text))
 
 
 def test_an_array_of_python_2_is_read_in_silence(tmp_path: Path) -> None:

@@ -112,17 +112,6 @@ def test_a_cut_off_file_is_named(
         assert refused == {*READ, *others}
 
 
-@pytest.fixture
-def quick_reports(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports are files of one word: their pictures take longer than all else."""
-
-    def write(_data: object, html: Path, text: Path, _sections: object) -> None:
-        for path in (html, text):
-            path.write_text("report")
-
-    monkeypatch.setattr("designer.report.write.write_report", write)
-
-
 def with_another_row(content: bytes) -> bytes:
     """A block with one bit flipped that every reader of Parquet reads, with other rows."""
     whole = pq.read_table(pa.BufferReader(content)).to_pylist()

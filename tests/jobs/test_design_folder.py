@@ -280,6 +280,8 @@ def test_cells_cannot_start_a_formula() -> None:
     text = csv_text(("a", "b"), [{"a": '=1,"x"', "b": "2"}])
     assert list(csv.reader(io.StringIO(text))) == [["a", "b"], ['\'=1,"x"', "2"]]
     assert sorted(["R10", "R2", "C1", "R203A"], key=natural_key) == ["C1", "R2", "R10", "R203A"]
+    strange = ["R²", "R١", "", "2", "R" + "9" * 5000, "R10"]  # on a board that somebody else drew
+    assert sorted(strange, key=natural_key) == ["", "2", "R10", "R" + "9" * 5000, "R²", "R١"]
 
 
 def test_json_is_strict() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import math
 import os
 import re
@@ -138,6 +139,17 @@ def test_a_small_file_gets_the_defaults() -> None:
     assert file.title == "untitled"
     assert dimensionless(file.model).sides == "both"
     assert parse_model_file(SMALL, Path("a/bench.toml")).title == "bench"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["a\n.include x", "\x1b[2J", "\udcff", "x" * 300, " ", "\u2028", "\u202egpj", "\u00a0"],
+)
+def test_a_title_from_the_file_s_name_is_one_that_may_be_stated(name: str) -> None:
+    """A name may be anything that is no slash; a title goes into decks, pages and terminals."""
+    read = parse_model_file(SMALL, Path(f"{name}.toml"))
+    again = parse_model_file(f"title = {json.dumps(read.title)}\n{SMALL}")
+    assert again.title == read.title
 
 
 def test_the_defaults_are_those_of_the_paper_but_for_what_is_chosen() -> None:

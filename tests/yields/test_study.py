@@ -22,6 +22,7 @@ import pytest
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.manifest import ManifestStage
 from designer.base.progress import Progress
 from designer.cli import entry
 from designer.folders import model_source, study_json
@@ -39,6 +40,7 @@ from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.tolerance_study import GROWTH, Stores, StudyWork, tolerance
 from tests.folders.test_study_cache import MAP
+from tests.shared.folder_contents import differing, without_cost
 from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import without_starts
 from tests.verdicts.test_verdict import plan
@@ -410,17 +412,6 @@ def _words(home: Path, out: Path, *more: str) -> list[str]:
     return ["tolerance", model, "--out", str(out), "--samples", "12", "--rung", "exact", *more]
 
 
-def _files(folder: Path) -> dict[str, object]:
-    """Everything, JSON without its object ``cost``."""
-    out: dict[str, object] = {}
-    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-        name, content = path.relative_to(folder).as_posix(), path.read_bytes()
-        out[name] = content
-        if name.endswith(".json"):
-            out[name] = {k: v for k, v in json.loads(content).items() if k != "cost"}
-    return out
-
-
 def test_the_exact_circuit_needs_no_ngspice(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -458,15 +449,15 @@ def test_layers_are_added_and_stay(
     assert answer["responses"][0]["reached"]["samples"] == 12
     assert answer["responses"][0]["tuned"] is None
     assert block.stat().st_mtime_ns == before
-    whole = _files(out)
+    whole = without_cost(out)
     assert "reached.parquet/block-000000.parquet" in whole
     assert entry.status([*words, "--json", "-q"]) == 0
     assert json.loads(capfd.readouterr().out) == answer
-    assert _files(out) == whole
+    assert without_cost(out) == whole
     # At once or one after the other: the same files.
     once = tmp_path / "once" / "exact"
     assert entry.status([*_words(home, once), "--reached", "-q"]) == 0
-    assert _files(once) == whole
+    assert without_cost(once) == whole
 
 
 def _refused(*_: Any, **__: Any) -> Any:
@@ -538,7 +529,7 @@ def test_yields_stand_before_the_attribution_and_it_goes_on_after_an_interruptio
     assert entry.status([*_words(home, out), "--resume", "--json"]) == 0
     (line,) = [json.loads(capfd.readouterr().out)]
     assert line["blame"] == {"status": "whole", "share": 1.0, "budget": None, "reason": ""}
-    assert _files(out) == _files(exact)
+    assert without_cost(out) == without_cost(exact)
 
 
 def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
@@ -551,7 +542,7 @@ def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
         patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status(["tolerance", str(out), "--no-blame", "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["blame"]["status"] == "whole"
-        assert _files(out) == _files(exact)
+        assert without_cost(out) == without_cost(exact)
         # Begun anew, of one board more.
         words = ["tolerance", str(out), "--samples", "13", "--overwrite", "--no-blame", "-q"]
         assert entry.status(words) == 0
@@ -566,7 +557,7 @@ def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
     )
     assert entry.status(["tolerance", str(out), "--blame", "-q"]) == 0
     assert json.loads((out / "tolerance.json").read_text())["blame"]["status"] == "whole"
-    added, whole = _files(out), _files(exact)
+    added, whole = without_cost(out), without_cost(exact)
     for name in ("manifest.json", "report.html", "report.md"):  # where the command line stands
         del added[name], whole[name]
     assert added == whole
@@ -580,16 +571,16 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
     words = [*_words(home, out)[:-1], "auto", "-q"]
     words[words.index("--samples") + 1] = "3"
     assert entry.status(words) == 0
-    whole = _files(out)
+    whole = without_cost(out)
     with monkeypatch.context() as patched:
         patched.setattr(numerics_gate, "check", _refused)
         patched.setattr(equation_check, "check", _refused)
         patched.setattr(tolerance_study, "attribute", _refused)
         assert entry.status([*words, "--reached"]) == 0
-    added = _files(out)
+    added = without_cost(out)
     once = tmp_path / "once" / "auto"
     assert entry.status([w if w != str(out) else str(once) for w in words] + ["--reached"]) == 0
-    assert _files(once) == added
+    assert without_cost(once) == added
     assert added["kept.npz"] == whole["kept.npz"]
     model = tmp_path / "other.toml"
     model.write_text(SMALL.replace("zeta = 0.1", "zeta = 0.11"))
@@ -625,10 +616,10 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
 def test_bad_input_writes_nothing(
     exact: Path, home: Path, words: list[str], said: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    before = _files(exact)
+    before = without_cost(exact)
     assert entry.status([*_words(home, exact), *words, "-q"]) == 2
     assert said in capfd.readouterr().err
-    assert _files(exact) == before
+    assert without_cost(exact) == before
 
 
 @pytest.mark.parametrize("change", ["gone", "design", "model", "manifest"])
@@ -643,7 +634,9 @@ def test_a_folder_that_changes_under_a_study_is_noticed(
         out.rename(tmp_path / "elsewhere")
     elif change == "manifest":
         said = json.loads((out / "manifest.json").read_text())
-        said["stages"]["study"]["inputs"]["seed"] = 7
+        study = said["stages"]["study"]
+        study["inputs"]["seed"] = 7
+        study["inputs_sha256"] = ManifestStage(study["inputs"]).hash
         (out / "manifest.json").write_text(json.dumps(said))
     else:
         path = out / {"design": "design.json", "model": "model.toml"}[change]
@@ -695,8 +688,7 @@ def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) 
             process.wait()
     assert kills >= 2
     assert _process(home, out, *more, "--resume").wait() == 0
-    one, other = _files(out), _files(whole)  # by name: the difference of two reports takes minutes
-    assert not [n for n in {**one, **other} if one.get(n) != other.get(n)]
+    assert not differing(out, whole)
     assert not list(out.rglob("*.part"))
 
 
