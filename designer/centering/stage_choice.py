@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import doing, part
+from designer.base.progress import doing, note, part
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -123,7 +123,9 @@ def synthesise(
     forecasts += [] if there is None else [there]
     if refusal is not None and not forecasts:
         raise refusal
-    return replace(chosen(forecasts), seconds=time.perf_counter() - began)
+    made = replace(chosen(forecasts), seconds=time.perf_counter() - began)
+    note(synthesis_result.parts_line(made.design, made.seconds))
+    return made
 
 
 def _of_stage(
@@ -141,7 +143,8 @@ def _of_stage(
     """
     with part(f"with the {kind} stage"):
         stated = with_stage(modelfile, kind)
-        return forecast(synthesis_result.synthesise(stated, catalog, jobs=jobs, shown=met), jobs)
+        made = synthesis_result.synthesise(stated, catalog, jobs=jobs, announced=False, shown=met)
+        return forecast(made, jobs)
 
 
 def _foretold(*choice: Any) -> StageForecast | None:

@@ -1,4 +1,5 @@
-"""Extremes of absolute displacements, where the equations count them from a moving base.
+"""Orbits followed once more: for extremes of absolute displacements, where the equations count
+them from a moving base, and point by point.
 
 x = z + y is no state, so its extremes are none of the flow's. Here the drive becomes states (its
 sine, its cosine, and those of harmonics), and x takes the place of z: a system of the same modes
@@ -42,6 +43,15 @@ def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
     if run.status is not FlowStatus.DONE:
         return np.zeros((0, 2))
     return np.asarray(run.extremes[: flow.system.size])
+
+
+def followed(flow: Flow, orbit: Orbit, points: int) -> Array | None:
+    """(k + 1, states) an orbit of ``flow`` over its period, or ``OPEN_PERIODS`` without one, at so
+    many points of each drive period; None where the steps run out."""
+    with flow.within(Budget(step_budget.SETTLING)):
+        mode, periods = orbit.mode or None, orbit.n or OPEN_PERIODS
+        run = flow.run(orbit.start, periods, mode=mode, points=points)
+    return run.strobes if run.status is FlowStatus.DONE else None
 
 
 def _in_absolute_terms(flow: Flow, ground: Array) -> PiecewiseLinearSystem:

@@ -16,12 +16,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.si_unit import value_text
-from designer.check.absolute_motion import OPEN_PERIODS
-from designer.dynamics import step_budget
+from designer.check.absolute_motion import followed
 from designer.dynamics.flow import Flow
-from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit
-from designer.dynamics.step_budget import Budget
 from designer.model.hertz_law import POWER
 from designer.model.law_elements import NonlinearElement, SmoothLaw
 from designer.model.lumped_elements import Gap
@@ -146,13 +143,11 @@ def law_misfits(
     laws = curved_laws(model)
     if not laws or not isinstance(model, LumpedSystem) or orbit.status not in ANSWERS:
         return ()
-    with flow.within(Budget(step_budget.SETTLING)):
-        mode, periods = orbit.mode or None, orbit.n or OPEN_PERIODS
-        run = flow.run(orbit.start, periods, mode=mode, points=POINTS)
-    if run.status is not FlowStatus.DONE:
+    states = followed(flow, orbit, POINTS)
+    if states is None:
         return ()
     # With another b all of a law's lengths are another, and its forces with them.
-    displacements = (run.strobes[:, : len(units)] / units)[:, 0::2] / model.b
+    displacements = (states[:, : len(units)] / units)[:, 0::2] / model.b
     out = []
     for law in laws:
         reached = law.reached(displacements)

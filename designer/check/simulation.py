@@ -108,8 +108,9 @@ class Simulated:
     misfits: tuple[tuple[LawMisfit, ...], ...] = ()
     """Of the orbit and of each of ``others``, the curved laws whose force is off there;
     () where the engine was not asked (ngspice)."""
-    sticking: tuple[tuple[Sticking, ...], ...] = ()
-    """Of the orbit and of each of ``others``, what each friction does there; () in ngspice."""
+    sticking: tuple[tuple[Sticking, ...] | None, ...] = ()
+    """Of the orbit and of each of ``others``, what each friction does there, None where that is not
+    known; () in ngspice."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.check.absolute_motion import OPEN_PERIODS
-from designer.dynamics import step_budget
+from designer.check.absolute_motion import followed
 from designer.dynamics.flow import Flow
-from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit
-from designer.dynamics.step_budget import Budget
 from designer.model.law_elements import Friction
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
@@ -43,6 +40,8 @@ class Sticking:
     """Of the time, that in which it holds."""
     longest: float
     """Longest phase, in drive periods."""
+    creep: float
+    """Largest sliding velocity while it holds: how far it is from sticking."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -51,33 +50,33 @@ class Sticking:
 
 def stick_phases(
     model: MechanicalModel, flow: Flow, orbit: Orbit, units: Array, seconds: float
-) -> tuple[Sticking, ...]:
-    """What each friction of the model does over an orbit of ``flow``; nothing without any, or where
-    the orbit could not be followed.
+) -> tuple[Sticking, ...] | None:
+    """What each friction of the model does over an orbit of ``flow``; nothing without any, None
+    where the orbit could not be followed.
 
     model : at the orbit's clearance. units : (n,) of each state of the flow per unit of the
     model's. seconds : of the flow's time per unit of the model's.
     """
     if not isinstance(model, LumpedSystem) or not model.frictions or orbit.status not in ANSWERS:
         return ()
-    periods = orbit.n or OPEN_PERIODS
-    with flow.within(Budget(step_budget.SETTLING)):
-        run = flow.run(orbit.start, periods, mode=orbit.mode or None, points=POINTS)
-    if run.status is not FlowStatus.DONE:
-        return ()
-    velocities = (run.strobes[:, : len(units)] / units)[:, 1::2] / model.b
+    states = followed(flow, orbit, POINTS)
+    if states is None:
+        return None
+    velocities = (states[:, : len(units)] / units)[:, 1::2] / model.b
     step = flow.drive.period / seconds / POINTS
-    frictions = {n: e for n, e in model.nonlinear.items() if isinstance(e, Friction)}
-    return tuple(
-        _sticking(name, _holds(model, friction, velocities, step), periodic=orbit.n > 0)
-        for name, friction in frictions.items()
-    )
+    found = []
+    for name, friction in model.nonlinear.items():
+        if isinstance(friction, Friction):
+            slip = velocities @ model.row_of(friction.factors) - friction.speed
+            holds = _holds(model, friction, slip, step)
+            creep = model.b * float(np.abs(slip[1:][holds]).max(initial=0.0))
+            found.append(_sticking(name, holds, creep, periodic=orbit.n > 0))
+    return tuple(found)
 
 
-def _holds(model: LumpedSystem, friction: Friction, velocities: Array, step: float) -> Array:
-    """(k,) whether it holds in each stretch. velocities : (k + 1, n) of the masses at b = 1."""
+def _holds(model: LumpedSystem, friction: Friction, slip: Array, step: float) -> Array:
+    """(k,) whether it holds in each stretch. slip : (k + 1,) the sliding velocity at b = 1."""
     row = model.row_of(friction.factors)
-    slip = velocities @ row - friction.speed
     force = np.interp(slip, *np.transpose([(x - friction.speed, f) for x, f in friction.corners]))
     mass = 1.0 / float(row @ np.linalg.solve(model.mass_matrix, row))
     middle = 0.5 * (slip[1:] + slip[:-1])
@@ -86,20 +85,20 @@ def _holds(model: LumpedSystem, friction: Friction, velocities: Array, step: flo
     return np.asarray((np.abs(middle) <= friction.velocity) & (np.abs(others) <= peak))
 
 
-def _sticking(name: str, holds: Array, *, periodic: bool) -> Sticking:
+def _sticking(name: str, holds: Array, creep: float, *, periodic: bool) -> Sticking:
     """What the stretches say. periodic : whether the last one is followed by the first."""
     periods = len(holds) // POINTS
     if holds.all() or not holds.any():
         whole = bool(holds.all())
-        return Sticking(name, periods, 0, float(whole), float(periods * whole))
+        return Sticking(name, periods, 0, float(whole), float(periods * whole), creep)
     if periodic:  # begin with one that slides
         holds = np.roll(holds, -int(np.argmin(holds)))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]
     longest = float(lengths.max()) / POINTS
-    return Sticking(name, periods, len(lengths), float(holds.mean()), longest)
+    return Sticking(name, periods, len(lengths), float(holds.mean()), longest, creep)
 
 
 def sticking_in(answer: Mapping[str, Any]) -> tuple[Sticking, ...]:
     """Those that stand in the JSON object of a response."""
-    return tuple(Sticking(**each) for each in answer.get("sticking", ()))
+    return tuple(Sticking(**each) for each in answer.get("sticking") or ())

@@ -230,8 +230,10 @@ def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:
 
 
 def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:
-    """What each friction does over an orbit; nothing without any."""
+    """What each friction does over an orbit, null where that is not known; nothing without any."""
     held = simulated.sticking[number] if simulated.sticking else ()
+    if held is None:
+        return {"sticking": None}
     return {"sticking": [each.as_dict() for each in held]} if held else {}
 
 

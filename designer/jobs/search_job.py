@@ -78,7 +78,8 @@ def search_into(
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
     stands = all(confirms(row) for row in confirmed["responses"])
-    return replace(study, answer=answer, satisfied=study.satisfied and stands)
+    satisfied = study.satisfied and stands
+    return replace(study, answer=answer, satisfied=satisfied, shown=False)
 
 
 def confirms(row: Mapping[str, Any]) -> bool:

@@ -3,7 +3,7 @@ given point by point, cubic springs and friction.
 
 Each stands for one ``ForceLaw``. All numbers are in the file's own consistent units; texts with
 units become SI. A kind is one class here, named in ``KINDS``, a field of ``Elements`` and a
-table of ``model_file``; checks, sweeps, tables, equations and drawings follow from it.
+table of ``model_file``; checks, sweeps, tables, drawings and an equation by points follow from it.
 """
 
 from __future__ import annotations
@@ -56,6 +56,8 @@ class LawNumber:
     """Its SI unit; "" where it has none of its own."""
     meaning: str
     """What it is, for the table of the elements."""
+    idle_at_zero: bool = False
+    """Whether the element is as if it had none of it where it is 0."""
 
 
 @dataclass(frozen=True)
@@ -249,7 +251,7 @@ class CubicSpring(NonlinearElement):
 
     TABLE, LIST, WORDS = "cubic_spring", "cubic_springs", "cubic spring"
     PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {
-        "k1": LawNumber(-GREATEST, "N/m", "linear part of the spring"),
+        "k1": LawNumber(-GREATEST, "N/m", "linear part of the spring", idle_at_zero=True),
         "k3": LawNumber(-GREATEST, "", "cubic part of the spring (N/m³ in SI)"),
         "range": LawNumber(SMALLEST, "m", "up to which its pieces are laid"),
     }
@@ -322,11 +324,11 @@ class Friction(NonlinearElement):
 
     TABLE, LIST, WORDS = "friction", "frictions", "friction"
     PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {
-        "force": LawNumber(0.0, "N", "friction"),
+        "force": LawNumber(0.0, "N", "friction", idle_at_zero=True),
         "velocity": LawNumber(SMALLEST, "m/s", "up to which it rises"),
         "static": LawNumber(SMALLEST, "N", "friction there"),
         "stribeck": LawNumber(SMALLEST, "m/s", "where it has fallen"),
-        "speed": LawNumber(-GREATEST, "m/s", "of the surface that it slides on"),
+        "speed": LawNumber(-GREATEST, "m/s", "of the surface that it slides on", idle_at_zero=True),
     }
 
     between: Annotated[tuple[str, str], two_bodies()]

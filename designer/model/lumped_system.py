@@ -331,14 +331,12 @@ UNITS = {
     "preload_over": "m",
     "constant": "N",
     "phase": "rad",
-    **{key: n.unit for kind in KINDS for key, n in kind.PARAMETERS.items() if n.unit},
 }
-"""SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
+"""SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``, of a law's numbers
+``LawNumber``."""
+_LAWS = {kind.LIST: kind.PARAMETERS for kind in KINDS}
 
-_MAY_BE_ZERO = (
-    *("damping", "preload", "amplitude", "constant", "phase"),
-    *(key for kind in KINDS for key, n in kind.PARAMETERS.items() if n.least <= 0.0),
-)
+_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "phase")
 
 
 @dataclass(frozen=True)
@@ -469,16 +467,23 @@ class LumpedSystem(Elements):
         """SI unit of each of ``parameters`` that has one; an acceleration of the ground may be in
         g."""
         amplitudes = {"forces": "N", "base": "m" if self.base is None else self.base.unit}
-        return {
-            name: amplitudes[group] if key == "amplitude" else UNITS[key]
-            for name, (group, _, key) in self._places.items()
-            if key == "amplitude" or key in UNITS
-        }
+
+        def unit(group: str, key: str) -> str:
+            if group in _LAWS:
+                return _LAWS[group][key].unit
+            return amplitudes[group] if key == "amplitude" else UNITS.get(key, "")
+
+        found = {name: unit(group, key) for name, (group, _, key) in self._places.items()}
+        return {name: text for name, text in found.items() if text}
 
     @property
     def idle(self) -> frozenset[str]:
         """A factor of 1; dampers and forces of 0."""
-        names = {name for name in self._places if name.rpartition(".")[2] in _MAY_BE_ZERO}
+
+        def may_be(group: str, key: str) -> bool:
+            return _LAWS[group][key].idle_at_zero if group in _LAWS else key in _MAY_BE_ZERO
+
+        names = {name for name, (group, _, key) in self._places.items() if may_be(group, key)}
         idle = {name for name in names if self.parameter(name) == 0.0}
         return frozenset(idle | ({"b"} if self.b == 1.0 else set()))
 

@@ -194,7 +194,8 @@ class _Page(MechanicalSheet):
             return f"{symbol}: {linear}{self.values[f'{symbol}.k3']} x³"
         if isinstance(joint, NonlinearElement):
             first = next(iter(joint.PARAMETERS), None)
-            return symbol if first is None else f"{symbol}: {self.values[f'{symbol}.{first}']}"
+            value = self.values.get(f"{symbol}.{first}")
+            return symbol if value is None else f"{symbol}: {value}"
         size = joint.stiffness if isinstance(joint, Spring) else joint.damping
         return f"{symbol} = {self.values.get(symbol, f'{size:.4g}'.replace('-', '−'))}"
 

@@ -46,24 +46,33 @@ def after_design(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
         yield _step("circuit against design rules", "rules", folder)
 
 
-def after_study(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
-    """With a study. answer : of ``tolerance`` or ``run``."""
+def after_study(
+    folder: Path, answer: Mapping[str, Any], *, repaired: bool = False
+) -> Iterator[Step]:
+    """With a study. answer : of ``tolerance`` or ``run``. repaired : whether a repair was sought
+    already."""
     responses = answer["responses"]
     yield f"open {shlex.quote(str(folder / 'report.html'))}", "the report"
     yield from after_failed_rules(folder, answer)
     yield from after_response(folder, responses)
     low = any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses)
     # A search follows orbits.
-    if low and not any((r["expected"] or r["circuit"]) in WITHOUT_PERIOD for r in responses):
+    if (
+        low
+        and not repaired
+        and not any((r["expected"] or r["circuit"]) in WITHOUT_PERIOD for r in responses)
+    ):
         yield _step("the cheapest cure", "search", folder, "--yield", GOOD)
     if _board(folder) is None:
         yield _step("the KiCad project, its board routed", "export", folder, "--routed")
     yield from after_board(folder)
 
 
-def after_repair(folder: Path) -> Iterator[Step]:
-    """With a repaired design in a folder of its own."""
-    yield _step("how many of its boards will work", "tolerance", folder)
+def after_repair(folder: Path, cure: Mapping[str, Any]) -> Iterator[Step]:
+    """With a repaired design in a folder of its own. cure : the JSON object of ``cure.json``."""
+    rare = any(r["after"].get("rare") for r in cure["responses"])
+    more = [*(["--rare"] if rare else []), *(["--tuned"] if cure["upgrades"]["trim"] else [])]
+    yield _step("how many of its boards will work", "tolerance", folder, *more)
     yield _step("its KiCad project, its board routed", "export", folder, "--routed")
 
 

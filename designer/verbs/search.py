@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
+from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.printed import tell
 from designer.base.progress import Progress
@@ -70,8 +71,9 @@ def search(
     """Find the design of the highest yield; with --yield or --ppm, its cheapest repair (cure).
 
     A model file is searched, and written into ``out``. With ``yield_`` or ``ppm`` the found design
-    is then repaired at least cost: what comes of it is a design folder of its own, ``out``/cured. A
-    design folder is repaired, as ``cure`` does it.
+    is then repaired at least cost: what comes of it is a design folder of its own, ``out``/cured,
+    and whether the yield was reached is the answer. A design folder is repaired, as ``cure`` does
+    it.
 
     Raises
     ------
@@ -122,7 +124,7 @@ def search(
     options.check()
     place = None if out is None else Path(out)
     modelfile, folder = source(path, place)
-    repair = _asked_repair(modelfile, options)
+    repair = _asked_repair(modelfile, folder, options)
     options = folder_numbers.of_search(folder, options, words)
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(VERB.command, model=name, out=place)
@@ -131,22 +133,31 @@ def search(
     with progress.whole(usual):
         found = search_job.search_into(modelfile, folder, options, progress, command)
         if repair is None:
-            return found
-        cured = repair(folder, out=folder / CURED, options=options, progress=progress)
+            cured = None
+        else:
+            cured = repair(folder, out=folder / CURED, options=options, progress=progress)
+    is_another_s = not found.reused if cured is None else not cured.reached
+    if is_another_s and (folder / CURED / DESIGN).exists():
+        progress.note(f"{folder / CURED} holds an earlier design, which is not of this search")
+    if cured is None:
+        return found
     return replace(
         found,
         answer={**found.answer, "cure": cured.answer},
-        satisfied=found.satisfied and cured.satisfied,
+        satisfied=cured.satisfied,
         reused=found.reused and cured.reused,
     )
 
 
-def _asked_repair(modelfile: ModelFile, options: Options) -> Callable[..., CureResult] | None:
+def _asked_repair(
+    modelfile: ModelFile, folder: Path, options: Options
+) -> Callable[..., CureResult] | None:
     """``repair_into`` with what is asked of the found design; None where nothing is.
 
     Raises
     ------
-    InputError : no repair of a design of this model file can reach it.
+    InputError : no repair of a design of this model file can reach it; something else stands where
+        the repaired design is to be written.
     """
     if options.yield_ is None and options.ppm is None:
         return None
@@ -155,6 +166,7 @@ def _asked_repair(modelfile: ModelFile, options: Options) -> Callable[..., CureR
     target = repair_job.target_of(options.yield_, options.ppm)
     wish: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
     repair_job.check_wish(modelfile, **wish)
+    Folder(folder / CURED)  # refuses a place where something else stands
     return partial(repair_job.repair_into, **wish)
 
 
@@ -183,10 +195,11 @@ def _repair_told(repair: Mapping[str, Any]) -> None:
 
 def _after(folder: Path, answer: Mapping[str, Any]) -> Iterator[next_steps.Step]:
     """What may be done next: with the repaired design, where there is one."""
-    if answer.get("cure", {}).get("reached"):
-        yield from next_steps.after_repair(folder / CURED)
+    cure = answer.get("cure")
+    if cure is None or not cure["reached"]:
+        yield from next_steps.after_study(folder, answer, repaired=cure is not None)
     else:
-        yield from next_steps.after_study(folder, answer)
+        yield from next_steps.after_repair(folder / CURED, cure)
 
 
 def tables(answer: Mapping[str, Any]) -> None:

@@ -361,6 +361,7 @@ def _holding(row: Mapping[str, Any], held: Sticking, *, in_si: bool) -> dict[str
         "holds": often,
         "of the time": f"{100.0 * held.share:.3g} %",
         "longest, in drive periods": f"{held.longest:.3g}",
+        "creeps at most": value_text(held.creep, "m/s") if in_si else f"{held.creep:.3g}",
     }
 
 

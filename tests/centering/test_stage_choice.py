@@ -64,6 +64,10 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
         said = stage_choice.better_stage(stated, other, 2)
         assert ("with the rectifier stage" in said) is (kind == "saturation")
         assert not stage_choice.better_stage(modelfile, other)  # none is stated there
+        if kind == "saturation":
+            lost = stage_choice.kept_of_doubtful(stated, other, 2)
+            with other_process(2) as elsewhere:
+                assert elsewhere(stage_choice.other_stage, stated, other, lost, 1)() == said
         checked = checked_design.check(other.design, other.model_responses, None)
         plan = plan_study(stated, other.design, checked, CATALOG, samples=40, seed=11)
         answers = exact_circuit.block(plan, range(40), 2)

@@ -31,29 +31,32 @@ omega = {omega}
 """
 
 
-def coulomb(omega: float, force: float, mass: float) -> tuple[int, float, float]:
+def coulomb(
+    omega: float, force: float, mass: float, static: float, speed: float
+) -> tuple[int, float, float]:
     """Phases in one drive period, share of the time and longest phase [drive periods] of a block
-    with Coulomb friction, from event to event."""
+    with Coulomb friction on a belt of this speed, from event to event."""
     period = 2.0 * math.pi / omega
-    t, x, v, end = 0.0, 0.0, 0.0, 40 * period
+    t, x, v, end = 0.0, 0.0, 0.0, 60 * period
     phases = []
     while t < end:
         others = math.sin(omega * t) - x
-        if v == 0.0 and abs(others) <= force:  # it holds until the other forces overcome it
+        if v == speed and abs(others) <= static:  # held until the other forces overcome it
             grid = np.linspace(t, t + period, 200_001)
-            beyond = np.flatnonzero(np.abs(np.sin(omega * grid) - x) > force)
+            places = x + speed * (grid - t)
+            beyond = np.flatnonzero(np.abs(np.sin(omega * grid) - places) > static)
             if not len(beyond):
                 return 0, 1.0, math.inf
             phases.append((t, grid[beyond[0]]))
-            t = grid[beyond[0]]
+            t, x = float(grid[beyond[0]]), float(places[beyond[0]])
             others = math.sin(omega * t) - x
-        sign = math.copysign(1.0, v if v else others)
+        sign = math.copysign(1.0, v - speed if v != speed else others)
 
         def rates(t: float, y: np.ndarray, sign: float = sign) -> list[float]:
             return [y[1], (math.sin(omega * t) - y[0] - sign * force) / mass]
 
         def stops(t: float, y: np.ndarray) -> float:
-            return float(y[1])
+            return float(y[1] - speed)
 
         stops.terminal = True  # type: ignore[attr-defined]
         stops.direction = -sign  # type: ignore[attr-defined]
@@ -63,20 +66,34 @@ def coulomb(omega: float, force: float, mass: float) -> tuple[int, float, float]
         )  # fmt: skip
         t, (x, v) = float(run.t[-1]), run.y[:, -1]
         if run.status == 1:
-            v = 0.0
+            v = speed
     last = [(a, b) for a, b in phases if end - 2 * period <= a < end - period]
     lengths = [(b - a) / period for a, b in last]
     return len(last), sum(lengths), max(lengths, default=0.0)
 
 
 @pytest.mark.parametrize(
-    ("omega", "force", "mass"),
-    [(0.3, 0.2, 1.0), (0.2, 0.5, 1.0), (0.12, 0.2, 1.0), (0.6, 0.2, 1.0)],
+    ("omega", "force", "mass", "static", "speed"),
+    [
+        (0.3, 0.2, 1.0, 0.2, 0.0),
+        (0.2, 0.5, 1.0, 0.5, 0.0),
+        (0.25, 0.3, 1.5, 0.3, 0.0),
+        (0.12, 0.2, 1.0, 0.2, 0.0),
+        (0.3, 0.2, 1.0, 0.3, 0.0),
+        (0.3, 0.3, 1.0, 0.3, 0.15),
+        (0.6, 0.2, 1.0, 0.2, 0.0),
+    ],
 )
-def test_phases_come_to_those_of_coulomb_s_law(omega: float, force: float, mass: float) -> None:
-    phases, share, longest = coulomb(omega, force, mass)
+def test_phases_come_to_those_of_coulomb_s_law(
+    omega: float, force: float, mass: float, static: float, speed: float
+) -> None:
+    phases, share, longest = coulomb(omega, force, mass, static, speed)
     velocity = 0.004
     text = BLOCK.format(omega=omega, force=force, mass=mass, velocity=velocity)
+    more = f"speed = {speed}\n"
+    if static > force:
+        more += f"static = {static}\nstribeck = {1.5 * velocity}\n"
+    text = text.replace("[[force]]", f"{more}[[force]]")
     (row,) = simulate(parse_model_file(text), starts=0).answer["responses"]
     assert (row["response"], row["n"]) == ("1-0-0", 1)
     (held,) = row["sticking"]
@@ -84,6 +101,77 @@ def test_phases_come_to_those_of_coulomb_s_law(omega: float, force: float, mass:
     assert (held["periods"], held["phases"]) == (1, phases)
     assert held["share"] == pytest.approx(share, abs=0.01)
     assert held["longest"] == pytest.approx(longest, abs=0.006)
+    assert held["creep"] <= velocity if phases else held["creep"] == 0.0
+
+
+TWO = """format = 2
+[[mass]]
+name = "block"
+mass = {mass}
+[[mass]]
+name = "sled"
+mass = 2.0
+[[spring]]
+between = ["sled", "ground"]
+stiffness = 3.0
+[[damper]]
+between = ["sled", "ground"]
+damping = 0.4
+[[spring]]
+between = ["block", "sled"]
+stiffness = 1.0
+[[friction]]
+between = ["block", "sled"]
+force = 0.4
+velocity = 0.01
+[[force]]
+on = "sled"
+amplitude = 4.0
+[[response]]
+omega = 0.5
+"""
+
+
+def test_of_two_bodies_it_is_where_they_move_together() -> None:
+    """The effective mass is that of both; the phases are those of their difference in velocity,
+    which is flat there."""
+    made = simulate(parse_model_file(TWO.format(mass=1.0)), starts=0)
+    (row,) = made.answer["responses"]
+    (held,) = row["sticking"]
+    period = 2.0 * math.pi / 0.5
+    grid = np.linspace(0.0, row["n"] * period, 20_001)
+    states = made[0].motion(grid)
+    slip = (states["x1'"] - states["x2'"]).to_numpy()
+    # Sliding, the difference of the accelerations is of the order of the forces over the masses.
+    flat = (np.abs(slip) <= 0.01) & (np.abs(np.gradient(slip, grid)) < 0.05)
+    assert 0.1 < held["share"] < 0.9
+    assert held["share"] == pytest.approx(flat.mean(), abs=0.03)
+    assert held["phases"] == np.count_nonzero(np.diff(np.concatenate([flat, flat[:1]]) * 1) == 1)
+
+
+def test_with_half_the_clearance_forces_and_velocities_are_half() -> None:
+    text = BLOCK.format(omega=0.3, force=0.4, mass=1.0, velocity=0.008)
+    halved = simulate(parse_model_file(text + "b = 0.5\n"), starts=0).answer
+    plain = BLOCK.format(omega=0.3, force=0.2, mass=1.0, velocity=0.004)
+    whole = simulate(parse_model_file(plain), starts=0).answer
+    (one,), (other,) = halved["responses"][0]["sticking"], whole["responses"][0]["sticking"]
+    assert one["phases"] == other["phases"] == 2
+    assert one["share"] == pytest.approx(other["share"], abs=0.002)
+    assert one["creep"] == pytest.approx(other["creep"], rel=0.02)
+
+
+@pytest.mark.slow
+def test_on_the_circuit_it_is_as_on_the_model() -> None:
+    file = Path(__file__).parents[2] / "examples" / "dry-friction.toml"
+    model, circuit = (
+        simulate(file, engine=engine, starts=0).answer["responses"]
+        for engine in ("model", "circuit")
+    )
+    for one, other in zip(model, circuit, strict=True):
+        (held,), (on_board,) = one["sticking"], other["sticking"]
+        assert on_board["phases"] == held["phases"]
+        assert on_board["share"] == pytest.approx(held["share"], abs=0.01)
+        assert on_board["creep"] == pytest.approx(held["creep"], rel=0.1)
 
 
 def test_a_block_that_is_never_moved_holds_always(capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,8 @@ from designer.fidelity.trade_study import IDEAL, SHARE
 from designer.jobs import fidelity_choice
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
-from designer.jobs.search_job import confirms, to_confirm
+from designer.jobs.repair_job import CureResult
+from designer.jobs.search_job import confirms, search_into, to_confirm
 from designer.jobs.search_stage import searched_into
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
@@ -412,11 +413,13 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     def chosen(file: ModelFile, folder: Path, options: Options, *rest: Any) -> JobOutcome:
         made_now = synthesise_into(file, folder, options, Progress())
         commands.append(rest[1](options))
-        return replace(made_now, answer={"responses": []}, satisfied=True)
+        return replace(made_now, answer=found, satisfied=True)
 
     commands: list[str] = []
+    nothing: dict[str, Any] = {"responses": []}
+    found = nothing | {"search": {"final": nothing, "contributions": []}, "confirmation": nothing}
     monkeypatch.setattr("designer.jobs.search_job.search_into", chosen)
-    monkeypatch.setattr("designer.verbs.search.tables", lambda answer: None)
+    monkeypatch.setattr("designer.verbs.search.whole_job", lambda answer: None)
     without = [word for kind in KINDS for word in ("--without", kind)]
     options = ("--out", out, *target, *without, "--jobs", 1, "-q")
     assert run("search", model, *options, "--json") == (0 if reached else 1)
@@ -434,6 +437,49 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     assert run("search", model, *options[:-1]) == (0 if reached else 1)
     said = capsys.readouterr().err
     assert (f"designer tolerance {out / 'cured'}" in said) is reached
+    assert ("nothing has to change" if reached else "97 % not reached") in said
+
+    # Another repair that does not come to a design: the old one is told of.
+    if reached:
+        failed = CureResult({**answer["cure"], "reached": False, "why": "none"}, False, False)
+        monkeypatch.setattr("designer.jobs.repair_job.repair_into", lambda *_, **__: failed)
+        assert run("search", model, *options[:-1]) == 1
+        assert "holds an earlier design" in capsys.readouterr().err
+
+
+def test_a_place_for_the_repaired_design_is_kept_free(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, notes = tmp_path / "model.toml", tmp_path / "out" / "cured" / "notes.txt"
+    model.write_text(asked(OPEN), encoding="utf-8")
+    notes.parent.mkdir(parents=True)
+    notes.write_text("mine", encoding="utf-8")
+    assert run("search", model, "--yield", 0.9, "--out", tmp_path / "out", "-q") == 2
+    assert "cured" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["cured"]
+
+
+def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study tells that its answer was shown; nobody did where the verb shows none so early."""
+    folder = Folder(tmp_path)
+    folder.begin({"search": ({}, ["search.json"])}, {})
+    folder.write("search.json", dumps({"format": 1}))
+    folder.finish("search")
+    for name, value in (
+        ("program_version", None),
+        ("searched_into", None),
+        ("run_into", JobOutcome({}, True, shown=True)),
+        ("_confirmed", {"responses": []}),
+    ):
+        job = f"designer.jobs.search_job.{name}"
+        monkeypatch.setattr(job, lambda *_, value=value, **__: value)
+    random = SimpleNamespace(answer=lambda _: {"responses": []})
+    monkeypatch.setattr("designer.jobs.search_job.RANDOM", random)
+    monkeypatch.setattr("designer.jobs.search_job.fidelity_choice.for_search", lambda *_: "exact")
+    file: Any = None
+    found = search_into(file, tmp_path, Options(), Progress(), lambda _: "")
+    assert found.satisfied
+    assert not found.shown
 
 
 @pytest.mark.parametrize(
