@@ -24,6 +24,12 @@ DIGITS = 4
 """Significant digits of a value that is shown."""
 
 
+def celsius_text(low: float, high: float | None = None) -> str:
+    """A temperature [°C], such as "−20 °C", or a range: "−20 to 60 °C"."""
+    text = f"{low:g} °C" if high is None or high == low else f"{low:g} to {high:g} °C"
+    return text.replace("-", "−")
+
+
 @dataclass(frozen=True)
 class Unit:
     """The SI unit of a dimensionless quantity."""

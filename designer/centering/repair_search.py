@@ -18,6 +18,7 @@ import numpy as np
 
 from designer.base.defaults import cores
 from designer.base.progress import Progress, best_so_far, seeking
+from designer.base.rare_words import boards_text
 from designer.centering.limiting_parts import joint_boards, limiting
 from designer.centering.repair_branch import TRIM, TRIMMER, Refused, RepairBranch, branches
 from designer.centering.repair_couplings import finest
@@ -523,6 +524,6 @@ def _share(measured: MeasuredYield) -> str:
     low, high = measured.interval
     if measured.rare is not None:
         rare = measured.rare
-        ends = f"({1e6 * rare.low:.3g} to {1e6 * rare.high:.3g})"
-        return f"{1e6 * rare.lost:.3g} of a million lost {ends}"
+        lost, *ends = (boards_text(1e6 * s) for s in (rare.lost, rare.low, rare.high))
+        return f"{lost} of a million lost ({' to '.join(ends)})"
     return f"{measured.rate:.4f} ({low:.4f} to {high:.4f})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from designer.base.rare_words import boards_text
 from designer.base.si_unit import drive_text
 
 
@@ -64,8 +65,8 @@ def _yield(m: Mapping[str, Any]) -> str:
     if m["rate"] is None:
         return "not shown"
     if rare := m.get("rare"):
-        low, high = 1e6 * rare["low"], 1e6 * rare["high"]
-        unseen = f"at most {1e6 * rare['unseen']:.3g} that no search met"
-        return f"{1e6 * rare['lost']:.3g} of a million lost ({low:.3g} to {high:.3g}; {unseen})"
+        keys = ("lost", "low", "high", "unseen")
+        lost, low, high, unseen = (boards_text(1e6 * rare[key]) for key in keys)
+        return f"{lost} of a million lost ({low} to {high}; at most {unseen} that no search met)"
     text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
     return text + (f", {m['failed']} failed" if m["failed"] else "")

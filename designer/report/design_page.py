@@ -443,10 +443,14 @@ def _attribution_note(data: ReportData, attribution: Attribution, *, lost: bool)
             "Lost boards were asked again with one part or one group exact and all else as drawn; "
             "shares do not add up, since a board can be lost by several parts together. "
         )
+    temperature = data.plan.spread.temperature
+    warm = ""
+    if temperature is not None:
+        warm = f"Boards are {boards_at(temperature)}, the nominal one {boards_at(None)}. "
     return replays + (
         "The margin is the distance to the loss, linear in the parts; its indices tell whose "
-        "spread moves it, and are worth as much as the verdicts that it foretells. Boards are "
-        f"{boards_at(data.plan.spread.temperature)}, the nominal one at 25 °C. Cost: "
+        "spread moves it, and are worth as much as the verdicts that it foretells. "
+        f"{warm}Cost: "
         f"{words.plural(attribution.attractors, 'attractor')} and "
         f"{words.plural(attribution.orbits, 'step')} of following orbits."
     )

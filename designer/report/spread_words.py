@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from designer.base.natural_sort import natural_key
+from designer.base.si_unit import celsius_text
 from designer.circuit.netlist import Circuit
 from designer.model.distributions import Binned, Distribution, Normal, Split, Uniform
 from designer.report.words import quantity
@@ -37,7 +38,7 @@ def words_of(spread: Spread, circuit: Circuit, *, bandwidth: bool = False) -> st
         parts.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
     if spread.temperature is not None:
         low, high = spread.temperature
-        within = f"uniform from {low:g} to {high:g} °C" if low < high else f"of {low:g} °C"
+        within = f"{'uniform from' if low < high else 'of'} {celsius_text(low, high)}"
         moved = warm_words(spread.opamps, bandwidth=bandwidth)
         parts.append(f"temperature {within}, which moves parts and, of the op-amps, {moved}")
     if spread.ageing:

@@ -9,7 +9,8 @@ from dataclasses import replace
 from functools import partial
 
 from designer.base.page import Table, table, table_of
-from designer.base.si_unit import value_text
+from designer.base.rare_words import boards_text, share_text
+from designer.base.si_unit import celsius_text, value_text
 from designer.model.model import SiScales
 from designer.report import words
 from designer.report.data import ReportData
@@ -245,7 +246,9 @@ def rare(data: ReportData) -> Table | None:
     rows = [[cell(r) for cell in columns.values()] for r in data.study.rare]
     if (joint := data.study.any_lost) is not None:
         cells = [f"{_millions(joint.least)} to {_millions(joint.most)}"]
-        cells.append(f"{_millions(joint.low)} to {_millions(joint.high)}, by the ends above")
+        cells.append(
+            f"{_millions(joint.low)} to {_millions(joint.high)}, by these and what may be unseen"
+        )
         rows.append(["at least one, on one board", *cells, *[words.NONE] * (len(columns) - 3)])
     return table(list(columns), rows, (4, 5))
 
@@ -257,7 +260,7 @@ def loss_regions(data: ReportData) -> Table | None:
         "response": lambda row: _asked(data, row[0]),
         "found by": lambda row: row[1].found_by,
         "becomes": lambda row: row[1].becomes,
-        "of the losses": lambda row: f"{100 * row[1].share:.2g} %",
+        "of the losses": lambda row: share_text(row[1].share),
         "parts that lead there": lambda row: ", ".join(row[1].parts) or words.NONE,
     }
     return table_of(rows, columns)
@@ -283,7 +286,7 @@ def _asked(data: ReportData, found: RareLosses) -> str:
 
 
 def _millions(share: float) -> str:
-    return f"{1e6 * share:.3g}"
+    return boards_text(1e6 * share)
 
 
 def maps(data: ReportData) -> Table | None:
@@ -321,14 +324,10 @@ def over_temperature(data: ReportData) -> Table | None:
         "response": lambda one: words.name(data.checked[data.study.response_indices[one.question]])
     }
     columns |= {
-        f"{_celsius(celsius)}{'*' * rows[0].outside(celsius)}": share(index)
+        f"{celsius_text(celsius)}{'*' * rows[0].outside(celsius)}": share(index)
         for index, celsius in enumerate(rows[0].axes[0].values)
     }
     return table_of(rows, columns)
-
-
-def _celsius(value: float) -> str:
-    return f"{value:g} °C".replace("-", "−")
 
 
 def what_temperature_moves(data: ReportData) -> str:
@@ -342,8 +341,8 @@ def what_temperature_moves(data: ReportData) -> str:
     ]
     if any(rows[0].outside(celsius) for celsius in rows[0].axes[0].values):
         low, high = rows[0].specified
-        ends = [] if low is None else [f"from {_celsius(low)}"]
-        ends += [] if high is None else [f"up to {_celsius(high)}"]
+        ends = [] if low is None else [f"from {celsius_text(low)}"]
+        ends += [] if high is None else [f"up to {celsius_text(high)}"]
         said.append(f"* The op-amp is specified {' '.join(ends)}, not here.")
     return " ".join(said)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.attribution_noise import lacks_noise
-from designer.base.rare_words import any_lost_words
+from designer.base.rare_words import any_lost_words, boards_text, share_text
 from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
@@ -242,13 +242,13 @@ def _rare(answer: Mapping[str, Any]) -> None:
 
     def cells(row: Mapping[str, Any]) -> dict[str, str]:
         found = row["rare"]
-        estimate, low, high = found["per_million"]
-        regions = [f"{g['becomes']} ({g['found_by']}) {100 * g['share']:.2g} %" for g in
+        estimate, low, high = map(boards_text, found["per_million"])
+        regions = [f"{g['becomes']} ({g['found_by']}) {share_text(g['share'])}" for g in
                    found["regions"]]  # fmt: skip
         wide = next((m["widening"] for m in found["margins"] if not m["part"]), None)
         return {
-            "lost of a million": f"{estimate:.3g}" if found["drawn_lost"] else "0",
-            "95 %": f"{low:.3g} to {high:.3g}",
+            "lost of a million": estimate if found["drawn_lost"] else "0",
+            "95 %": f"{low} to {high}",
             "boards asked": str(found["boards"] + found["pilots"]),
             "regions": "; ".join(regions[:2]) or ("none found" if found["pilots"] else "-"),
             "first loss at": "-" if wide is None else f"{wide:.2g} × the tolerances",
@@ -257,9 +257,10 @@ def _rare(answer: Mapping[str, Any]) -> None:
     table("Rare losses", ({**response_cells(r, rows), **cells(r)} for r in asked), gap=1)
     if any_lost := answer.get("any_lost"):
         say(any_lost_words(any_lost))
-    unseen = 1e6 * max(r["rare"]["unseen"] for r in asked)
+    unseen = max(r["rare"]["unseen"] for r in asked)
     if unseen:
-        say(f"A region of losses that no search met may hold up to {unseen:.3g} of a million more")
+        more = boards_text(1e6 * unseen)
+        say(f"A region of losses that no search met may hold up to {more} of a million more")
 
 
 def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:
