@@ -13,16 +13,18 @@ TAIL = 0.025
 """Probability beyond each limit."""
 
 
-def wilson(count: float, of: int) -> tuple[float, float]:
-    """Two-sided 95 % interval of count/of (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927, 209).
+def wilson(count: float, of: int, quantile: float = Z) -> tuple[float, float]:
+    """Two-sided interval of count/of (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927, 209): of 95 %, or
+    of another quantile of the normal distribution.
 
     ``count`` need not be whole. (0, 1) where nothing was asked.
     """
     if of == 0:
         return 0.0, 1.0
-    p, n, z2 = count / of, float(of), Z * Z
+    p, n, z = count / of, float(of), quantile
+    z2 = z * z
     centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
-    half = Z * math.sqrt(max(p * (1.0 - p), 0.0) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
+    half = z * math.sqrt(max(p * (1.0 - p), 0.0) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
     # At the ends the limit is exact, and the difference of equals only rounding.
     return (
         0.0 if count <= 0.0 else max(centre - half, 0.0),

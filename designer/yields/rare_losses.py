@@ -22,11 +22,13 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from scipy.special import ndtri
 
 from designer.base.arrays import Array, Index, Mask
 from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import wilson
+from designer.base.rare_words import boards_text
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -176,6 +178,16 @@ class RareLosses:
         """Boards of a million that lose it: the estimate, and the ends of its interval."""
         return 1e6 * self.lost, 1e6 * self.low, 1e6 * self.high
 
+    def ends(self, level: float) -> tuple[float, float]:
+        """Ends of the interval at another level than 0.95, without what may be unseen."""
+        quantile = float(ndtri(0.5 + 0.5 * level))
+        if not self.pilots:  # counted, not drawn
+            return wilson(self.drawn_lost, round(self.boards * (1.0 - self.unanswered)), quantile)
+        if not self.lost:
+            return 0.0, 0.0
+        spread = (self.lost / self.low) ** (quantile / QUANTILE)
+        return self.lost / spread, min(self.lost * spread, 1.0)
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; an undefined number is None."""
         document: dict[str, Any] = plain({**asdict(self), "per_million": self.per_million})
@@ -195,14 +207,17 @@ class AnyLost:
     low: float
     """The least share, by the lower ends of the intervals."""
     high: float
-    """The largest share, by their upper ends."""
+    """The largest share, by their upper ends and what may be unseen of each."""
 
     @classmethod
     def of(cls, found: Sequence[RareLosses]) -> AnyLost:
-        """From one estimate at least."""
-        lost = [each.lost for each in found]
-        high = min(sum(each.high for each in found), 1.0)
-        return cls(max(lost), min(sum(lost), 1.0), max(each.low for each in found), high)
+        """From one estimate at least. Of n the ends are those at the level 1 - 0.05/n (C. E.
+        Bonferroni, 1936), and so is what may be unseen."""
+        lost, level = [each.lost for each in found], 1.0 - 0.05 / len(found)
+        lows, highs = zip(*(each.ends(level) for each in found), strict=True)
+        # The quantiles of a Poisson count grow with the level most where nothing was counted.
+        unseen = sum(each.unseen for each in found) * math.log(1.0 - level) / math.log(0.05)
+        return cls(max(lost), min(sum(lost), 1.0), max(lows), min(sum(highs) + unseen, 1.0))
 
 
 @dataclass(frozen=True)
@@ -404,7 +419,7 @@ def rare_losses(
     while True:
         result = _estimate(cube, sample)
         count = len(sample.points)
-        doing(f"{1e6 * result.mean:.3g} of a million boards, by {count} boards")
+        doing(f"{boards_text(1e6 * result.mean)} of a million boards, by {count} boards")
         narrow = result.mean > 0.0 and QUANTILE * result.error <= target * result.mean
         narrow = narrow and result.effective >= ENOUGH
         decided = bound is not None and _is_decided(result, bound)

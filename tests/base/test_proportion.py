@@ -5,16 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from scipy.stats import binom, binomtest
+from scipy.stats import binom, binomtest, norm
 
 from designer.base.proportion import mid_p, wilson
 
 
-@given(of=st.integers(1, 500), count=st.integers(0, 500))
-def test_wilson_is_that_of_scipy(of: int, count: int) -> None:
+@given(of=st.integers(1, 500), count=st.integers(0, 500), level=st.floats(0.5, 0.999))
+def test_wilson_is_that_of_scipy(of: int, count: int, level: float) -> None:
     count = min(count, of)
     ci = binomtest(count, of).proportion_ci(0.95, method="wilson")
     assert wilson(count, of) == pytest.approx((ci.low, ci.high), abs=1e-12)
+    ci = binomtest(count, of).proportion_ci(level, method="wilson")
+    quantile = float(norm.ppf(0.5 + 0.5 * level))
+    assert wilson(count, of, quantile) == pytest.approx((ci.low, ci.high), abs=1e-12)
 
 
 @given(of=st.integers(1, 300), tenths=st.integers(0, 3000))

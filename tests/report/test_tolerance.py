@@ -279,6 +279,15 @@ def test_an_attribution_without_noise_says_once_how_to_get_it(full: ReportData) 
     assert "stored no noise" not in text
 
 
+def test_an_attribution_says_a_temperature_that_is_stated(full: ReportData) -> None:
+    assert full.plan.spread.temperature is None
+    assert "the nominal one" not in render_markdown(full)
+    warm = replace(full.plan, spread=replace(full.plan.spread, temperature=(-20.0, 60.0)))
+    text = render_markdown(changed(full, plan=warm))
+    assert "Boards are at −20 to 60 °C, each at its own, the nominal one at 25 °C." in text
+    assert "temperature uniform from −20 to 60 °C" in text
+
+
 def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
     row = rows_of(maps(full))[0]
     assert row[1] == "ω"
@@ -339,7 +348,10 @@ def test_boards_of_a_million_stand_in_the_first_answer(plain: ReportData) -> Non
         f"{words.name(data.checked[1])}: 50 of a million boards are lost (25 to 100), of them 80 % "
         "by R203 high, C1 low, which show 2-2-2; R203 alone loses it at 1.3 times its tolerance."
     ) in text
-    assert "is lost on 50 to 70 of a million boards (25 to 140 by the ends" in text
+    assert (
+        "is lost on 50 to 70 of a million boards (22.6 to 2617 by the intervals and what may"
+        in text
+    )
     assert "Boards differ as in the study above, at −20 to 60 °C, each at its own." in text
     table = rare(data)
     assert table is not None
