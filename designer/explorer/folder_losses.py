@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from designer.base.design_folder import MODEL, TOLERANCE, Folder, is_design_folder
+from designer.base.errors import InputError
 from designer.base.guarded_reading import reading
 from designer.base.rare_words import any_lost_words, boards_at, loss_words
 from designer.base.si_unit import drive_text
 from designer.explorer.wire import Message
 from designer.folders.model_source import design_inputs_of
 from designer.model.model_file import ModelFile
+from designer.model.response_table import Response
+
+
+@dataclass(frozen=True)
+class ResponseLosses:
+    """Boards of a million that lose one response."""
+
+    omega: float
+    """Its drive frequency in the model's units."""
+    b: float
+    """The clearance it is wanted at."""
+    summary: str
+    """The response in words."""
+    words: str
+    """Its losses in words."""
 
 
 @dataclass(frozen=True)
@@ -21,26 +37,32 @@ class FolderLosses:
 
     words: str
     """Which boards these are."""
-    rows: tuple[tuple[float, str, str], ...]
-    """Of each response its drive frequency in the model's units, itself and its losses in words."""
+    b: float
+    """The model's own clearance."""
+    rows: tuple[ResponseLosses, ...]
+    """One for each response with an estimate."""
 
     def message(self) -> Message:
         """What the page writes of it."""
-        keys = ("omega", "summary", "words")
-        return {"rows": [dict(zip(keys, row, strict=True)) for row in self.rows]}
+        return {"b": self.b, "rows": [asdict(row) for row in self.rows]}
 
 
-def folder_losses(modelfile: ModelFile) -> FolderLosses | None:
+def folder_losses(modelfile: ModelFile, note: Callable[[str], None]) -> FolderLosses | None:
     """Of a design folder's model file; None where there is no folder, or no finished estimate.
 
-    Raises
-    ------
-    InputError : its study cannot be read.
+    note : is told of a study that cannot be read, which the page does without.
     """
     path = modelfile.source
     if path is None or path.name != MODEL or not is_design_folder(path.parent):
         return None
-    folder = Folder(path.parent)
+    try:
+        return _found(modelfile, Folder(path.parent))
+    except InputError as error:
+        note(f"no boards of a million are shown: {error}")
+        return None
+
+
+def _found(modelfile: ModelFile, folder: Folder) -> FolderLosses | None:
     stage = None if folder.manifest is None else folder.manifest.stages.get("study")
     if stage is None or not stage.complete:
         return None
@@ -48,25 +70,30 @@ def folder_losses(modelfile: ModelFile) -> FolderLosses | None:
         return None
     study = folder.json(TOLERANCE)
     with reading(folder / TOLERANCE, "a finished study"):
-        return _read(study)
+        return _read(study, modelfile)
 
 
-def _read(study: Mapping[str, Any]) -> FolderLosses | None:
-    asked = [r for r in study["responses"] if r.get("rare")]
+def _read(study: Mapping[str, Any], modelfile: ModelFile) -> FolderLosses | None:
+    each = zip(modelfile.responses, study["responses"], strict=True)
+    asked = [(spec, response) for spec, response in each if response.get("rare")]
     if not asked:
         return None
-    origin = study["provenance"]
+    origin, own = study["provenance"], modelfile.model.b
     words = (
         "Estimated by tolerance --rare for the parts of this folder, boards "
         f"{boards_at(origin['spread']['temperature'])}, seed {origin['seed']}."
     )
     if any_lost := study.get("any_lost"):
         words += f" {any_lost_words(any_lost)}."
-    return FolderLosses(words, tuple(map(_row, asked)))
+    return FolderLosses(words, own, tuple(_row(*pair, own) for pair in asked))
 
 
-def _row(response: Mapping[str, Any]) -> tuple[float, str, str]:
-    omega = float(response["omega"])
+def _row(spec: Response, response: Mapping[str, Any], own: float) -> ResponseLosses:
+    omega, b = float(response["omega"]), own if spec.b is None else spec.b
+    if isinstance(b, tuple):
+        raise ValueError("a response of the model file that leaves b open")
     place = drive_text(omega, response.get("frequency_hz"), 6)
+    if b != own:
+        place += f", b = {b:.6g}"
     wanted = response["expected"] or response["model"]
-    return omega, f"{wanted} at {place}", loss_words(response["rare"])
+    return ResponseLosses(omega, b, f"{wanted} at {place}", loss_words(response["rare"]))

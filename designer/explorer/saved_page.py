@@ -310,11 +310,11 @@ def save_page(
     Raises
     ------
     InputError : the file is there and is not to be replaced, or cannot be written; an option that
-    cannot be; a study of the model's folder that cannot be read.
+    cannot be.
     """
     options.check()
     _check_place(path, options.overwrite)
-    losses = folder_losses(modelfile)
+    losses = folder_losses(modelfile, progress.note)
     branch = record(modelfile, places(modelfile), options.workers, progress)
     counted = yields(modelfile, options, progress)
     page = recorded_page(modelfile, message_of(branch, counted), losses)

@@ -134,13 +134,13 @@ def serve(
 
     Raises
     ------
-    InputError : a port that is taken, an address that is none here, a study that cannot be read.
+    InputError : a port that is taken, an address that is none here.
     """
     if token is None:
         token = "" if host in LOCAL else secrets.token_urlsafe(16)
     elif not TOKEN.fullmatch(token):
         raise InputError(None, "--token", token, "letters, digits, _, -, . and ~, at most 200")
-    losses = folder_losses(modelfile)
+    losses = folder_losses(modelfile, progress.note)
     listening = _listening(host, port)
     number = listening.getsockname()[1]
     address = _address(host, number, token)

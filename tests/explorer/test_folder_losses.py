@@ -3,109 +3,136 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser
 
-from designer import InputError
 from designer.base.design_folder import MODEL, TOLERANCE, Folder
-from designer.base.plain_json import dumps
+from designer.cli import entry
 from designer.explorer.explorer_page import page
-from designer.explorer.folder_losses import folder_losses
+from designer.explorer.folder_losses import FolderLosses, folder_losses
 from designer.folders.model_source import model_of
-from designer.model.model_file import parse_model_file
+from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
 from tests.explorer.opened_page import chromium, opened
 from tests.explorer.served import served
 from tests.shared.model_text import SMALL
 
-REGION = {"becomes": "2-2-2 <b>", "found_by": "", "share": 0.8, "boards": 9, "parts": ["R203 high"]}
-RARE = {
-    "per_million": [12.0, 8.0, 17.0],
-    "drawn_lost": 90,
-    "regions": [REGION],
-    "margins": [{"part": "", "widening": 0.6}, {"part": "R203", "widening": 1.3}],
-}
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
+TWO = (
+    SMALL
+    + """\
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+b = 0.26
+
+[spread]
+temperature = [-20.0, 60.0]
+"""
+)
+"""One response at two clearances."""
+RARE = RareLosses(
+    0, 12e-6, 8e-6, 17e-6, 0.0, 1500, 3000, 90, 60.0, 3.0, 40.0, 0.0, True,
+    (LossRegion("", "2-2-2 <b>", 0.8, 9, ("R203 high",)),),
+    (ToleranceMargin("", 0.6), ToleranceMargin("R203", 1.3)), 0.0,
+)  # fmt: skip
 
 
-def made(place: Path, **changes: Any) -> Path:
-    """A design folder with a finished study that says this of its response."""
-    digest = parse_model_file(SMALL).sha256
-    response = {"omega": 0.85, "expected": "1-2-2", "model": "1-2-2", "rare": RARE}
-    study = {
-        "format": 1,
-        "responses": [response],
-        "provenance": {"seed": 3, "spread": {"temperature": [-20.0, 60.0]}},
-        **changes,
-    }
-    folder = Folder(place)
-    stages = {"design": ({"model": digest}, [MODEL]), "study": ({}, [TOLERANCE])}
-    with folder.working(stages):  # type: ignore[arg-type]
-        folder.write(MODEL, SMALL)
-        folder.write(TOLERANCE, dumps(study))
+def made(place: Path, *options: str) -> Path:
+    """A design folder whose study, asked for an estimate, says ``RARE`` of each response."""
+    model = place.with_suffix(".toml")
+    model.write_text(TWO, "utf-8")
+    command = ["tolerance", str(model), "--out", str(place), "--rung", "exact", "--samples", "1"]
+
+    def known(_plan: object, number: int, **_: object) -> RareLosses:
+        return replace(RARE, question=number)
+
+    def report(_data: object, html: Path, text: Path, _sections: object) -> None:
+        for path in (html, text):
+            path.write_text("report")
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("designer.yields.tolerance_study.rare_losses", known)
+        patched.setattr("designer.report.write.write_report", report)
+        assert entry.status([*command, "--no-blame", "--seed", "3", *options]) == 0
     return place
 
 
-def test_figures_of_a_folder_stand_on_its_page(tmp_path: Path) -> None:
-    """With the parts and the temperature that they are of; what a file says is no markup."""
-    modelfile = model_of(made(tmp_path / "d"))
-    losses = folder_losses(modelfile)
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, designs_are_made_once: None) -> Path:
+    """A folder with an estimate, which no test changes."""
+    return made(tmp_path_factory.mktemp("whole") / "d", "--rare")
+
+
+@pytest.fixture
+def folder(whole: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    return Path(shutil.copytree(whole, tmp_path / "d"))
+
+
+def said(folder: Path) -> FolderLosses:
+    """What is found of a folder of which nothing has to be noted."""
+    losses = folder_losses(model_of(folder), pytest.fail)
     assert losses is not None
-    text = page(modelfile, losses)
+    return losses
+
+
+def test_figures_of_a_folder_stand_on_its_page(whole: Path) -> None:
+    """With the parts and the temperature that they are of, and the clearance of each response; what
+    a file says is no markup."""
+    losses = said(whole)
+    text = page(model_of(whole), losses)
     for words in ("for the parts of this folder", "at −20 to 60 °C", "seed 3"):
         assert words in text
-    (row,) = losses.message()["rows"]
-    assert (row["omega"], row["summary"]) == (0.85, "1-2-2 at ω = 0.85")
-    assert row["words"] == (
+    first, second = losses.message()["rows"]
+    assert (first["omega"], first["b"], first["summary"]) == (0.85, 0.25, "1-2-2 at ω = 0.85")
+    assert (second["omega"], second["b"]) == (0.85, 0.26)
+    assert second["summary"] == "1-2-2 at ω = 0.85, b = 0.26"
+    assert first["words"] == (
         "12 of a million boards are lost (8 to 17), of them 80 % by R203 high, which show "
         "2-2-2 <b>; R203 alone loses it at 1.3 times its tolerance"
     )
     assert "2-2-2 <b>" not in text
-    assert "At least one" not in text
-    assert "Boards of a million" not in page(modelfile)
+    assert "At least one of the responses is lost on 12 to 24 of a million boards" in text
+    assert "Boards of a million" not in page(model_of(whole))
 
 
-def test_bounds_of_several_responses_are_said(tmp_path: Path) -> None:
-    joint = {"least": 1.2e-5, "most": 3e-5, "low": 8e-6, "high": 4.1e-5}
-    losses = folder_losses(model_of(made(tmp_path / "d", any_lost=joint)))
-    assert losses is not None
-    assert "12 to 30 of a million boards (8 to 41 by the ends of the intervals)" in losses.words
-
-
-def test_where_no_board_is_lost_the_bound_is_said(tmp_path: Path) -> None:
-    none = RARE | {"per_million": [0.0, 0.0, 75.0], "drawn_lost": 0, "regions": [], "margins": []}
-    response = {"omega": 0.85, "expected": "1-2-2", "model": "1-2-2", "rare": none}
-    losses = folder_losses(model_of(made(tmp_path / "d", responses=[response])))
-    assert losses is not None
-    assert "at most 75 of a million" in losses.rows[0][2]
-
-
-def test_without_a_finished_estimate_of_this_model_nothing_is_said(tmp_path: Path) -> None:
+def test_without_a_finished_estimate_of_this_model_nothing_is_said(
+    folder: Path, tmp_path: Path
+) -> None:
     model = tmp_path / "small.toml"
     model.write_text(SMALL, "utf-8")
-    assert folder_losses(model_of(model)) is None
-    without = {"omega": 0.85, "expected": "1-2-2", "model": "1-2-2"}
-    assert folder_losses(model_of(made(tmp_path / "a", responses=[without]))) is None
-    other = made(tmp_path / "b")
-    (other / MODEL).write_text(SMALL.replace("omega = 0.85", "omega = 0.86"), "utf-8")
-    assert folder_losses(model_of(other / MODEL)) is None
-    unfinished = made(tmp_path / "c")
-    Folder(unfinished).begin({"study": ({}, [TOLERANCE])})
-    assert folder_losses(model_of(unfinished)) is None
+    assert folder_losses(model_of(model), pytest.fail) is None
+    assert folder_losses(model_of(made(tmp_path / "a")), pytest.fail) is None
+    (folder / MODEL).write_text(TWO.replace("b = 0.26", "b = 0.27"), "utf-8")
+    assert folder_losses(model_of(folder / MODEL), pytest.fail) is None
+    (folder / MODEL).write_text(TWO, "utf-8")
+    said(folder)
+    Folder(folder).begin({"study": ({}, [TOLERANCE])})
+    assert folder_losses(model_of(folder), pytest.fail) is None
 
 
-def test_a_study_that_is_none_is_named(tmp_path: Path) -> None:
-    folder = made(tmp_path / "d", responses=[{"omega": 0.85, "rare": {"per_million": "x"}}])
-    with pytest.raises(InputError, match=r"tolerance\.json"):
-        folder_losses(model_of(folder))
-    changed = made(tmp_path / "e")
-    study = json.loads((changed / TOLERANCE).read_text("utf-8"))
+def test_a_study_that_cannot_be_read_is_noted_and_done_without(
+    folder: Path, tmp_path: Path
+) -> None:
+    notes = list[str]()
+    study = json.loads((folder / TOLERANCE).read_text("utf-8"))
     study["responses"][0]["rare"]["per_million"] = [0.0, 0.0, 1.0]
-    (changed / TOLERANCE).write_text(json.dumps(study), "utf-8")
-    with pytest.raises(InputError, match="sha256"):
-        folder_losses(model_of(changed))
+    (folder / TOLERANCE).write_text(json.dumps(study), "utf-8")
+    assert folder_losses(model_of(folder), notes.append) is None
+    (folder / TOLERANCE).unlink()
+    assert folder_losses(model_of(folder), notes.append) is None
+    edited, deleted = notes
+    assert "tolerance.json" in edited
+    assert "sha256" in edited
+    assert "tolerance.json" in deleted
+    with served(folder, tmp_path, "--port", "0") as address:
+        assert address
 
 
 @pytest.fixture(scope="module")
@@ -115,16 +142,25 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.mark.browser
-def test_the_page_says_when_it_shows_other_values(browser: Browser, tmp_path: Path) -> None:
-    """Another frequency or another number of the model; the row leads back to its frequency."""
-    with served(made(tmp_path / "d"), tmp_path, "--port", "0") as address:
+def test_the_page_says_when_it_shows_other_values(
+    browser: Browser, whole: Path, tmp_path: Path
+) -> None:
+    """Another frequency, another clearance or another number of the model; a row leads to its
+    response."""
+    with served(whole, tmp_path, "--port", "0") as address:
         shown = opened(browser, address)
         shown.wait_for_selector("#moved", state="hidden")
         assert "12 of a million boards are lost" in shown.inner_text("#losses li")
-        shown.fill("[data-name=omega] .number", "0.86")
-        shown.press("[data-name=omega] .number", "Enter")
-        shown.wait_for_selector("#moved:not([hidden])")
-        shown.click("#losses li button")
+        clearance = shown.locator("[data-name=b] .number")
+        for name, value in (("omega", "0.86"), ("b", "0.27")):
+            shown.fill(f"[data-name={name}] .number", value)
+            shown.press(f"[data-name={name}] .number", "Enter")
+            shown.wait_for_selector("#moved:not([hidden])")
+            shown.click("#losses li:nth-child(2) button")
+            shown.wait_for_selector("#moved", state="hidden")
+            assert clearance.input_value() == "0.26"
+        shown.click("#losses li:nth-child(1) button")
+        shown.wait_for_function("document.querySelector('[data-name=b] .number').value === '0.25'")
         shown.wait_for_selector("#moved", state="hidden")
         shown.fill("[data-name=zeta] .number", "0.11")
         shown.press("[data-name=zeta] .number", "Enter")

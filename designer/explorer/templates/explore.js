@@ -681,14 +681,21 @@
   };
 
   // --- what is known of certain drive frequencies -----------------------------------------------
-  const goTo = (omega) => { named.omega.show(String(omega)); want(); };
+  // A recording is at the file's own b, and has no control for another.
+  const isShown = ({ omega, b }) => omega !== null && (b === undefined || named.b || b === losses.b);
+  const goTo = ({ omega, b }) => {
+    named.omega.show(String(omega));
+    if (b !== undefined && named.b) named.b.show(String(b));
+    want();
+  };
   const listed = (name, rows) => document.querySelector(`#${name} ul`).replaceChildren(
     ...rows.map((each) => row(`${each.summary}: ${each.words}`,
-      each.omega === null ? null : ["Show", () => goTo(each.omega)])));
-  // Rare losses are of the file's values at the frequencies of its responses.
-  const isOfLosses = (words) => controls.every((c) => (c.name === "omega"
-    ? losses.rows.some((each) => each.omega === Number(words.omega))
-    : Number(words[c.name]) === Number(c.own)));
+      isShown(each) ? ["Show", () => goTo(each)] : null)));
+  // Rare losses are of the file's values, with omega and b as its responses have them.
+  const isOfLosses = (words) => controls.every(({ name, own }) =>
+    name === "omega" || name === "b" || Number(words[name]) === Number(own))
+    && losses.rows.some(({ omega, b }) =>
+      omega === Number(words.omega) && b === Number(words.b ?? losses.b));
   if (losses) listed("losses", losses.rows);
 
   // --- the recording, where there is no server --------------------------------------------------
