@@ -23,6 +23,7 @@ from designer.spread.part_rules import spread_of
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.rare_losses import rare_losses, unseen_share
+from designer.yields.stored_parts import AnswerLog, GivenAnswers, StoredParts
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
 from designer.yields.tuned_yield import benched_block
@@ -42,6 +43,8 @@ VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdi
 _LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
 _RARE = "rare"
 """Takes the place of a block's number where a study was estimated."""
+_ANSWERS = "answers"
+"""Takes it while the estimate is under way."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ class VerdictCache:
             verdicts = benched_block(plan, indices, answers, bands, jobs)
         letters = "".join(_LETTERS[v] for v in verdicts)
         self._known.setdefault(study, {})[place] = letters
-        self._save({"format": 1, "studies": self._known})
+        self._save_all()
         return letters, True
 
     def rare(
@@ -139,15 +142,43 @@ class VerdictCache:
         bound : as ``rare_losses`` has it."""
         study = self._known.setdefault(study_hash(plan, "rare", {"bound": bound}), {})
         if _RARE not in study:
-            found = rare_losses(plan, 0, bound=bound, jobs=jobs, progress=progress)
+            log = AnswerLog(_EstimateParts(study, self._save_all), _ANSWERS)
+            found = rare_losses(plan, 0, bound=bound, jobs=jobs, progress=progress, log=log)
+            study.pop(_ANSWERS, None)
             boards = found.boards + found.pilots
             share = RareShare(found.lost, found.low, found.high, found.unseen, boards)
             study[_RARE] = asdict(share)
-            self._save({"format": 1, "studies": self._known})
+            self._save_all()
         return RareShare(**study[_RARE])
+
+    def _save_all(self) -> None:
+        self._save({"format": 1, "studies": self._known})
+
+
+class _EstimateParts(StoredParts):
+    """What boards of an estimate answered, in its study's entry."""
+
+    def __init__(self, study: dict[str, Any], save: Callable[[], None]) -> None:
+        self._study, self._save = study, save
+
+    def get(self, name: str) -> GivenAnswers | None:
+        stored = self._study.get(name)
+        return None if stored is None else GivenAnswers(**stored)
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        self._study.update({name: asdict(answers) for name, answers in values.items()})
+        self._save()
 
 
 def _is_stored(place: str, found: object) -> bool:
+    if place == _ANSWERS:
+        names = {field.name for field in fields(GivenAnswers)}
+        return (
+            isinstance(found, Mapping)
+            and set(found) == names
+            and all(isinstance(texts, list) for texts in found.values())
+            and all(isinstance(text, str) for texts in found.values() for text in texts)
+        )
     if place == _RARE:
         names = {field.name for field in fields(RareShare)}
         numbers = isinstance(found, Mapping) and all(

@@ -7,11 +7,12 @@ import contextlib
 import csv
 import itertools
 import json
+import math
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -58,8 +59,10 @@ from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
+from designer.yields import stored_parts
 from designer.yields.margins import Limit, Margin
 from designer.yields.rare_losses import unseen_share
+from designer.yields.stored_parts import AnswerLog
 from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.yield_count import Yield
 from designer.yields.yield_maps import Axis, YieldMap
@@ -408,6 +411,50 @@ def test_a_rare_share_is_estimated_once_where_no_board_of_a_block_is_lost(
     lost, waits = measure_all([out, fine], 1.0 - 1e-5, VerdictCache())
     assert lost.missed
     assert waits.rare is None
+
+
+def test_an_interrupted_estimate_of_a_repair_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was answered is not asked again, and is forgotten at the end; damage is asked anew."""
+    monkeypatch.setattr(stored_parts, "EVERY", 0.0)
+    asked: list[bytes] = []
+
+    def ask(question: bytes, most: float) -> list[str]:
+        if len(asked) == most:
+            raise KeyboardInterrupt
+        asked.append(question)
+        return ["ok 1-2-2", "lost clipped"]
+
+    def cut(most: float) -> Callable[..., Any]:
+        def estimate(*_: object, log: AnswerLog, **__: object) -> Any:
+            for question in (b"a", b"b", b"c"):
+                lines = log.answer(question, 2, partial(ask, question, most))
+                assert lines == ["ok 1-2-2", "lost clipped"]
+            ends = {"low": 2e-6, "high": 8e-6}
+            return SimpleNamespace(lost=5e-6, **ends, unseen=1e-3, boards=2000, pilots=500)
+
+        return estimate
+
+    def studies() -> Any:
+        return json.loads(json.dumps(kept))["studies"]
+
+    kept: dict[str, Any] = {}
+    plan = bench_plans.plan(1, samples=8000)
+    monkeypatch.setattr(repair_measure, "rare_losses", cut(2))
+    with pytest.raises(KeyboardInterrupt):
+        VerdictCache(save=kept.update).rare(plan, 1e-5, 1, lambda: None)
+    ((study, half),) = studies().items()
+    monkeypatch.setattr(repair_measure, "rare_losses", cut(math.inf))
+    damaged: tuple[object, ...] = (
+        [], {"questions": ["x"]}, {"questions": [1], "answers": ["x"]}
+    )  # fmt: skip
+    for damage in damaged:
+        asked.clear()
+        VerdictCache({study: {"answers": damage}}).rare(plan, 1e-5, 1, lambda: None)
+        assert asked == [b"a", b"b", b"c"]
+    asked.clear()
+    found = VerdictCache({study: half}, kept.update).rare(plan, 1e-5, 1, lambda: None)
+    assert asked == [b"c"]
+    assert studies() == {study: {"rare": asdict(found)}}
 
 
 def test_where_no_search_meets_a_loss_boards_as_they_are_bound_it(
