@@ -73,7 +73,7 @@ REACH = {
     "simulate": 27_750,
     "bifurcation": 34_050,
     "reproduce": 56_400,
-    "rules": 59_600,
+    "rules": 59_700,
     "explore": 57_950,
     "bench": 61_900,
     "trade": 64_350,
