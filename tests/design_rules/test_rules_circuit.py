@@ -18,7 +18,7 @@ from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.nodal import NodalEquations
 from designer.circuit.reduction import Reduction
-from designer.design_rules import on_nets, on_precision, run_rules
+from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.clearance import Sides
@@ -31,12 +31,13 @@ from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit, exact_values
-from tests.shared.oracles import linear_matrix
+from tests.shared.oracles import dead_zone_gains, linear_matrix
 from tests.shared.rule_cases import (
     PAIRS,
     TEXT,
     base,
     bent,
+    graded,
     subject_of,
     warm,
     with_circuit,
@@ -465,6 +466,20 @@ def test_leftover_stiffness_is_the_difference_of_two_gains() -> None:
     assert abs(changed) == pytest.approx(0.01, rel=2e-2)
 
 
+def test_the_stiffness_that_is_left_spreads_as_the_rule_says() -> None:
+    """Boards drawn one by one, by Eq. (18): what the linear path gains over the saturating one, of
+    the stop's slope, which is 19 times K1."""
+    subject, random = graded(0.01), np.random.default_rng(6)
+    values, left = subject.circuit.values, []
+    slope = dead_zone_gains(values)[1]
+    for _ in range(2000):
+        drawn = {n: v * random.uniform(0.99, 1.01) for n, v in values.items() if n[0] == "R"}
+        steep, linear, through = dead_zone_gains(values | drawn)
+        left.append(19.0 * (linear - steep * through) / slope)
+    found = run_rules.look("dead-zone-stiffness", subject)
+    assert found.value == pytest.approx(np.std(left), rel=0.05)
+
+
 def test_the_rectifier_leaves_no_stiffness_whatever_its_grade() -> None:
     found = run_rules.look("dead-zone-stiffness", base())
     assert found.value < 1e-3
@@ -507,6 +522,15 @@ def test_a_value_that_is_no_number_never_passes() -> None:
         assert (found.status, found.where) == (FAIL, "b")
 
 
+def test_a_decoupling_capacitor_stands_its_rail_over_ground() -> None:
+    subject = base()
+    found = {f.where.split(" ")[0]: f.value for f in on_ratings.capacitor_voltage(subject)}
+    beside = [c.name for c in subject.circuit.fittings if c.name in subject.volts]
+    assert len(beside) > 4
+    for name in beside:
+        assert found[name] * subject.volts[name] == pytest.approx(15.0)
+
+
 def test_a_net_s_drivers_are_counted_with_the_rails() -> None:
     short = rule_cases.rewired({("U1", "1"): "vcc"})
     found = list(on_nets.drivers(short))
@@ -541,3 +565,4 @@ def test_the_slope_that_is_left_past_a_bend_spreads_as_the_rule_says() -> None:
     found = run_rules.look("far-slope", subject)
     assert found.value == pytest.approx(np.std(slopes) / abs(np.mean(slopes)), rel=0.1)
     assert found.value > 0.05
+    assert "K, beyond its upper bends" in found.found

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from designer.dynamics.counts import Counts, read_counts
+from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 
 PAIRS = st.lists(st.tuples(st.integers(0, 9999), st.integers(0, 9999)), min_size=1, max_size=4)
 
@@ -46,3 +51,43 @@ def test_a_status_has_no_counts(text: str) -> None:
 
 def test_long_periods_and_many_impacts_are_read_from_a_response() -> None:
     assert read_counts("32-20000-0") == Counts(32, ((20000, 0),))
+
+
+@pytest.mark.parametrize(
+    ("orbit", "countable"),
+    [
+        (Orbit(OrbitStatus.PERIODIC, n=1), True),
+        (Orbit(OrbitStatus.PERIODIC), False),
+        (Orbit(OrbitStatus.APERIODIC), True),
+        (Orbit(OrbitStatus.APERIODIC, n=-1), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, p=-1), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, p=1_000_000, q=1_000_000), True),
+        (Orbit(OrbitStatus.PERIODIC, n=1, q=1_000_001), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, more=((0, 0), (0, -1))), False),
+    ],
+)
+def test_numbers_that_are_stored_may_be_no_counts(orbit: Orbit, countable: bool) -> None:
+    assert orbit.countable is countable
+
+
+def test_an_orbit_that_could_not_be_computed_has_nothing() -> None:
+    """Arrays of no entry have the rest of their shape, so that what reads them reads nothing."""
+    orbit = failed("why")
+    assert (str(orbit.status), orbit.reason, str(orbit.counts)) == ("failed", "why", "0-0-0")
+    pairs = (orbit.extremes, orbit.spans, orbit.speeds, orbit.graze)
+    assert [each.shape for each in pairs] == [(0, 2)] * 4
+    lists = (orbit.start, orbit.impact_times, orbit.impact_velocities, orbit.impact_sides)
+    assert [each.shape for each in (*lists, orbit.impact_clearances, orbit.multipliers)] == [
+        (0,)
+    ] * 6
+    assert (orbit.penetration, orbit.miss) == (math.inf, math.inf)
+    assert all(map(math.isnan, (orbit.radius, orbit.asymmetry, orbit.lyapunov)))
+    assert orbit.symmetric is None
+    assert (orbit.periods, orbit.more, orbit.frequencies, orbit.mode) == (0, (), (), ())
+
+
+def test_impacts_without_a_clearance_are_of_the_first() -> None:
+    orbit = Orbit(OrbitStatus.PERIODIC, n=1, p=1, q=1, impact_sides=np.array([1.0, -1.0]))
+    assert orbit.impact_clearances.tolist() == [0, 0]
+    second = replace(orbit, impact_clearances=np.array([1, 1]))
+    assert second.impact_clearances.tolist() == [1, 1]

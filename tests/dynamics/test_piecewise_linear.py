@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import itertools
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
-from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.drive_shape import SINE
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import (
+    Drive,
+    Guard,
+    Mode,
+    ModeKey,
+    PiecewiseLinearSystem,
+    SecondDrive,
+)
+from designer.dynamics.working_modes import TabulatedModes
 
 
 def complementarity(M: Array, q: Array, weight: float = 1.0) -> PiecewiseLinearSystem:
@@ -76,3 +88,49 @@ def test_a_system_without_an_answer_says_so() -> None:
     system = complementarity(-np.eye(2), -np.ones(2))
     with pytest.raises(ArithmeticError, match="no mode holds"):
         system.mode_at(np.zeros(1), 0.0)
+
+
+def test_a_displacement_that_is_a_state_is_told_from_one_that_is_made_of_it() -> None:
+    rows = [[1, 0, 0, 0], [0, 1, 0, 0], [2, 0, 0, 0], [1, -3, 0, 0], [0, 0, 1, 0], [1, 0, 0, 1]]
+    system = PiecewiseLinearSystem(
+        ("x", "x'"), lambda _: Mode(np.eye(2), np.ones(2), np.zeros(2), (), ()), (),
+        tuple("ABCDEF"), tuple(np.array(rows, dtype=float)), (),
+    )  # fmt: skip
+    assert system.state_in == (0, 1, None, None, None, None)
+    assert system.moving == 0
+    assert replace(system, displacement=system.displacement[3:]).moving == 1
+    assert replace(system, displacement=()).moving == 0
+
+
+def test_modes_that_somebody_else_has_built_are_taken_where_they_are_not_there() -> None:
+    system = complementarity(np.eye(2), -np.ones(2))
+    own = system.mode((0, 0))
+    keys: list[ModeKey] = [(0, 0), (1, 0)]
+    others = {key: complementarity(np.eye(2), np.ones(2)).mode(key) for key in keys}
+    system.know(others)
+    assert system.mode((0, 0)) is own
+    assert system.mode((1, 0)) is others[1, 0]
+    assert system.built == 2
+
+
+def test_a_mode_keeps_the_number_that_it_gets() -> None:
+    tables = TabulatedModes(complementarity(np.eye(2), -np.ones(2)), Drive(1.0))
+    keys = [(0, 0), (1, 0), (1, 1)]
+    assert [tables.number(key) for key in keys] == [0, 1, 2]
+    assert [tables.number(key) for key in keys] == [0, 1, 2]
+    assert tables.targets.keys == keys
+
+
+def test_a_guard_may_look_at_the_second_drive() -> None:
+    """x' = sin t while the second drive, sin t too, is above 1/2: from π/6 to 5π/6, in which x
+    gains the square root of 3."""
+
+    def build(key: ModeKey) -> Mode:
+        sign = -1.0 if key[0] else 1.0
+        guard = Guard(np.zeros(1), 0.0, -0.5 * sign, (1 - key[0],), -1, sign)
+        moves = np.array([float(key[0])])
+        return Mode(np.zeros((1, 1)), moves, np.zeros(1), (guard,), (), second=np.zeros(1))
+
+    system = PiecewiseLinearSystem(("x",), build, (0,), (), (), (), continuous=False)
+    flow = Flow(system, Drive(1.0, second=SecondDrive(1.0, SINE)))
+    assert flow.run(np.zeros(1), 1).strobes[-1, 0] == pytest.approx(math.sqrt(3.0), abs=1e-9)

@@ -75,3 +75,24 @@ def test_copies_are_no_independent_boards(copies: int, least: float, most: float
     24."""
     points = np.random.default_rng(3).random((192 // copies, SIZE))
     assert least <= independent(np.tile(points, (copies, 1))) <= most
+
+
+def test_boards_lie_within_what_parts_may_be() -> None:
+    """A coordinate of 1 is beyond the end of its part's law, where an unbounded one is infinite."""
+    far = LossWalk("clipped", 2.0, 2.0, np.array([[-40.0, 0.0, 40.0]]))
+    low, middle, high = far.points[0]
+    assert (low, middle) == (0.0, 0.5)
+    assert 1.0 - 1e-15 < high < 1.0
+
+
+@pytest.mark.parametrize(("kind", "reach"), [("2-2-2", 0.95), ("", 0.05)])
+def test_moves_are_as_long_as_boards_stay_lost(kind: str, reach: float) -> None:
+    """Where every board is lost a move may forget where it began; where none stays, a short one is
+    tried, and the boards are where they were."""
+    begun_at = np.random.default_rng(1).random((12, 5))
+    each = LossWalk.of("2-2-2", 1.0, begun_at)
+    before = each.normal
+    walk([each], lambda points, _: [kind] * len(points), np.random.default_rng(2), moves=20)
+    assert each.reach == reach
+    assert (each.normal == before).all() == (kind == "")
+    assert len(each.kept) == 1
