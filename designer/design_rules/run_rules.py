@@ -20,8 +20,7 @@ from designer.catalog.design_rules import BY_ID, RULES
 from designer.design_rules import on_nets, on_precision, on_ratings
 from designer.design_rules.rule_subject import Look, RuleSubject
 
-_FOUND = {**on_nets.LOOKS, **on_ratings.LOOKS, **on_precision.LOOKS}
-LOOKS: dict[str, Look] = {rule.id: _FOUND[rule.id] for rule in RULES if rule.scope == "circuit"}
+LOOKS: dict[str, Look] = {**on_nets.LOOKS, **on_ratings.LOOKS, **on_precision.LOOKS}
 """By id, in the order of the list."""
 
 

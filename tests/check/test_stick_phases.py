@@ -11,24 +11,26 @@ from scipy.integrate import solve_ivp
 
 from designer import parse_model_file, simulate
 from designer.verbs.simulate import tables
+from tests.shared.system_text import system_text, table
 
-BLOCK = """format = 2
-[[mass]]
-name = "block"
-mass = {mass}
-[[spring]]
-between = ["block", "ground"]
-stiffness = 1.0
-[[friction]]
-between = ["block", "ground"]
-force = {force}
-velocity = {velocity}
-[[force]]
-on = "block"
-amplitude = 1.0
-[[response]]
-omega = {omega}
-"""
+
+def block(
+    omega: float,
+    force: float,
+    velocity: float,
+    mass: float = 1.0,
+    damping: float = 0.0,
+    **more: float,
+) -> str:
+    """A block on a spring and on a surface, driven. more : further keys of its friction."""
+    return system_text(
+        {"block": mass},
+        {("block", "ground"): 1.0},
+        {("block", "ground"): damping} if damping else {},
+        table("friction", between=("block", "ground"), force=force, velocity=velocity, **more),
+        table("force", on="block", amplitude=1.0),
+        table("response", omega=omega),
+    )
 
 
 def coulomb(
@@ -89,11 +91,10 @@ def test_phases_come_to_those_of_coulomb_s_law(
 ) -> None:
     phases, share, longest = coulomb(omega, force, mass, static, speed)
     velocity = 0.004
-    text = BLOCK.format(omega=omega, force=force, mass=mass, velocity=velocity)
-    more = f"speed = {speed}\n"
+    more = {"speed": speed}
     if static > force:
-        more += f"static = {static}\nstribeck = {1.5 * velocity}\n"
-    text = text.replace("[[force]]", f"{more}[[force]]")
+        more |= {"static": static, "stribeck": 1.5 * velocity}
+    text = block(omega, force, velocity, mass, **more)
     (row,) = simulate(parse_model_file(text), starts=0).answer["responses"]
     assert (row["response"], row["n"]) == ("1-0-0", 1)
     (held,) = row["sticking"]
@@ -104,38 +105,20 @@ def test_phases_come_to_those_of_coulomb_s_law(
     assert held["creep"] <= velocity if phases else held["creep"] == 0.0
 
 
-TWO = """format = 2
-[[mass]]
-name = "block"
-mass = {mass}
-[[mass]]
-name = "sled"
-mass = 2.0
-[[spring]]
-between = ["sled", "ground"]
-stiffness = 3.0
-[[damper]]
-between = ["sled", "ground"]
-damping = 0.4
-[[spring]]
-between = ["block", "sled"]
-stiffness = 1.0
-[[friction]]
-between = ["block", "sled"]
-force = 0.4
-velocity = 0.01
-[[force]]
-on = "sled"
-amplitude = 4.0
-[[response]]
-omega = 0.5
-"""
+TWO = system_text(
+    {"block": 1.0, "sled": 2.0},
+    {("sled", "ground"): 3.0, ("block", "sled"): 1.0},
+    {("sled", "ground"): 0.4},
+    table("friction", between=("block", "sled"), force=0.4, velocity=0.01),
+    table("force", on="sled", amplitude=4.0),
+    table("response", omega=0.5),
+)
 
 
 def test_of_two_bodies_it_is_where_they_move_together() -> None:
     """The effective mass is that of both; the phases are those of their difference in velocity,
     which is flat there."""
-    made = simulate(parse_model_file(TWO.format(mass=1.0)), starts=0)
+    made = simulate(parse_model_file(TWO), starts=0)
     (row,) = made.answer["responses"]
     (held,) = row["sticking"]
     period = 2.0 * math.pi / 0.5
@@ -150,9 +133,9 @@ def test_of_two_bodies_it_is_where_they_move_together() -> None:
 
 
 def test_with_half_the_clearance_forces_and_velocities_are_half() -> None:
-    text = BLOCK.format(omega=0.3, force=0.4, mass=1.0, velocity=0.008)
+    text = block(0.3, 0.4, 0.008)
     halved = simulate(parse_model_file(text + "b = 0.5\n"), starts=0).answer
-    plain = BLOCK.format(omega=0.3, force=0.2, mass=1.0, velocity=0.004)
+    plain = block(0.3, 0.2, 0.004)
     whole = simulate(parse_model_file(plain), starts=0).answer
     (one,), (other,) = halved["responses"][0]["sticking"], whole["responses"][0]["sticking"]
     assert one["phases"] == other["phases"] == 2
@@ -176,16 +159,13 @@ def test_on_the_circuit_it_is_as_on_the_model() -> None:
 
 def test_a_block_that_is_never_moved_holds_always(capsys: pytest.CaptureFixture[str]) -> None:
     """And one on a belt that is faster than itself never does; both are told."""
-    still = BLOCK.format(omega=0.3, force=1.5, mass=1.0, velocity=0.004)
+    still = block(0.3, 1.5, 0.004)
     answer = simulate(parse_model_file(still), starts=0).answer
     (held,) = answer["responses"][0]["sticking"]
     assert (held["phases"], held["share"], held["longest"]) == (0, 1.0, 1.0)
     tables(answer)
     assert "always" in capsys.readouterr().err
-    belt = still.replace("force = 1.5", "force = 0.2\nspeed = 9.0").replace(
-        "[[force]]",
-        '[[damper]]\nbetween = ["block", "ground"]\ndamping = 0.1\n[[force]]',
-    )
+    belt = block(0.3, 0.2, 0.004, damping=0.1, speed=9.0)
     answer = simulate(parse_model_file(belt), starts=0).answer
     (held,) = answer["responses"][0]["sticking"]
     assert (held["phases"], held["share"], held["longest"]) == (0, 0.0, 0.0)

@@ -30,7 +30,7 @@ from designer.catalog.design_rule import (
 )
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.cli import entry
-from designer.design_rules import rule_reports, run_rules
+from designer.design_rules import on_nets, on_precision, on_ratings, rule_reports, run_rules
 from designer.folders.design_source import design_inputs
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
@@ -93,6 +93,8 @@ def test_every_rule_has_a_function_and_a_pair() -> None:
     assert len(set(ids)) == len(ids)
     of_circuit = [rule.id for rule in RULES if rule.scope == "circuit"]
     assert list(run_rules.LOOKS) == of_circuit
+    files = on_nets, on_ratings, on_precision
+    assert sum(len(file.LOOKS) for file in files) == len(of_circuit)  # none hides another
     assert set(rule_cases.PAIRS) == set(of_circuit)
     of_board = {
         *test_rules_board.BY_KICAD,

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.shared.system_text import system_text, table
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
 Texts = Sequence[tuple[str, str]]
@@ -150,26 +152,15 @@ KINDS: tuple[type[NonlinearElement], ...] = (Law, CubicSpring, Friction, Drag)
         ),
     ],
 }
-MODEL = """format = 2
-[[mass]]
-name = "m"
-mass = 1.0
-[[spring]]
-between = ["m", "ground"]
-stiffness = 1.0
-[[damper]]
-between = ["m", "ground"]
-damping = 0.02
-[[drag]]
-between = ["m", "ground"]
-factor = 0.5
-speed = 2.0
-[[force]]
-on = "m"
-amplitude = 0.8
-[[response]]
-omega = 1.0
-"""
+GROUNDED = ("m", "ground")
+MODEL = system_text(
+    {"m": 1.0},
+    {GROUNDED: 1.0},
+    {GROUNDED: 0.02},
+    table("drag", between=GROUNDED, factor=0.5, speed=2.0),
+    table("force", on="m", amplitude=0.8),
+    table("response", omega=1.0),
+)
 SHOWN = """
 import json, sys
 from designer.model.ascii_sketch import system_sketch
