@@ -12,7 +12,7 @@ LOCK := requirements/constraints.txt
 PARALLEL := --numprocesses auto --dist loadfile --no-loadscope-reorder
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
-.PHONY: help env ngspice demo test check-all lint format bench reports picture site dist lock clean
+.PHONY: help env ngspice demo test check-all lint format bench mutate coverage reports picture site dist lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -65,6 +65,12 @@ $(VENV)/.bench: $(VENV)/.installed requirements/bench.txt
 
 bench: $(VENV)/.bench ngspice ## run the benchmarks
 	@$(VENV)/bin/python -m benchmarks
+
+mutate: env ## change the program in one place, again and again: do the tests notice?
+	@$(VENV)/bin/python -m benchmarks.mutation
+
+coverage: env ngspice ## how much of the core the quick tests run, with branches
+	@$(VENV)/bin/python -m benchmarks.branch_coverage $(PARALLEL) $(PYTEST_ARGS)
 
 reports: env ngspice ## make the reports that this commit lacks
 	@DESIGNER=$(VENV)/bin/designer scripts/make-reports
