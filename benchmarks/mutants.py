@@ -52,8 +52,8 @@ SIGNS: dict[type[ast.unaryop], str] = {ast.USub: "-", ast.Not: "not", ast.Invert
 RETURNS = {"bool": "not ({})", "str": '""'} | dict.fromkeys(("float", "int", "Array"), "-({})")
 """What is returned in the place of a value of such an annotation; None where that is allowed, and
 elsewhere no other value of the type is at hand."""
-NO_MATTER = ("strict",)
-"""Keywords whose value only a mistake of the caller would show."""
+NO_MATTER = ("strict", "repr")
+"""Keywords whose value only a mistake of the caller would show, or a record as text."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from designer.verdicts.verdict import Answer, Verdict
-from designer.yields.yield_count import Yield, count
+from designer.yields.yield_count import Yield, all_on_one, count, reasons, worst
 
 
 @given(
@@ -41,3 +41,47 @@ def test_count_sorts_verdicts() -> None:
     order = [Verdict.OK] * 4 + [Verdict.LOST] * 3 + [Verdict.GRAZING] * 2 + [Verdict.FAILED]
     got = count([replace(blank, verdict=v) for v in order])
     assert (got.ok, got.lost, got.grazing, got.failed) == (4, 3, 2, 1)
+
+
+OK, LOST, GRAZING, FAILED = Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED
+BLANK = Answer(0, 0, OK, "", "", 0.0, 0.0, 0.0, 0.0, 0)
+
+
+def test_a_board_is_what_its_worst_response_is() -> None:
+    """One that is lost is one too many, whatever the others are; then one that is undecided."""
+    boards = [(OK, OK), (OK, LOST), (FAILED, LOST), (GRAZING, OK), (FAILED, GRAZING), (OK, FAILED)]
+    assert [worst(verdicts) for verdicts in boards] == [OK, LOST, LOST, GRAZING, GRAZING, FAILED]
+    rows = [
+        replace(BLANK, sample=sample, question=question, verdict=boards[sample][question])
+        for question in (0, 1)
+        for sample in range(len(boards))
+    ]
+    assert all_on_one(rows) == Yield(1, 2, 2, 1)
+    assert all_on_one(rows, census=True) == Yield(1, 2, 2, 1, census=True)
+
+
+def test_of_all_the_boards_there_are_the_rate_is_no_estimate() -> None:
+    assert Yield(3, 1, 0, 1, census=True).interval == (0.75, 0.75)
+    assert Yield(3, 1, 0, 1).interval[0] < 0.75 < Yield(3, 1, 0, 1).interval[1]
+    assert Yield(0, 0, 0, 2, census=True).interval == (0.0, 1.0)
+    assert count([BLANK, BLANK], census=True).interval == (1.0, 1.0)
+    assert count([BLANK, BLANK]).interval[0] < 1.0
+
+
+def test_reasons_are_counted_without_their_figures_the_most_frequent_first() -> None:
+    rows = [
+        (OK, ""),
+        (LOST, "to 2-2-2"),
+        (FAILED, "3 of 4 settings gave no answer"),
+        (LOST, "asymmetric by 0.2 of the peak"),
+        (GRAZING, ""),
+        (LOST, "to 1-2-2"),
+        (LOST, "asymmetric by 0.31 of the peak"),
+    ]
+    assert list(reasons(rows).items()) == [
+        ("lost: asymmetric", 2),
+        ("failed: most settings gave no answer", 1),
+        ("grazing", 1),
+        ("lost: to 1-2-2", 1),
+        ("lost: to 2-2-2", 1),
+    ]
