@@ -71,7 +71,7 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         *_of("yields", "window_path", "yields/window_path"),
     ),
     "flow guards": (
-        *_of("dynamics", "piecewise_linear", "dynamics/piecewise_linear dynamics/flow"),
+        *_of("dynamics", "piecewise_linear", "dynamics/piecewise_linear circuit/reduction"),
         *_of("dynamics", "flow step_budget", "dynamics/step_budget dynamics/flow"),
         *_of("dynamics", "working_modes", "kernels/kernel_propagators circuit/rectifier"),
         *_of("kernels", "kernel_crossing kernel_modal", "dynamics/flow dynamics/event_by_event"),
