@@ -210,7 +210,7 @@ def test_a_board_s_own_values_count() -> None:
 
 def test_swing_sets_the_amplitude_where_nothing_clips() -> None:
     circuit = circuit_of(EXACT, stops=False)
-    peaks = np.array([1.0, 2.0, 0.5, 0.7])
+    peaks = np.array([3.0, 2.0, 0.5, 0.7])
     found = coefficient_errors(circuit, replace(PAPER, k0=0.0).second_order(), swing=(9.0, peaks))
     assert (found.scales.volts * peaks).max() == pytest.approx(9.0)
     assert math.isnan(found.scales.threshold)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from designer.dynamics.counts import Counts, read_counts
+from designer.dynamics.orbit import Orbit, OrbitStatus
 
 PAIRS = st.lists(st.tuples(st.integers(0, 9999), st.integers(0, 9999)), min_size=1, max_size=4)
 
@@ -46,3 +47,20 @@ def test_a_status_has_no_counts(text: str) -> None:
 
 def test_long_periods_and_many_impacts_are_read_from_a_response() -> None:
     assert read_counts("32-20000-0") == Counts(32, ((20000, 0),))
+
+
+@pytest.mark.parametrize(
+    ("orbit", "countable"),
+    [
+        (Orbit(OrbitStatus.PERIODIC, n=1), True),
+        (Orbit(OrbitStatus.PERIODIC), False),
+        (Orbit(OrbitStatus.APERIODIC), True),
+        (Orbit(OrbitStatus.APERIODIC, n=-1), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, p=-1), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, p=1_000_000, q=1_000_000), True),
+        (Orbit(OrbitStatus.PERIODIC, n=1, q=1_000_001), False),
+        (Orbit(OrbitStatus.PERIODIC, n=1, more=((0, 0), (0, -1))), False),
+    ],
+)
+def test_numbers_that_are_stored_may_be_no_counts(orbit: Orbit, countable: bool) -> None:
+    assert orbit.countable is countable

@@ -124,6 +124,17 @@ def test_verdicts(orbit: Orbit, spec: Response, verdict: Verdict) -> None:
     assert got is verdict
     if verdict in (Verdict.LOST, Verdict.FAILED):
         assert reason
+    if orbit.status is OrbitStatus.PERIODIC:
+        named = spec.completed(NOMINAL).accepts_text(
+            orbit.response, symmetric=orbit.symmetric is True
+        )
+        assert named is (verdict is Verdict.OK)
+
+
+def test_a_status_in_words_survives_where_it_is_wanted() -> None:
+    assert CHAOS.accepts_text("aperiodic", symmetric=False)
+    assert not CHAOS.accepts_text("quasi-periodic", symmetric=False)
+    assert not wanted("1-1-1").accepts_text("aperiodic", symmetric=True)
 
 
 def test_lost_says_to_what() -> None:

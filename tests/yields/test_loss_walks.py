@@ -75,3 +75,11 @@ def test_copies_are_no_independent_boards(copies: int, least: float, most: float
     24."""
     points = np.random.default_rng(3).random((192 // copies, SIZE))
     assert least <= independent(np.tile(points, (copies, 1))) <= most
+
+
+def test_boards_lie_within_what_parts_may_be() -> None:
+    """A coordinate of 1 is beyond the end of its part's law, where an unbounded one is infinite."""
+    far = LossWalk("clipped", 2.0, 2.0, np.array([[-40.0, 0.0, 40.0]]))
+    low, middle, high = far.points[0]
+    assert (low, middle) == (0.0, 0.5)
+    assert 1.0 - 1e-15 < high < 1.0

@@ -258,6 +258,13 @@ def test_plenty_of_losses_are_counted_as_they_are() -> None:
     assert counted is not None
     assert counted.lost == pytest.approx(45 / 195)
     assert counted.low < counted.lost < counted.high
+    assert counted.unanswered == 5 / 200
+    assert (counted.boards, counted.pilots, counted.drawn_lost) == (200, 0, 45)
+    assert (counted.effective, counted.largest_weight, counted.gain) == (45.0, 1.0, 1.0)
+    assert (counted.unseen, counted.seconds, counted.narrow) == (0.0, 0.0, True)
+    enough = replace(few, lost=35)
+    assert counted_losses(0, replace(enough, lost=34)) is None
+    assert counted_losses(0, enough) is not None
 
 
 # ---------------------------------------------------------------------------------------------
