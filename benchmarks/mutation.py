@@ -278,11 +278,11 @@ def key_of(row: Row) -> Key:
 
 
 def judged(path: Path) -> dict[Key, str]:
-    """Why a mutant is the program in other words, for those that somebody has looked at."""
+    """Why no test can tell a mutant from the program, for those that somebody has looked at."""
     if not path.exists():
         return {}
     found = tomllib.loads(path.read_text("utf-8")).get("mutant", [])
-    return {key_of({"number": 0, **row}): row["equal"] for row in found}
+    return {key_of({"number": 0, **row}): row["why"] for row in found}
 
 
 class Population:
@@ -306,12 +306,12 @@ class Population:
         found = (m for module, source in self.sources.items() for m in mutants(module, source))
         return {mutant.key: mutant for mutant in found}
 
-    def sample(self, count: int, prefix: str = "") -> list[Mutant]:
+    def sample(self, count: int, prefixes: Sequence[str] = ("",)) -> list[Mutant]:
         """So many that differ from the program: of the groups in turn, and of a group's modules.
-        Those of modules whose path begins with prefix."""
+        Those of modules whose path begins with one of the prefixes."""
         groups = []
         for group in self.groups.values():
-            modules = (t.module for t in group if t.module.startswith(prefix))
+            modules = (t.module for t in group if t.module.startswith(tuple(prefixes)))
             mine = [[m for m in self.mutants.values() if m.module == name] for name in modules]
             groups.append(in_turn([shuffled(each, self.seed) for each in mine]))
         out: list[Mutant] = []
@@ -324,13 +324,13 @@ class Population:
 
 
 def missing(
-    wanted: Sequence[Mutant], rows: Sequence[Row], equal: Mapping[Key, str], population: Population
+    wanted: Sequence[Mutant], rows: Sequence[Row], why: Mapping[Key, str], population: Population
 ) -> Iterator[Mutant]:
     """Survivors whose tests have changed, then what was not tried."""
     last = {key_of(row): row for row in rows}
     for key, row in last.items():
         mutant = population.mutants.get(key)
-        if mutant is None or row["result"] != "survived" or key in equal:
+        if mutant is None or row["result"] != "survived" or key in why:
             continue
         if row["state"] != _hash(population.root, population.targets[mutant.module].tests):
             yield mutant
@@ -341,10 +341,10 @@ def missing(
 # The report
 
 
-def _ways(rows: Sequence[Row], equal: Mapping[Key, str]) -> Counter[str]:
+def _ways(rows: Sequence[Row], why: Mapping[Key, str]) -> Counter[str]:
     """How many went which way."""
     return Counter(
-        "equal" if row["result"] == "survived" and key_of(row) in equal else row["result"]
+        "judged" if row["result"] == "survived" and key_of(row) in why else row["result"]
         for row in rows
     )
 
@@ -355,9 +355,7 @@ def _name(row: Row) -> str:
     return f"`{short}`, {where}: `{row['before']}` becomes `{row['after']}`"
 
 
-def report(
-    rows: Sequence[Row], equal: Mapping[Key, str], population: Population, count: int
-) -> str:
+def report(rows: Sequence[Row], why: Mapping[Key, str], population: Population, count: int) -> str:
     """README.md."""
     last = {key_of(row): row for row in rows}
     there = [row for key, row in last.items() if key in population.mutants]
@@ -367,11 +365,11 @@ def report(
         for target in targets:
             mine = [row for row in there if row["module"] == target.module]
             if mine:
-                body.append([group, target.module.removeprefix("designer/"), *_cells(mine, equal)])
-    body.append(["all", "", *_cells(there, equal)])
-    ways = _ways(there, equal)
+                body.append([group, target.module.removeprefix("designer/"), *_cells(mine, why)])
+    body.append(["all", "", *_cells(there, why)])
+    ways = _ways(there, why)
     dead = ways["killed"] + ways["timed out"]
-    share = f"{100 * dead / max(len(there) - ways['equal'], 1):.1f} %"
+    share = f"{100 * dead / max(len(there) - ways['judged'], 1):.1f} %"
     lines = [
         "# Mutants: do the tests notice a wrong program?",
         "",
@@ -386,25 +384,26 @@ def report(
         "",
         filled(
             f"{len(there)} mutants, of {len(population.mutants)} that there are. {dead} are killed "
-            f"({share} of those that are no equal program), of which {ways['timed out']} by the "
+            f"({share} of those that a test can tell), of which {ways['timed out']} by the "
             f"limit of time: {PATIENCE:g} times what the tests take without a mutant, and "
-            f"{START:g} s ({START + COMPILE:g} s where numba compiles). {ways['equal']} are the "
-            f"program in other words, and {ways['survived']} survive. {len(last) - len(there)} "
+            f"{START:g} s ({START + COMPILE:g} s where numba compiles). {ways['judged']} are the "
+            "program in other words, or change a figure that was chosen, which a test would only "
+            f"repeat; {ways['survived']} survive. {len(last) - len(there)} "
             "further ones were of lines that have changed since. Mutants with the program's "
             "bytecode are not counted."
         ),
         "",
-        *table(["group", "file", "mutants", "killed", "by time", "equal", "survive"], body),
+        *table(["group", "file", "mutants", "killed", "by time", "judged", "survive"], body),
     ]
     killed = [r for r in there if key_of(r) in survived_once and r["result"] != "survived"]
     if killed:
         lines += ["", "## Survivors that a test now kills", ""]
         lines += [f"- {_name(row)}: {_test(row)}" for row in killed]
-    alike = [row for row in there if row["result"] == "survived" and key_of(row) in equal]
+    alike = [row for row in there if row["result"] == "survived" and key_of(row) in why]
     if alike:
-        lines += ["", "## Equal", ""]
-        lines += [f"- {_name(row)}: {equal[key_of(row)]}" for row in alike]
-    alive = [row for row in there if row["result"] == "survived" and key_of(row) not in equal]
+        lines += ["", "## That no test can tell", ""]
+        lines += [f"- {_name(row)}: {why[key_of(row)]}" for row in alike]
+    alive = [row for row in there if row["result"] == "survived" and key_of(row) not in why]
     if alive:
         lines += ["", "## Survive", ""]
         lines += [f"- {_name(row)}{'' if row['tests'] else ': no test runs it'}" for row in alive]
@@ -417,9 +416,9 @@ def _test(row: Row) -> str:
     return f"`{row['by']}`" if row["by"] else "pytest did not come to its end"
 
 
-def _cells(rows: Sequence[Row], equal: Mapping[Key, str]) -> list[str]:
-    ways = _ways(rows, equal)
-    shown = (ways[way] for way in ("killed", "timed out", "equal", "survived"))
+def _cells(rows: Sequence[Row], why: Mapping[Key, str]) -> list[str]:
+    ways = _ways(rows, why)
+    shown = (ways[way] for way in ("killed", "timed out", "judged", "survived"))
     return [str(len(rows)), *map(str, shown)]
 
 
@@ -430,7 +429,7 @@ def options(words: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutation", description=__doc__)
     parser.add_argument("--count", type=int, default=COUNT, help="mutants in all")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="ends after these")
-    parser.add_argument("--only", default="", help="files whose path begins so")
+    parser.add_argument("--only", nargs="*", default=[""], help="files whose path begins so")
     parser.add_argument("--work", type=Path, default=ROOT / "out" / "mutation", help="of the copy")
     parser.add_argument("--out", type=Path, default=REPORT, help="folder of the report")
     return parser.parse_args(words)
@@ -451,7 +450,7 @@ def main(words: Sequence[str] = ()) -> str:
     chosen.work.mkdir(parents=True, exist_ok=True)
     population = Population(ROOT, GROUPS, SEED)
     path, made = chosen.out / ROWS, commit()
-    rows, equal = whole_lines(path), judged(chosen.out / JUDGED)
+    rows, why = whole_lines(path), judged(chosen.out / JUDGED)
     copy = Copy(ROOT, chosen.work)
     copy.refresh(tracked())
     covers: dict[str, Cover] = {}
@@ -461,7 +460,7 @@ def main(words: Sequence[str] = ()) -> str:
             users.setdefault(tests, []).append(target.module)
     wanted = population.sample(chosen.count, chosen.only)
     with path.open("a", encoding="utf-8") as file:
-        for mutant in list(missing(wanted, rows, equal, population)):
+        for mutant in list(missing(wanted, rows, why, population)):
             if time.monotonic() > end:
                 break
             target = population.targets[mutant.module]
@@ -473,8 +472,8 @@ def main(words: Sequence[str] = ()) -> str:
             file.flush()
             shown = {name: rows[-1][name] for name in ("result", "seconds", "after", "by")}
             print(f"{mutant.module}:{mutant.line}", *shown.values(), flush=True)
-    (chosen.out / "README.md").write_text(report(rows, equal, population, chosen.count), "utf-8")
-    ways = _ways(list({key_of(row): row for row in rows}.values()), equal)
+    (chosen.out / "README.md").write_text(report(rows, why, population, chosen.count), "utf-8")
+    ways = _ways(list({key_of(row): row for row in rows}.values()), why)
     return ", ".join(f"{count} {way}" for way, count in sorted(ways.items()))
 
 

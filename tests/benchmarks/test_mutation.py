@@ -198,16 +198,16 @@ def test_a_run_goes_on_and_tries_survivors_again(copy: Copy, tmp_path: Path) -> 
     listed = tmp_path / "judged.toml"
     told = {name: json.dumps(value) for name, value in zip(mutation.NAMES, alike.key, strict=True)}
     lines = [f"{name} = {value}" for name, value in told.items()]
-    listed.write_text("\n".join(["[[mutant]]", *lines, 'equal = "no other number"']))
-    equal = judged(listed)
-    assert list(missing(wanted, rows, equal, population)) == [alive, *wanted[3:]]
+    listed.write_text("\n".join(["[[mutant]]", *lines, 'why = "no other number"']))
+    why = judged(listed)
+    assert list(missing(wanted, rows, why, population)) == [alive, *wanted[3:]]
     rows.append(row_of(alive, "killed", by=f"{TESTS}::test_steps"))
     assert [key_of(row) for row in rows[-2:]] == [alive.key] * 2
-    assert list(missing(wanted, rows, equal, population)) == wanted[3:]
-    text = report(rows, equal, population, 5)
+    assert list(missing(wanted, rows, why, population)) == wanted[3:]
+    text = report(rows, why, population, 5)
     assert "3 mutants, of 18 that there are. 2 are killed (100.0 %" in text
-    assert f": `{TESTS}::test_steps`" in text.partition("## Equal")[0]
-    assert ": no other number" in text.partition("## Equal")[2]
+    assert f": `{TESTS}::test_steps`" in text.partition("## That")[0]
+    assert ": no other number" in text.partition("## That")[2]
 
 
 def test_groups_take_turns() -> None:
@@ -223,3 +223,10 @@ def test_the_files_that_are_mutated_are_there() -> None:
     names = [name for target in targets for name in (target.module, *target.tests)]
     assert [name for name in names if not (mutation.ROOT / name).is_file()] == []
     assert len({target.module for target in targets}) == len(targets)
+
+
+def test_what_is_judged_is_a_mutant_of_the_sources_as_they_are() -> None:
+    known = Population(mutation.ROOT, GROUPS, mutation.SEED).mutants
+    listed = judged(mutation.REPORT / mutation.JUDGED)
+    assert listed
+    assert [key for key in listed if key not in known] == []
