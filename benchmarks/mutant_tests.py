@@ -1,8 +1,9 @@
 """What pytest does for mutants, as its plugin: ``-p benchmarks.mutant_tests``.
 
-Under coverage.py every test is a context of its own. Where ``ORDER`` names a file with a list of
-tests, those run in its order, and no others. Hypothesis does not shrink what it found. At the end
-``NOTES`` has the seconds of each test and the first one that failed.
+Under coverage.py every test is a context of its own. Where ``ORDER`` names a file with tests and
+the seconds that each may take, those run in its order, and no others. Hypothesis does not shrink
+what it found. ``NOTES`` says which test is running, and at the end the seconds of each test and the
+first one that failed.
 """
 
 from __future__ import annotations
@@ -36,9 +37,12 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> Generator[None, None, None]:
     yield
     if ORDER in os.environ:
-        order = json.loads(Path(os.environ[ORDER]).read_text("utf-8"))
-        place = {test: number for number, test in enumerate(order)}
+        limits = json.loads(Path(os.environ[ORDER]).read_text("utf-8"))
+        place = {test: number for number, test in enumerate(limits)}
         items[:] = sorted((i for i in items if i.nodeid in place), key=lambda i: place[i.nodeid])
+        for item in items:
+            # A thread ends the process: compiled code does not listen to signals.
+            item.add_marker(pytest.mark.timeout(limits[item.nodeid], method="thread"))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -47,6 +51,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
     running = coverage.Coverage.current() if coverage else None
     if running is not None:
         running.switch_context(item.nodeid)
+    _note({"running": item.nodeid})
     start = time.perf_counter()
     try:
         return (yield)
@@ -67,6 +72,9 @@ def pytest_collectreport(report: pytest.CollectReport) -> None:
 
 
 def pytest_sessionfinish() -> None:
+    _note({"seconds": _seconds, "failed": _failed[0] if _failed else None})
+
+
+def _note(what: dict[str, object]) -> None:
     if NOTES in os.environ:
-        notes = {"seconds": _seconds, "failed": _failed[0] if _failed else None}
-        Path(os.environ[NOTES]).write_text(json.dumps(notes), "utf-8")
+        Path(os.environ[NOTES]).write_text(json.dumps(what), "utf-8")

@@ -42,9 +42,10 @@ ROWS, JUDGED = "rows.jsonl", "judged.toml"
 SEED, COUNT = 1, 500
 QUICK = "not (slow or kicad or browser or wheel or docs)"
 PATIENCE = 3.0
-"""Times the seconds that the tests take without a mutant, after which they are ended."""
-START, COMPILE = 30.0, 180.0
-"""Seconds beside: imports, and numba's work where a kernel was changed."""
+"""Times the seconds that the slowest test of a file takes without a mutant, after which one of the
+file is ended: the first of them makes what all share."""
+START, COMPILE = 10.0, 180.0
+"""Seconds beside, and those of numba's work where a kernel was changed."""
 MEMORY = 8 << 30
 """Bytes that the tests of a mutant may take."""
 Row = Mapping[str, Any]
@@ -61,9 +62,9 @@ class Outcome:
     """What tests say."""
 
     result: str
-    """"passed", "failed" or "timed out"."""
+    """One of "passed", "failed", "timed out"."""
     failed: str
-    """The first test that failed; "" where none did, or where pytest did not come to its end."""
+    """The first test that failed, or in which the process ended; "" where none did."""
     seconds: Mapping[str, float]
     """Of each test that ran."""
 
@@ -107,21 +108,31 @@ class Copy:
             path.write_bytes(source)
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
-    def tests(
-        self, files: Sequence[str], order: Sequence[str] | None = None,
-        seconds: float | None = None, before: Sequence[str] = (), kernels: str = "kernels",
-    ) -> Outcome:  # fmt: skip
-        """Run the quick tests of these files, in this order, until one fails.
+    def compile(self) -> None:
+        """What most tests compile, so that none of them is slow because it is the first."""
+        call = "from tests.shared.compile_kernels import compile_kernels; compile_kernels()"
+        environment = os.environ | self._environment("kernels")
+        subprocess.run([sys.executable, "-P", "-c", call], cwd=self.path, env=environment)
 
-        seconds : after which they are ended. before : words between ``python`` and ``-m pytest``.
+    def _environment(self, kernels: str) -> dict[str, str]:
+        places = {"PYTHONPATH": str(self.path), "NUMBA_CACHE_DIR": str(self.work / kernels)}
+        return places | {"PYTHONHASHSEED": "0"}
+
+    def tests(
+        self, files: Sequence[str], limits: Mapping[str, float] | None = None,
+        before: Sequence[str] = (), kernels: str = "kernels",
+    ) -> Outcome:  # fmt: skip
+        """Run the quick tests of these files until one fails.
+
+        limits : tests in their order, and the seconds that each may take; all, where there are
+        none. before : words between ``python`` and ``-m pytest``.
         kernels : folder of ``work`` for what numba compiles.
         """
         notes, chosen = self.work / "notes.json", self.work / "order.json"
         notes.unlink(missing_ok=True)
-        more = {"PYTHONPATH": str(self.path), "NUMBA_CACHE_DIR": str(self.work / kernels)}
-        more |= {NOTES: str(notes), "PYTHONHASHSEED": "0"}
-        if order is not None:
-            chosen.write_text(json.dumps(order), "utf-8")
+        more = self._environment(kernels) | {NOTES: str(notes)}
+        if limits is not None:
+            chosen.write_text(json.dumps(limits), "utf-8")
             more[ORDER] = str(chosen)
         words = [sys.executable, "-P", *before, "-m", "pytest", "-q", "-x", "-m", QUICK]
         words += ["-p", "benchmarks.mutant_tests", "-p", "no:cacheprovider", *files]
@@ -132,14 +143,15 @@ class Copy:
                 preexec_fn=_little_memory,
             )  # fmt: skip
             try:
-                status = process.wait(seconds)
-            except subprocess.TimeoutExpired:
-                return Outcome("timed out", "", {})
+                status = process.wait()
             finally:
                 _end(process)
         told = json.loads(notes.read_text("utf-8")) if notes.exists() else {}
         result = "failed" if status else "passed"
-        return Outcome(result, told.get("failed") or "", told.get("seconds", {}))
+        if "running" in told and b"+ Timeout +" in (self.work / "log.txt").read_bytes():
+            result = "timed out"
+        failed = told.get("failed") or told.get("running", "")
+        return Outcome(result, failed, told.get("seconds", {}))
 
 
 def _little_memory() -> None:
@@ -211,20 +223,10 @@ def covered(copy: Copy, tests: str, modules: Sequence[str]) -> Cover:
     return Cover(done.seconds, lines)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The tests of a mutant."""
-
-    files: Sequence[str]
-    order: Sequence[str]
-    seconds: float
-    """That they take without a mutant."""
-
-
-def choice(mutant: Mutant, target: Target, covers: Mapping[str, Cover]) -> Choice:
-    """The files with a test that runs the changed line: in each those tests first, the quickest
-    before the others, then the rest, which may see what a fixture or a cache has kept. Where no
-    test but an import runs it, or numba has compiled it, all."""
+def choice(mutant: Mutant, target: Target, covers: Mapping[str, Cover]) -> dict[str, list[str]]:
+    """The tests of a mutant by file: of each with a test that runs the changed line those first,
+    the quickest before the others, then the rest, which may see what a fixture or a cache has kept.
+    Where no test but an import runs it, or numba has compiled it, all."""
     blocks: list[tuple[float, str, list[str]]] = []
     for file in target.tests:
         cover = covers[file]
@@ -234,10 +236,18 @@ def choice(mutant: Mutant, target: Target, covers: Mapping[str, Cover]) -> Choic
             blocks.append((cover.seconds[running[0]], file, [*running, *rest]))
     if not blocks and (target.compiled or any(covers[f].running(mutant) for f in target.tests)):
         blocks = [(0.0, file, list(covers[file].seconds)) for file in target.tests]
-    blocks.sort(key=lambda block: block[0])
-    total = sum(sum(covers[file].seconds.values()) for _, file, _ in blocks)
-    order = [test for _, _, tests in blocks for test in tests]
-    return Choice([file for _, file, _ in blocks], order, total)
+    return {file: tests for _, file, tests in sorted(blocks, key=lambda block: block[0])}
+
+
+def limits(
+    chosen: Mapping[str, Sequence[str]], target: Target, covers: Mapping[str, Cover]
+) -> dict[str, float]:
+    """The seconds that each test may take, in their order."""
+    beside = START + (COMPILE if target.compiled else 0.0)
+    slowest = {file: max(covers[file].seconds.values()) for file in chosen}
+    return {
+        test: beside + PATIENCE * slowest[file] for file, tests in chosen.items() for test in tests
+    }
 
 
 # ---------------------------------------------------------------------------------------------
@@ -250,11 +260,10 @@ def tried(copy: Copy, mutant: Mutant, target: Target, covers: Mapping[str, Cover
     before, after = mutant.diff((copy.path / mutant.module).read_bytes())
     start = time.perf_counter()
     result, by = "survived", ""
-    if chosen.order:
-        limit = PATIENCE * chosen.seconds + START + (COMPILE if target.compiled else 0.0)
+    if chosen:
         kernels = "changed-kernels" if target.compiled else "kernels"
         with copy.changed(mutant):
-            found = copy.tests(chosen.files, chosen.order, limit, kernels=kernels)
+            found = copy.tests(list(chosen), limits(chosen, target, covers), kernels=kernels)
         shutil.rmtree(copy.work / "changed-kernels", ignore_errors=True)
         if found.result != "passed":
             result = "timed out" if found.result == "timed out" else "killed"
@@ -266,7 +275,7 @@ def tried(copy: Copy, mutant: Mutant, target: Target, covers: Mapping[str, Cover
         "after": after,
         "result": result,
         "by": by,
-        "tests": len(chosen.order),
+        "tests": sum(map(len, chosen.values())),
         "seconds": round(time.perf_counter() - start, 1),
         "state": _hash(copy.path, target.tests),
     }
@@ -385,9 +394,10 @@ def report(rows: Sequence[Row], why: Mapping[Key, str], population: Population, 
         filled(
             f"{len(there)} mutants, of {len(population.mutants)} that there are. {dead} are killed "
             f"({share} of those that a test can tell), of which {ways['timed out']} by the "
-            f"limit of time: {PATIENCE:g} times what the tests take without a mutant, and "
-            f"{START:g} s ({START + COMPILE:g} s where numba compiles). {ways['judged']} are the "
-            "program in other words, or change a figure that was chosen, which a test would only "
+            f"limit of time of a test: {PATIENCE:g} times what the slowest of its file takes "
+            f"without a mutant, and {START:g} s ({START + COMPILE:g} s where numba compiles). "
+            f"{ways['judged']} are the program in other words, or change a figure that was chosen, "
+            "which a test would only "
             f"repeat; {ways['survived']} survive. {len(last) - len(there)} "
             "further ones were of lines that have changed since. Mutants with the program's "
             "bytecode are not counted."
@@ -411,9 +421,8 @@ def report(rows: Sequence[Row], why: Mapping[Key, str], population: Population, 
 
 
 def _test(row: Row) -> str:
-    if row["result"] == "timed out":
-        return "the limit of time"
-    return f"`{row['by']}`" if row["by"] else "pytest did not come to its end"
+    by = f"`{row['by']}`" if row["by"] else "an import"
+    return f"{by}, by time" if row["result"] == "timed out" else by
 
 
 def _cells(rows: Sequence[Row], why: Mapping[Key, str]) -> list[str]:
@@ -453,6 +462,7 @@ def main(words: Sequence[str] = ()) -> str:
     rows, why = whole_lines(path), judged(chosen.out / JUDGED)
     copy = Copy(ROOT, chosen.work)
     copy.refresh(tracked())
+    copy.compile()
     covers: dict[str, Cover] = {}
     users: dict[str, list[str]] = {}
     for target in population.targets.values():
@@ -478,4 +488,5 @@ def main(words: Sequence[str] = ()) -> str:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # with what it has started
     print(main(sys.argv[1:]))

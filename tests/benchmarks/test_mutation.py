@@ -156,7 +156,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     ("operator", "after", "result", "by"),
     [
         ("< to >=", "return x >= LIMIT", "killed", "test_inside"),
-        ("+= to -=", "done -= 1", "timed out", ""),
+        ("+= to -=", "done -= 1", "timed out", "test_steps"),
         ("1 to 2", "done += 2", "survived", ""),
         ("False to True", "def inside(x: float, wide: bool = True) -> bool:", "survived", ""),
     ],
@@ -174,12 +174,12 @@ def test_what_becomes_of_known_mutants(
 
 
 def test_tests_that_run_the_line_come_first() -> None:
+    inside, steps = COVERS[TESTS].seconds
     last = found()["return -(…)", "return -(done)"]
-    assert choice(last, TINY, COVERS).order == [f"{TESTS}::test_steps", f"{TESTS}::test_inside"]
+    assert choice(last, TINY, COVERS) == {TESTS: [steps, inside]}
     constant = found()["3 to 4", "LIMIT: int = 4"]
-    assert choice(constant, TINY, COVERS).order == list(COVERS[TESTS].seconds)
-    nobody = {TESTS: Cover(COVERS[TESTS].seconds, {})}
-    assert choice(last, TINY, nobody).order == []
+    assert choice(constant, TINY, COVERS) == {TESTS: [inside, steps]}
+    assert choice(last, TINY, {TESTS: Cover(COVERS[TESTS].seconds, {})}) == {}
 
 
 def row_of(mutant: Mutant, result: str, **more: Any) -> dict[str, Any]:
