@@ -283,7 +283,7 @@ def tried(copy: Copy, mutant: Mutant, target: Target, covers: Mapping[str, Cover
 
 def key_of(row: Row) -> Key:
     """That of its mutant."""
-    return tuple(row[name] for name in NAMES)  # type: ignore[return-value]
+    return tuple(row[name] for name in NAMES)
 
 
 def judged(path: Path) -> dict[Key, str]:

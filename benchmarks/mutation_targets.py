@@ -40,7 +40,8 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
     "reduction": (
         *_of("circuit", "reduction nodal", "circuit/reduction circuit/rectifier circuit/one_sided"),
         *_of("circuit", "nodal_bandwidth", "circuit/nodal_bandwidth circuit/rectifier_bandwidth"),
-        *_of("circuit", "ensemble board_modes", "circuit/ensemble circuit/ensemble_of_any_size"),
+        *_of("circuit", "ensemble", "circuit/ensemble circuit/ensemble_of_any_size"),
+        *_of("circuit", "board_modes", "circuit/ensemble circuit/any_system"),
     ),
     "matching": (
         *_of("circuit", "terms", "circuit/terms linear_network/term_search"),
@@ -71,7 +72,11 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         *_of("yields", "window_path", "yields/window_path"),
     ),
     "flow guards": (
-        *_of("dynamics", "piecewise_linear", "dynamics/piecewise_linear circuit/reduction"),
+        *_of(
+            "dynamics",
+            "piecewise_linear",
+            "dynamics/piecewise_linear circuit/reduction synthesis/drive_channels",
+        ),
         *_of("dynamics", "flow step_budget", "dynamics/step_budget dynamics/flow"),
         *_of("dynamics", "working_modes", "kernels/kernel_propagators circuit/rectifier"),
         *_of("kernels", "kernel_crossing kernel_modal", "dynamics/flow dynamics/event_by_event"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given, strategies as st
 
 from designer.dynamics.counts import Counts, read_counts
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 
 PAIRS = st.lists(st.tuples(st.integers(0, 9999), st.integers(0, 9999)), min_size=1, max_size=4)
 
@@ -64,3 +66,19 @@ def test_long_periods_and_many_impacts_are_read_from_a_response() -> None:
 )
 def test_numbers_that_are_stored_may_be_no_counts(orbit: Orbit, countable: bool) -> None:
     assert orbit.countable is countable
+
+
+def test_an_orbit_that_could_not_be_computed_has_nothing() -> None:
+    """Arrays of no entry have the rest of their shape, so that what reads them reads nothing."""
+    orbit = failed("why")
+    assert (str(orbit.status), orbit.reason, str(orbit.counts)) == ("failed", "why", "0-0-0")
+    pairs = (orbit.extremes, orbit.spans, orbit.speeds, orbit.graze)
+    assert [each.shape for each in pairs] == [(0, 2)] * 4
+    lists = (orbit.start, orbit.impact_times, orbit.impact_velocities, orbit.impact_sides)
+    assert [each.shape for each in (*lists, orbit.impact_clearances, orbit.multipliers)] == [
+        (0,)
+    ] * 6
+    assert (orbit.penetration, orbit.miss) == (math.inf, math.inf)
+    assert all(map(math.isnan, (orbit.radius, orbit.asymmetry, orbit.lyapunov)))
+    assert orbit.symmetric is None
+    assert (orbit.periods, orbit.more, orbit.frequencies, orbit.mode) == (0, (), (), ())

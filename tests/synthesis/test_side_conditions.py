@@ -132,6 +132,7 @@ def test_what_is_found_is_what_the_circuit_has() -> None:
     volts = made.errors.scales.volts * PEAKS.states
     assert found["swing_v"].found == pytest.approx(max(*volts, 10.0))
     assert found["swing_v"].limit == pytest.approx(0.85 * 13.5)
+    assert (found["guaranteed_swing_v"].found, found["guaranteed_swing_v"].where) == (10.0, "U3D")
     assert found["signal_share_ratio"].found == pytest.approx(max(volts) / volts[0])
     assert found["signal_offset_ratio"].found == pytest.approx(volts[0] / 10e-3)
     assert (found["output_current_a"].found, found["output_current_a"].limit) == (2e-3, 10e-3)
@@ -146,6 +147,7 @@ def test_what_is_found_is_what_the_circuit_has() -> None:
 def test_sections_that_are_meant_to_saturate_keep_no_swing(section: str) -> None:
     loads = Loads((Load(section, -13.5, 13.5, 1e-3, "a", "a", "a"),), {})
     made = side_conditions.verify(design(), frozenset({"swing"}), TL074C, PEAKS, [1.0], loads)
+    assert [check.quantity for check in made] == ["swing_v"]
     assert made[0].holds
     assert side_conditions.saturating(circuit("rectifier")) == frozenset()
 
@@ -384,3 +386,39 @@ def test_what_hangs_behind_a_diode_loads_a_section() -> None:
     broken = ConditionCheck("load", "load_ohm", 2e3, 1e3, "U3A", least=True)
     tighter = within.tightened([broken], replace(design(), circuit=made), slower=False)
     assert tighter.load == pytest.approx(made.values["R50"], rel=2e-3)
+
+
+BY = 1.25 * (1.0 + limits.MARGIN)
+"""What a limit is tightened by where a check is 25 % beyond its own."""
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "slower", "changes"),
+    [
+        ("noise_gain", "noise_gain", False, {"noise_gain": limits.NOISE_GAIN / BY}),
+        ("level", "signal_level_ratio", False, {"level": limits.LEVEL_RATIO / BY}),
+        ("level", "signal_share_ratio", False, {"share": limits.SHARE / BY}),
+        ("swing", "swing_v", False, {"swing": 0.85 * 13.0 / BY}),
+        ("generator", "generator_peak_v", True, {"swing": 0.85 * 13.0 / BY}),
+        ("level", "signal_offset_ratio", True, {}),
+    ],
+)
+def test_what_is_broken_is_tightened_by_how_much_it_is(
+    name: str, quantity: str, slower: bool, changes: dict[str, float]
+) -> None:
+    within = limits.limits(CircuitSpec(), frozenset(SIDE_CONDITIONS), TL074C, 13.0, 400.0)
+    far = replace(design(), checks=(ConditionCheck("swing", "swing_v", 99.0, 99.0),))
+    tighter = within.tightened([ConditionCheck(name, quantity, 4.0, 5.0)], far, slower=slower)
+    assert tighter == replace(within, **changes)  # type: ignore[arg-type]
+
+
+def test_a_stage_that_is_too_fast_is_slowed_down_or_loses_gain() -> None:
+    """By the time scale, or, where that is not to change, by the gain of the stage itself."""
+    made = design()
+    within = limits.limits(CircuitSpec(), frozenset(SIDE_CONDITIONS), TL074C, 13.0, 400.0)
+    stage = max((s for s in stages(made.circuit) if not s.integrates), key=lambda s: s.gain)
+    broken = ConditionCheck("bandwidth", "noise_gain_bandwidth_hz", 1e5, 1.25e5, stage.section.name)
+    slow = within.tightened([broken], made, slower=True)
+    assert slow.seconds == (pytest.approx(made.errors.scales.seconds * BY), within.seconds[1])
+    flat = within.tightened([broken], made, slower=False)
+    assert flat == replace(within, noise_gain=stage.gain / BY)
