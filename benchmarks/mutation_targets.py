@@ -38,14 +38,15 @@ def _pairs(tests: str) -> list[tuple[str, str]]:
 
 GROUPS: Mapping[str, tuple[Target, ...]] = {
     "reduction": (
-        *_of("circuit", "reduction nodal", "circuit/reduction circuit/rectifier circuit/one_sided"),
+        *_of("circuit", "reduction", "circuit/reduction circuit/rectifier circuit/one_sided"),
+        *_of("circuit", "nodal", "circuit/reduction circuit/rectifier circuit/any_system"),
         *_of("circuit", "nodal_bandwidth", "circuit/nodal_bandwidth circuit/rectifier_bandwidth"),
         *_of("circuit", "ensemble", "circuit/ensemble circuit/ensemble_of_any_size"),
         *_of("circuit", "board_modes", "circuit/ensemble circuit/any_system"),
     ),
     "matching": (
         *_of("circuit", "terms", "circuit/terms linear_network/term_search"),
-        *_of("circuit", "coefficients", "circuit/coefficients circuit/paper_values"),
+        *_of("circuit", "coefficients", "circuit/coefficients circuit/any_system"),
         *_of(
             "linear_network",
             "linear_block linear_terms term_conditions",
@@ -77,7 +78,8 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
             "piecewise_linear",
             "dynamics/piecewise_linear circuit/reduction synthesis/drive_channels",
         ),
-        *_of("dynamics", "flow step_budget", "dynamics/step_budget dynamics/flow"),
+        *_of("dynamics", "step_budget", "dynamics/step_budget"),
+        *_of("dynamics", "flow", "dynamics/step_budget dynamics/flow dynamics/drive_shape"),
         *_of("dynamics", "working_modes", "kernels/kernel_propagators circuit/rectifier"),
         *_of("kernels", "kernel_crossing kernel_modal", "dynamics/flow dynamics/event_by_event"),
         *_of("kernels", "kernel_general", "dynamics/event_by_event dynamics/several_clearances"),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
@@ -82,3 +84,10 @@ def test_an_orbit_that_could_not_be_computed_has_nothing() -> None:
     assert all(map(math.isnan, (orbit.radius, orbit.asymmetry, orbit.lyapunov)))
     assert orbit.symmetric is None
     assert (orbit.periods, orbit.more, orbit.frequencies, orbit.mode) == (0, (), (), ())
+
+
+def test_impacts_without_a_clearance_are_of_the_first() -> None:
+    orbit = Orbit(OrbitStatus.PERIODIC, n=1, p=1, q=1, impact_sides=np.array([1.0, -1.0]))
+    assert orbit.impact_clearances.tolist() == [0, 0]
+    second = replace(orbit, impact_clearances=np.array([1, 1]))
+    assert second.impact_clearances.tolist() == [1, 1]

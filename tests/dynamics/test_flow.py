@@ -425,3 +425,11 @@ def test_seconds_and_volts_do_not_matter() -> None:
     assert b.counts.tolist() == a.counts.tolist()
     assert b.impacts.time / seconds == pytest.approx(a.impacts.time, rel=1e-10)
     assert b.penetration / volts == pytest.approx(a.penetration, rel=1e-8)
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 1, 2])
+def test_the_way_to_the_strobe_is_the_same_after_whole_turns(turns: int) -> None:
+    flow = flow_of(PAPER, 0.85)
+    quarters = flow.run(START, 1, points=4).strobes
+    late = flow.to_strobe(quarters[1], (0.5 + 2.0 * turns) * np.pi)
+    assert late.strobes[-1] == pytest.approx(quarters[-1], abs=1e-10)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,3 +77,15 @@ def test_a_system_without_an_answer_says_so() -> None:
     system = complementarity(-np.eye(2), -np.ones(2))
     with pytest.raises(ArithmeticError, match="no mode holds"):
         system.mode_at(np.zeros(1), 0.0)
+
+
+def test_a_displacement_that_is_a_state_is_told_from_one_that_is_made_of_it() -> None:
+    rows = [[1, 0, 0, 0], [0, 1, 0, 0], [2, 0, 0, 0], [1, -3, 0, 0], [0, 0, 1, 0], [1, 0, 0, 1]]
+    system = PiecewiseLinearSystem(
+        ("x", "x'"), lambda _: Mode(np.eye(2), np.ones(2), np.zeros(2), (), ()), (),
+        tuple("ABCDEF"), tuple(np.array(rows, dtype=float)), (),
+    )  # fmt: skip
+    assert system.state_in == (0, 1, None, None, None, None)
+    assert system.moving == 0
+    assert replace(system, displacement=system.displacement[3:]).moving == 1
+    assert replace(system, displacement=()).moving == 0

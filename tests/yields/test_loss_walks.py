@@ -83,3 +83,16 @@ def test_boards_lie_within_what_parts_may_be() -> None:
     low, middle, high = far.points[0]
     assert (low, middle) == (0.0, 0.5)
     assert 1.0 - 1e-15 < high < 1.0
+
+
+@pytest.mark.parametrize(("kind", "reach"), [("2-2-2", 0.95), ("", 0.05)])
+def test_moves_are_as_long_as_boards_stay_lost(kind: str, reach: float) -> None:
+    """Where every board is lost a move may forget where it began; where none stays, a short one is
+    tried, and the boards are where they were."""
+    begun_at = np.random.default_rng(1).random((12, 5))
+    each = LossWalk.of("2-2-2", 1.0, begun_at)
+    before = each.normal
+    walk([each], lambda points, _: [kind] * len(points), np.random.default_rng(2), moves=20)
+    assert each.reach == reach
+    assert (each.normal == before).all() == (kind == "")
+    assert len(each.kept) == 1
