@@ -39,7 +39,7 @@ def _pairs(tests: str) -> list[tuple[str, str]]:
 GROUPS: Mapping[str, tuple[Target, ...]] = {
     "reduction": (
         *_of("circuit", "reduction", "circuit/reduction circuit/rectifier circuit/one_sided"),
-        *_of("circuit", "nodal", "circuit/reduction circuit/rectifier circuit/any_system"),
+        *_of("circuit", "nodal", "circuit/reduction circuit/nodal_bandwidth circuit/any_system"),
         *_of("circuit", "nodal_bandwidth", "circuit/nodal_bandwidth circuit/rectifier_bandwidth"),
         *_of("circuit", "ensemble", "circuit/ensemble circuit/ensemble_of_any_size"),
         *_of("circuit", "board_modes", "circuit/ensemble circuit/any_system"),
@@ -54,7 +54,9 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         ),
         *_of("synthesis", "stop_halves", "synthesis/stop_halves"),
         *_of("synthesis", "value_tables", "synthesis/value_tables synthesis/parts_choice"),
-        *_of("synthesis", "dead_zone_target", "synthesis/size_dead_zone synthesis/nonlinear_block"),
+        *_of(
+            "synthesis", "dead_zone_target", "synthesis/nonlinear_block linear_network/term_search"
+        ),
         *_of("synthesis", "side_conditions limits", "synthesis/side_conditions"),
         *_of("synthesis", "scale_choice scale_box", "synthesis/scale_choice"),
     ),

@@ -31,12 +31,13 @@ from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit, exact_values
-from tests.shared.oracles import linear_matrix
+from tests.shared.oracles import dead_zone_gains, linear_matrix
 from tests.shared.rule_cases import (
     PAIRS,
     TEXT,
     base,
     bent,
+    graded,
     subject_of,
     warm,
     with_circuit,
@@ -463,6 +464,20 @@ def test_leftover_stiffness_is_the_difference_of_two_gains() -> None:
     changed = leftovers(circuit, {"R207": board["R207"] * 1.01}) - leftovers(circuit)
     # The linear path alone carries in contact; at rest 1 % of it is left over.
     assert abs(changed) == pytest.approx(0.01, rel=2e-2)
+
+
+def test_the_stiffness_that_is_left_spreads_as_the_rule_says() -> None:
+    """Boards drawn one by one, by Eq. (18): what the linear path gains over the saturating one, of
+    the stop's slope, which is 19 times K1."""
+    subject, random = graded(0.01), np.random.default_rng(6)
+    values, left = subject.circuit.values, []
+    slope = dead_zone_gains(values)[1]
+    for _ in range(2000):
+        drawn = {n: v * random.uniform(0.99, 1.01) for n, v in values.items() if n[0] == "R"}
+        steep, linear, through = dead_zone_gains(values | drawn)
+        left.append(19.0 * (linear - steep * through) / slope)
+    found = run_rules.look("dead-zone-stiffness", subject)
+    assert found.value == pytest.approx(np.std(left), rel=0.05)
 
 
 def test_the_rectifier_leaves_no_stiffness_whatever_its_grade() -> None:

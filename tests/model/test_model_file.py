@@ -393,6 +393,13 @@ WRONG_MECHANICAL = [
     ('"2 kg"', "1e-300", "mechanical.M2", "3.0", "m = M2/(M1 + M2) a number in (0, 1)"),
     ('"60 kN/m"', "1e-320", "mechanical.", "", ""),
     ("Omega = 340.0", "Omega = 340\nomega = 1", "response[1].Omega", "omega and", "one of the two"),
+    (
+        "Omega = 340.0",
+        "Omega = 340\nfrequency = 54\nomega = 1",
+        "response[1].frequency",
+        "omega and Omega and frequency",
+        "one of the three",
+    ),
     ("Omega = 340.0", "Omega = 0", "response[1].Omega", "0", "rad/s"),
     ("Omega = 340.0", 'Omega = "best"', "response[1].Omega", '"best"', "rad/s"),
     (

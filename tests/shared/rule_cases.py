@@ -234,7 +234,7 @@ def _leaking(share: float) -> RuleSubject:
     return on(1e3 + 1e3 * (share - once) / (twice - once))
 
 
-def _grade(grade: float) -> RuleSubject:
+def graded(grade: float) -> RuleSubject:
     made = base().synthesis
     spec = replace(made.modelfile.circuit, resistor_grade=grade)
     made = replace(made, modelfile=replace(made.modelfile, circuit=spec))
@@ -291,7 +291,7 @@ def _of_grade(parts: Iterable[Component], grade: float) -> list[Component]:
 
 
 def _deviation() -> float:
-    return look("dead-zone-stiffness", _grade(0.01)).value / 0.01
+    return look("dead-zone-stiffness", graded(0.01)).value / 0.01
 
 
 def _bent_deviation() -> float:
@@ -433,8 +433,8 @@ PAIRS: dict[str, tuple[Look, Look]] = {
         lambda: look("absorption-force", _absorbing(0.00999)),
     ),
     "dead-zone-stiffness": (
-        lambda: look("dead-zone-stiffness", _grade(0.51 / _deviation())),
-        lambda: look("dead-zone-stiffness", _grade(0.49 / _deviation())),
+        lambda: look("dead-zone-stiffness", graded(0.51 / _deviation())),
+        lambda: look("dead-zone-stiffness", graded(0.49 / _deviation())),
     ),
     "far-slope": (
         lambda: look("far-slope", bent(0.51 / _bent_deviation())),

@@ -45,7 +45,7 @@ def test_no_choice_is_better(seed: int) -> None:
     rng = np.random.default_rng(seed)
     sides = [1, -1][: int(rng.integers(1, 3))]
     targets = [
-        HalfTarget(side, float(rng.choice([0.0, rng.uniform(1.0, 6.0)])), rng.uniform(3e-5, 2e-4))
+        HalfTarget(side, float(rng.choice([0.0, rng.uniform(0.3, 6.0)])), rng.uniform(3e-5, 2e-4))
         for side in sides
     ]
     wanted = by_hand(targets, E12.tolist(), RULES)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle, shoot_symmetric
-from designer.dynamics.continued_orbit import follow, valleys
+from designer.dynamics.continued_orbit import ContinuedOrbit, follow, valleys
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw_many
+from designer.yields import window_path
 from designer.yields.adjustment import Adjustment
 from designer.yields.window_path import MOST_FOLLOWED, PathSetting, find_window
 from tests.shared.bench_plans import period_counts, plan, question
@@ -46,6 +48,21 @@ def test_a_path_leads_into_a_window_that_is_hard_to_meet(p: int, sample: int) ->
     assert Adjustment.at(best.setting.vector, bands) == best.setting
     assert response(board(p, sample), p, best) == (1, p, p)
     assert followed <= MOST_FOLLOWED
+
+
+def test_a_path_ends_when_it_has_followed_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+
+    def counted(flow: Flow, start: Array, n: int) -> ContinuedOrbit | None:
+        nonlocal calls
+        calls += 1
+        return follow(flow, start, n)
+
+    monkeypatch.setattr(window_path, "follow", counted)
+    monkeypatch.setattr(window_path, "MOST_FOLLOWED", 40)
+    _, followed = find_window(board(4, 5), question(4), Bands())
+    assert 40 - window_path.RESERVE < followed <= 40
+    assert followed == calls
 
 
 def test_the_radius_says_where_the_window_ends() -> None:
