@@ -82,7 +82,7 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         ),
         *_of("dynamics", "step_budget", "dynamics/step_budget"),
         *_of("dynamics", "flow", "dynamics/step_budget dynamics/flow dynamics/drive_shape"),
-        *_of("dynamics", "working_modes", "kernels/kernel_propagators circuit/rectifier"),
+        *_of("dynamics", "working_modes", "dynamics/piecewise_linear kernels/kernel_propagators"),
         *_of("kernels", "kernel_crossing kernel_modal", "dynamics/flow dynamics/event_by_event"),
         *_of("kernels", "kernel_general", "dynamics/event_by_event dynamics/several_clearances"),
     ),

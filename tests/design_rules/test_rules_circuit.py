@@ -18,7 +18,7 @@ from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.nodal import NodalEquations
 from designer.circuit.reduction import Reduction
-from designer.design_rules import on_nets, on_precision, run_rules
+from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.clearance import Sides
@@ -522,6 +522,15 @@ def test_a_value_that_is_no_number_never_passes() -> None:
         assert (found.status, found.where) == (FAIL, "b")
 
 
+def test_a_decoupling_capacitor_stands_its_rail_over_ground() -> None:
+    subject = base()
+    found = {f.where.split(" ")[0]: f.value for f in on_ratings.capacitor_voltage(subject)}
+    beside = [c.name for c in subject.circuit.fittings if c.name in subject.volts]
+    assert len(beside) > 4
+    for name in beside:
+        assert found[name] * subject.volts[name] == pytest.approx(15.0)
+
+
 def test_a_net_s_drivers_are_counted_with_the_rails() -> None:
     short = rule_cases.rewired({("U1", "1"): "vcc"})
     found = list(on_nets.drivers(short))
@@ -556,3 +565,4 @@ def test_the_slope_that_is_left_past_a_bend_spreads_as_the_rule_says() -> None:
     found = run_rules.look("far-slope", subject)
     assert found.value == pytest.approx(np.std(slopes) / abs(np.mean(slopes)), rel=0.1)
     assert found.value > 0.05
+    assert "K, beyond its upper bends" in found.found

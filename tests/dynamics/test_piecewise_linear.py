@@ -10,7 +10,14 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
-from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import (
+    Drive,
+    Guard,
+    Mode,
+    ModeKey,
+    PiecewiseLinearSystem,
+)
+from designer.dynamics.working_modes import TabulatedModes
 
 
 def complementarity(M: Array, q: Array, weight: float = 1.0) -> PiecewiseLinearSystem:
@@ -89,3 +96,21 @@ def test_a_displacement_that_is_a_state_is_told_from_one_that_is_made_of_it() ->
     assert system.moving == 0
     assert replace(system, displacement=system.displacement[3:]).moving == 1
     assert replace(system, displacement=()).moving == 0
+
+
+def test_modes_that_somebody_else_has_built_are_taken_where_they_are_not_there() -> None:
+    system = complementarity(np.eye(2), -np.ones(2))
+    own = system.mode((0, 0))
+    others = {key: complementarity(np.eye(2), np.ones(2)).mode(key) for key in ((0, 0), (1, 0))}
+    system.know(others)
+    assert system.mode((0, 0)) is own
+    assert system.mode((1, 0)) is others[1, 0]
+    assert system.built == 2
+
+
+def test_a_mode_keeps_the_number_that_it_gets() -> None:
+    tables = TabulatedModes(complementarity(np.eye(2), -np.ones(2)), Drive(1.0))
+    keys = [(0, 0), (1, 0), (1, 1)]
+    assert [tables.number(key) for key in keys] == [0, 1, 2]
+    assert [tables.number(key) for key in keys] == [0, 1, 2]
+    assert tables.targets.keys == keys
