@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,15 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
+from designer.dynamics.drive_shape import SINE
+from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import (
     Drive,
     Guard,
     Mode,
     ModeKey,
     PiecewiseLinearSystem,
+    SecondDrive,
 )
 from designer.dynamics.working_modes import TabulatedModes
 
@@ -114,3 +118,18 @@ def test_a_mode_keeps_the_number_that_it_gets() -> None:
     assert [tables.number(key) for key in keys] == [0, 1, 2]
     assert [tables.number(key) for key in keys] == [0, 1, 2]
     assert tables.targets.keys == keys
+
+
+def test_a_guard_may_look_at_the_second_drive() -> None:
+    """x' = sin t while the second drive, sin t too, is above 1/2: from π/6 to 5π/6, in which x
+    gains the square root of 3."""
+
+    def build(key: ModeKey) -> Mode:
+        sign = -1.0 if key[0] else 1.0
+        guard = Guard(np.zeros(1), 0.0, -0.5 * sign, (1 - key[0],), -1, sign)
+        moves = np.array([float(key[0])])
+        return Mode(np.zeros((1, 1)), moves, np.zeros(1), (guard,), (), beside=np.zeros(1))
+
+    system = PiecewiseLinearSystem(("x",), build, (0,), (), (), (), continuous=False)
+    flow = Flow(system, Drive(1.0, second=SecondDrive(1.0, SINE)))
+    assert flow.run(np.zeros(1), 1).strobes[-1, 0] == pytest.approx(math.sqrt(3.0), abs=1e-9)
