@@ -38,11 +38,13 @@ def _pairs(tests: str) -> list[tuple[str, str]]:
 
 GROUPS: Mapping[str, tuple[Target, ...]] = {
     "reduction": (
-        *_of("circuit", "reduction", "circuit/reduction circuit/rectifier circuit/one_sided"),
+        *_of(
+            "circuit", "reduction", "circuit/reduction circuit/rectifier synthesis/drive_channels"
+        ),
         *_of("circuit", "nodal", "circuit/reduction circuit/nodal_bandwidth circuit/any_system"),
         *_of("circuit", "nodal_bandwidth", "circuit/nodal_bandwidth circuit/rectifier_bandwidth"),
         *_of("circuit", "ensemble", "circuit/ensemble circuit/ensemble_of_any_size"),
-        *_of("circuit", "board_modes", "circuit/ensemble circuit/any_system"),
+        *_of("circuit", "board_modes", "circuit/any_system fabrication/bench_sheet"),
     ),
     "matching": (
         *_of("circuit", "terms", "circuit/terms linear_network/term_search"),
@@ -63,7 +65,11 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
     "verdicts": (
         *_of("verdicts", "verdict", "verdicts/verdict verdicts/exact_rung"),
         *_of("verdicts", "exact_rung", "verdicts/exact_rung yields/window_path"),
-        *_of("model", "response_table", "verdicts/verdict dynamics/attractors model/model_file"),
+        *_of(
+            "model",
+            "response_table",
+            "verdicts/verdict model/model_file centering/operating_points",
+        ),
         *_of("dynamics", "orbit counts", "dynamics/counts dynamics/attractors verdicts/verdict"),
     ),
     "yields": (

@@ -106,9 +106,11 @@ def test_boards_whose_states_move_together_are_served() -> None:
         ends, known = fast.swept(board, stages, rest)
         assert known.all()
         system, x = slow.reduction(board).system(), rest[0]
-        for each, periods in stages:
+        for k, (each, periods) in enumerate(stages):
             x = Flow(system, each, fast=False).run(x, periods).strobes[-1]
-        assert np.abs((ends[0] - x) / np.abs(x).max()).max() < 1e-8
+            so_far, _ = fast.swept(board, stages[: k + 1], rest)
+            assert np.abs((so_far[0] - x) / np.abs(x).max()).max() < 1e-8
+        np.testing.assert_array_equal(so_far, ends)
         again, _ = fast.swept(board, stages, rest)
         np.testing.assert_array_equal(again, ends)
     # Modes that are solved for several boards at once are those of each.
