@@ -105,7 +105,8 @@ def test_a_displacement_that_is_a_state_is_told_from_one_that_is_made_of_it() ->
 def test_modes_that_somebody_else_has_built_are_taken_where_they_are_not_there() -> None:
     system = complementarity(np.eye(2), -np.ones(2))
     own = system.mode((0, 0))
-    others = {key: complementarity(np.eye(2), np.ones(2)).mode(key) for key in ((0, 0), (1, 0))}
+    keys: tuple[ModeKey, ...] = ((0, 0), (1, 0))
+    others = {key: complementarity(np.eye(2), np.ones(2)).mode(key) for key in keys}
     system.know(others)
     assert system.mode((0, 0)) is own
     assert system.mode((1, 0)) is others[1, 0]
