@@ -41,10 +41,10 @@ def measured(words: Sequence[str]) -> dict[str, Any]:
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     settings, data = WORK / "settings.ini", WORK / "data"
-    omitted = "".join(f"\n    designer/{pattern}" for pattern in jit.KERNELS)
+    omit = "omit =" + "".join(f"\n    designer/{pattern}" for pattern in jit.KERNELS)
     settings.write_text(
-        f"[run]\nbranch = true\nsource = designer\nomit = {omitted}\nparallel = true\n"
-        f"patch = subprocess\ndata_file = {data}\n",
+        f"[run]\nbranch = true\nsource = designer\n{omit}\nparallel = true\n"
+        f"patch = subprocess\ndata_file = {data}\n[report]\n{omit}\n",
         "utf-8",
     )
 
