@@ -137,3 +137,10 @@ def test_simulate_ends_with_the_reason(
     assert row["status"] == "not settled"
     assert "steps to a drive period" in row["reason"]
     assert row["starts"]["count"] < row["starts"]["asked"] == 200
+
+
+def test_a_budget_begins_with_nothing_spent() -> None:
+    budget = Budget(10.0)
+    budget.take(4.0)
+    budget.take(7.0)
+    assert (budget.left, budget.spent) == (-1.0, 11.0)

@@ -18,8 +18,8 @@ from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.model import Dimensionless
-from designer.model.response_table import Response
+from designer.model.model import Dimensionless, SiScales
+from designer.model.response_table import Response, placed
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict, judge
 from tests.circuit.test_coefficients import exact_for_paper
@@ -84,6 +84,17 @@ def test_without_an_expectation_the_nominal_motion_without_a_period_is_wanted() 
     nominal = chaotic(0.1, 0.01)
     assert judge(chaotic(0.2, 0.01), wanted(None), nominal)[0] is Verdict.OK
     assert judge(periodic(1, 1, 1), wanted(None), nominal)[0] is Verdict.LOST
+
+
+def test_a_response_at_another_place_keeps_its_key_and_its_unit() -> None:
+    table = {"omega": 0.85, "expect": "1-2-2"}
+    assert placed(table, 1.2, 0.3, None) == {"omega": 1.2, "expect": "1-2-2", "b": 0.3}
+    assert placed(table, None, None, None) == table
+    assert placed({"expect": "1-2-2"}, 1.2, None, None) == {"expect": "1-2-2", "omega": 1.2}
+    turns = 7.0 / (2.0 * math.pi)
+    assert placed({"Omega": 3.0}, 7.0, None, SiScales()) == {"Omega": pytest.approx(7.0)}
+    text = placed({"frequency": "3 Hz"}, 7.0, None, SiScales())["frequency"]
+    assert float(text.removesuffix(" Hz")) == pytest.approx(turns)
 
 
 def nothing() -> None:
