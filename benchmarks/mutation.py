@@ -12,6 +12,7 @@ can tell it from the program.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import hashlib
 import json
 import os
@@ -457,6 +458,11 @@ def main(words: Sequence[str] = ()) -> str:
     end = time.monotonic() + 60.0 * chosen.minutes
     chosen.out.mkdir(parents=True, exist_ok=True)
     chosen.work.mkdir(parents=True, exist_ok=True)
+    lock = (chosen.work / "lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        raise SystemExit(f"{chosen.work}: another run works there") from None
     population = Population(ROOT, GROUPS, SEED)
     path, made = chosen.out / ROWS, commit()
     rows, why = whole_lines(path), judged(chosen.out / JUDGED)
