@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
+from designer.base.progress import doing
 from designer.catalog.design_rule import (
     DesignRule,
     Finding,
@@ -26,8 +27,12 @@ LOOKS: dict[str, Look] = {**on_nets.LOOKS, **on_ratings.LOOKS, **on_precision.LO
 
 def on_circuit(subject: RuleSubject, overrides: Mapping[str, Override]) -> tuple[RuleOutcome, ...]:
     """Every rule on the circuit, in the order of the list."""
-    wanted = [rule for rule in RULES if rule.scope == "circuit"]
-    return tuple(look(rule.id, subject, overrides.get(rule.id)) for rule in wanted)
+    outcomes = []
+    for rule in RULES:
+        if rule.scope == "circuit":
+            doing(f"design rule {rule.id}")
+            outcomes.append(look(rule.id, subject, overrides.get(rule.id)))
+    return tuple(outcomes)
 
 
 def look(id_: str, subject: RuleSubject, override: Override | None = None) -> RuleOutcome:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.base.progress import doing
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL, RuleOutcome
 from designer.check import checked_design
@@ -45,7 +44,6 @@ def judged(synthesis: Synthesis, subject: RuleSubject | InputError) -> Synthesis
     the design."""
     if synthesis.outcomes is not None or isinstance(subject, InputError):
         return synthesis
-    doing("design rules of the circuit")
     outcomes = run_rules.on_circuit(subject, synthesis.modelfile.rules)
     return replace(synthesis, outcomes=outcomes)
 

@@ -195,10 +195,10 @@ class Walk(ProgressLines):
 
 STAGES = {
     "ngspice": "",
-    "responses of the model, parts": "swing|integrators|dead zone|cost",
+    "responses of the model, parts": "swing|integrators|dead zone|cost|design rule power",
     "files of the design": "bill",
     "KiCad project": "",
-    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct|rules",
+    "start recipes, design rules of the circuit": "start recipe of response 1 of 1, direct",
     "ngspice, equation check": "6 of 6 runs",
     "exact circuit": "",
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
