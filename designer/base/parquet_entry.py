@@ -9,10 +9,13 @@ so. Rows, values and bytes are therefore counted in the headers of its pages bef
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import types
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from enum import StrEnum
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -30,6 +33,30 @@ MOST_BYTES = 64_000_000
 """The most bytes of an entry that is unpacked, and of all its texts written out."""
 _WRITER = "parquet-cpp-arrow"
 Rows = Sequence[Mapping[str, Any]]
+_SCALARS: dict[type, pa.DataType] = {
+    bool: pa.bool_(),
+    int: pa.int64(),
+    float: pa.float64(),
+    str: pa.string(),
+}
+
+
+def columns_of(kind: type, names: Iterable[str]) -> list[pa.Field]:
+    """Columns for these fields of a dataclass, in this order, with the types that it states: a list
+    for an array (k,) or a tuple, text for an enumeration."""
+    hints = get_type_hints(kind)
+    return [pa.field(name, _type_of(hints[name])) for name in names]
+
+
+def _type_of(kind: Any) -> pa.DataType:
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):  # or None
+        return _type_of(inner[0])
+    if origin is np.ndarray:
+        return pa.list_(pa.float64())
+    if origin is tuple:
+        return pa.list_(_type_of(inner[0]))
+    return _SCALARS[str if issubclass(kind, StrEnum) else kind]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Whether the values of a record are of the types that its class states.
+"""Records from plain data, whose values are of the types that their classes state.
 
 What is stored may come from anyone, with a seal that is right: a value of another type would be met
 far from the file, by whoever computes with it.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from enum import Enum
 from functools import cache
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -18,6 +19,39 @@ Record = TypeVar("Record")
 _KINDS = {"f": "fiu", "i": "iu", "u": "iu", "c": "cfiu", "b": "b"}
 """Kinds of arrays that stand for each kind."""
 _hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+
+
+def read_record(kind: type[Record], row: Mapping[str, Any]) -> Record:
+    """The record of a dataclass from what JSON and Parquet hold of it: a text for an enumeration,
+    a list for a tuple or an array, a mapping for a record.
+
+    Raises
+    ------
+    TypeError, ValueError : a value is not of its field's type, is missing, or has no field.
+    """
+    hints = _hints(kind)
+    return checked_record(kind, {name: _read(v, hints.get(name)) for name, v in row.items()})
+
+
+def _read(value: object, kind: Any) -> Any:
+    """A value as its annotation has it; as it is where that says nothing of it."""
+    if value is None or isinstance(value, int | float):
+        return value
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        return _read(value, inner[0])
+    if origin is tuple and isinstance(value, list):
+        each = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
+        return tuple(_read(v, k) for v, k in zip(value, each, strict=True))
+    if origin is np.ndarray and isinstance(value, list):
+        array = np.array(value)  # with something else in it than numbers it fits no annotation
+        return array.astype(float) if array.dtype.kind in "iu" else array
+    if isinstance(kind, type):
+        if issubclass(kind, Enum):
+            return kind(value)
+        if isinstance(value, Mapping) and is_dataclass(kind):
+            return read_record(kind, value)
+    return value
 
 
 def checked_record(kind: type[Record], values: Mapping[str, Any]) -> Record:

@@ -22,6 +22,7 @@ from .basins import (
 )
 from .border_curve import (
     BorderCurve as BorderCurve,
+    CurveMeeting as CurveMeeting,
     CurveOrigin as CurveOrigin,
     read_curve as read_curve,
 )
@@ -37,6 +38,9 @@ from .continuation import (
     Branch as Branch,
     End as End,
 )
+from .curve_switch import (
+    OtherCurve as OtherCurve,
+)
 from .doubling_cascade import (
     Cascade as Cascade,
     cascade as cascade,
@@ -44,6 +48,9 @@ from .doubling_cascade import (
 from .flow_family import (
     Family as Family,
     FlowPlane as FlowPlane,
+)
+from .grazing_contact import (
+    GrazingContact as GrazingContact,
 )
 from .parameter_map import (
     MapCell as MapCell,

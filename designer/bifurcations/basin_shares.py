@@ -94,13 +94,9 @@ class AttractorShare(Motion):
     attractor: int
     """Number of the attractor, the same at every value; from 0."""
     status: OrbitStatus
-    """What the motion is."""
     n: int
-    """Least period in drive periods; 0 unless periodic."""
     p: int
-    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
-    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
     """Whether the motion is its own mirror image; None unless periodic."""
     twin: int | None
@@ -110,7 +106,6 @@ class AttractorShare(Motion):
     strobes: tuple[tuple[float, ...], ...]
     """States at drive phase 0 in order; of what is not periodic the one where it was left."""
     more: Pairs = ()
-    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
 
 
 Step = tuple[AttractorShare, ...]
@@ -136,7 +131,7 @@ class BasinShares:
         return dict(sorted(out.items()))
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of the contract."""
+        """Plain data by the keys of the contract."""
         return {
             **self.plan.as_dict(),
             "phase": "even over a drive period",
@@ -301,7 +296,7 @@ def _grows(flow: Flow, x: Array) -> bool:
 
 @dataclass(frozen=True)
 class _Way:
-    """From one value of the parameter to another."""
+    """The way from one value of the parameter to another."""
 
     family: Family
     """The system at any value."""
@@ -420,7 +415,7 @@ def _continue(
 
 
 def _distance(met: AttractorList, one: MetAttractor, other: MetAttractor) -> float:
-    """From the first strobe of one orbit to the nearest of another."""
+    """Distance from the first strobe of one orbit to the nearest of another."""
     return float(np.abs(met.weights * (other.strobes - one.strobes[0])).max(axis=1).min())
 
 

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from designer.base.arrays import Array
-from designer.base.record_check import checked_record
+from designer.base.record_check import read_record
 from designer.bifurcations.curve_switch import OtherCurve, other_curve, read_other_curve
 from designer.bifurcations.plane_curves import PlaneCurve
 from designer.bifurcations.points import PointKind
-from designer.dynamics.counts import read_counts
+from designer.dynamics.counts import period_of
 
 FOLLOWED, NO_OTHER, NOT_BUILT = "followed", "no other curve", "not built"
 UNSTABLE, DEEPER, LOST = "unstable orbits only", "deeper than asked for", "no convergence"
@@ -25,9 +23,9 @@ class CurveMeeting:
     """A point of codimension two on a curve, as plain data."""
 
     name: str
-    """What it is called; see ``codimension_two``."""
+    """Name of the point; see ``codimension_two``."""
     values: tuple[float, float]
-    """Of both parameters."""
+    """Values of both parameters."""
     other: OtherCurve | None = None
     """The other curve of the same orbits there, if there is one."""
     curve: int = 0
@@ -53,9 +51,9 @@ class CurveOrigin:
     curve: int
     """Number of the curve that it was found on, from 1."""
     name: str
-    """What it is called."""
+    """Name of the point."""
     values: tuple[float, float]
-    """Of both parameters."""
+    """Values of both parameters."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""
@@ -113,8 +111,7 @@ class BorderCurve:
     @property
     def n(self) -> int:
         """Period of its orbits, in drive periods."""
-        counts = read_counts(self.response)
-        return 0 if counts is None else counts.n
+        return period_of(self.response)
 
     @property
     def turned(self) -> BorderCurve:
@@ -130,35 +127,22 @@ def read_curve(row: Mapping[str, Any]) -> BorderCurve:
     ------
     ValueError, TypeError, LookupError : it is no curve's.
     """
-    at = row["begun_at"]
-    symmetric = row["symmetric"]
-    values = {
+    fields = {
+        **row,
         "kind": str(PointKind(row["kind"])),
-        "response": row["response"],
-        "symmetric": symmetric,
-        "points": np.array([(float(a), float(b)) for a, b in row["points"]]).reshape(-1, 2),
-        "stable": tuple(row["stable"]),
-        "ends": tuple(row["ends"]),
         "codimension_two": tuple(
-            _read_meeting(met, symmetric=symmetric) for met in row["codimension_two"]
+            _read_meeting(met, symmetric=row["symmetric"]) for met in row["codimension_two"]
         ),
-        "begun_at": None if at is None else _read_origin(at),
     }
-    curve = checked_record(BorderCurve, values)
-    if not 0 < len(curve.points) == len(curve.stable):
+    if (at := row["begun_at"]) is not None:
+        fields["begun_at"] = {"curve": at["curve"], "name": at["kind"], "values": at["values"]}
+    curve = read_record(BorderCurve, fields)
+    if curve.points.shape != (len(curve.stable), 2):
         raise ValueError("a curve of no points, or of more points than it has stabilities")
     return curve
 
 
-def _read_origin(row: Mapping[str, Any]) -> CurveOrigin:
-    a, b = row["values"]
-    values = {"curve": row["curve"], "name": row["kind"], "values": (a, b)}
-    return checked_record(CurveOrigin, values)
-
-
 def _read_meeting(row: Mapping[str, Any], *, symmetric: bool) -> CurveMeeting:
-    a, b = row["values"]
-    other = row["other"]
-    values = {"name": row["kind"], "values": (a, b)}
-    values["other"] = read_other_curve(other, (a, b), symmetric=symmetric)
-    return checked_record(CurveMeeting, values)
+    values = row["values"]
+    other = read_other_curve(row["other"], values, symmetric=symmetric)
+    return read_record(CurveMeeting, {"name": row["kind"], "values": values, "other": other})

@@ -78,10 +78,6 @@ class CodimensionTwo:
         """The values of both parameters."""
         return self.point.values
 
-    def as_dict(self) -> dict[str, object]:
-        """Plain, for JSON."""
-        return {"kind": self.name, "values": list(self.values)}
-
 
 Event = tuple[str, PointKind | None]
 """Name of a point of codimension two, and kind of the other curve."""

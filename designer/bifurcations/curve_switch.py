@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.base.record_check import checked_record
+from designer.base.record_check import read_record
 from designer.bifurcations.codimension_two import CodimensionTwo
 from designer.bifurcations.conditions import Condition, Grazing, Multiplier, MultiplierPair
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
@@ -93,19 +93,11 @@ def read_other_curve(
     """
     if row is None:
         return None
-    fields = {
-        "kind": PointKind(row["kind"]),
-        "n": row["n"],
-        "symmetric": symmetric,
-        "values": values,
-        "state": tuple(row["state"]),
-        "stable": row["stable"],
-    }
-    if (t := row["touch"]) is not None:
-        touch = {key: t[key] for key in ("clearance", "side", "tip")}
-        fields["touch"] = checked_record(GrazingContact, touch)
-        fields |= {"phase": t["phase"], "size": t["size"]}
-    return checked_record(OtherCurve, fields)
+    fields = {**row, "symmetric": symmetric, "values": values}
+    if row["touch"] is not None:
+        touch = dict(row["touch"])
+        fields |= {"phase": touch.pop("phase"), "size": touch.pop("size"), "touch": touch}
+    return read_record(OtherCurve, fields)
 
 
 def other_curve(system: ExtendedSystem, c: CodimensionTwo) -> OtherCurve | None:

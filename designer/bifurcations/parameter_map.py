@@ -22,30 +22,23 @@ COURSE = TransientSettings(settle=134, keep=16, patience=1000)
 
 @dataclass(frozen=True)
 class MapCell(Motion):
-    """What a grid point shows; the fields are those of ``SteadyMotion``."""
+    """What a grid point shows; other fields as of ``SteadyMotion``."""
 
     i: int
     """Row of the cell."""
     j: int
     """Column of the cell."""
     status: OrbitStatus
-    """How the search for a steady state ended."""
     n: int
-    """Least period in drive periods; 0 unless periodic."""
     p: int
-    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
-    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
-    """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
-    """Largest Lyapunov exponent per unit of the system's time."""
     strobe: tuple[float, ...]
     """A state of the motion at drive phase 0."""
     attractor: int = 0
     """Its number in a basin, 0 in a map."""
     more: Pairs = ()
-    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
 
 
 class CellStore(Protocol):

@@ -10,7 +10,7 @@ two neighbouring rays the border is taken as straight.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -33,9 +33,9 @@ BEYOND = 0.1
 EDGE = "edge of the window"
 """What a border is called where the response lives on beyond the window."""
 HELD = 0.95
-"""Of the boards: those between the ends of a spread's box in each parameter."""
+"""Share of the boards between the ends of a spread's box in each parameter."""
 ROUND = 1e-6
-"""Of the region's size: how closely the largest ellipse is found."""
+"""Error of the largest ellipse, over the region's size."""
 GRID, ROUNDS, NARROWER = 41, 8, 0.25
 """The best box is sought on a grid of so many points a side, then on ever narrower ones."""
 
@@ -47,17 +47,9 @@ class ToleranceBox:
     centre: tuple[float, float]
     """Values of both parameters in its middle."""
     half_widths: tuple[float, float]
-    """Of both parameters."""
+    """Half widths of both parameters."""
     share: float
     """Half widths over the nominal values."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
-        return {
-            "centre": list(self.centre),
-            "half_widths": list(self.half_widths),
-            "share": self.share,
-        }
 
 
 @dataclass(frozen=True)
@@ -67,17 +59,9 @@ class ToleranceEllipse:
     centre: tuple[float, float]
     """Values of both parameters in its middle."""
     half_axes: tuple[float, float]
-    """Of both parameters."""
+    """Half axes of both parameters."""
     share: float
     """Half axes over the nominal values."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain, for JSON."""
-        return {
-            "centre": list(self.centre),
-            "half_axes": list(self.half_axes),
-            "share": self.share,
-        }
 
 
 @dataclass(frozen=True)
@@ -89,9 +73,9 @@ class SpreadBox:
     high: tuple[float, float]
     """Greatest values of both parameters."""
     share: float
-    """Of the boards that lie between the ends of each parameter."""
+    """Share of the boards that lie between the ends of each parameter."""
     boards: int
-    """That were drawn."""
+    """Boards that were drawn."""
     inside: float
     """Share of the boards that lie in the part of the region that is seen."""
 
@@ -150,10 +134,10 @@ class ResponseRegion:
                 {"values": values, "kind": kind}
                 for values, kind in zip(self.border.tolist(), self.kinds, strict=True)
             ],
-            "around": self.around.as_dict(),
-            "best": self.best.as_dict(),
-            "ellipse_around": self.ellipse_around.as_dict(),
-            "ellipse_best": self.ellipse_best.as_dict(),
+            "around": asdict(self.around),
+            "best": asdict(self.best),
+            "ellipse_around": asdict(self.ellipse_around),
+            "ellipse_best": asdict(self.ellipse_best),
             "spread": None if self.spread is None else self.spread.as_dict(),
         }
 

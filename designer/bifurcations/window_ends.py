@@ -23,7 +23,7 @@ from designer.bifurcations.sweep import Sweep, Window
 from designer.bifurcations.window_families import families
 from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, WindowEnd, all_windows
 from designer.dynamics import attractors
-from designer.dynamics.counts import read_counts
+from designer.dynamics.counts import period_of
 from designer.dynamics.orbit import Orbit
 
 LEAST_STEPS, LONGEST = 4, 4
@@ -63,7 +63,7 @@ class SweptEnd:
     """Why it was not located or not looked for, in words."""
 
     def as_dict(self) -> dict[str, object]:
-        """By the keys of the contract."""
+        """Plain data by the keys of the contract."""
         reason = {"reason": self.reason} if self.reason else {}
         return {"kind": self.kind, "value": self.value, "error": self.error, **reason}
 
@@ -136,17 +136,11 @@ def windows(sweep: Sweep) -> list[Window]:
 
 def _left_out(window: Window) -> str:
     """Why the ends of a window are not looked for; "" where they are."""
-    if not period(window):
+    if not period_of(window.response):
         return "not periodic"
     if window.steps < LEAST_STEPS:
         return f"fewer than {LEAST_STEPS} steps of the sweep show it"
-    return f"its period is longer than {LONGEST}" if period(window) > LONGEST else ""
-
-
-def period(window: Window) -> int:
-    """n of a periodic window; 0 of others."""
-    counts = read_counts(window.response)
-    return 0 if counts is None else counts.n
+    return f"its period is longer than {LONGEST}" if period_of(window.response) > LONGEST else ""
 
 
 def locate(
@@ -160,7 +154,7 @@ def find(sweep: Sweep, jobs: int = 1, progress: Callable[[], None] = lambda: Non
     """The points and the windows' ends; ``progress`` is called once a window that is followed."""
 
     def one(window: Window) -> _Followed:
-        if not period(window):
+        if not period_of(window.response):
             return _Followed()
         if reason := _left_out(window):
             low, high = (_unknown(window, side, NOT_SOUGHT, reason) for side in (-1, 1))
@@ -201,7 +195,8 @@ def _follow(sweep: Sweep, window: Window, over: Family) -> _Followed:
     counts = orbits[0][1].counts.family
 
     def over_with(p: BranchPoint) -> bool:
-        """Past what the sweep shows of the window, and no longer the stable response."""
+        """Whether a point is past what the sweep shows of the window, and no longer the stable
+        response."""
         return not low <= p.value <= high and not (p.stable and p.counts.family == counts)
 
     found = branch_survey.survey(over, orbits, values[0], values[-1], depth=0, until=over_with)

@@ -33,6 +33,7 @@ from .counts import (
     MAX_PERIOD as MAX_PERIOD,
     Counts as Counts,
     Pairs as Pairs,
+    period_of as period_of,
     read_counts as read_counts,
 )
 from .drive_shape import (

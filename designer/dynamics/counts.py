@@ -84,6 +84,12 @@ class Counts:
         return Counts(2 * self.n, tuple((2 * p, 2 * q) for p, q in self.impacts))
 
 
+def period_of(response: str) -> int:
+    """n of a response's text; 0 of a status."""
+    counts = read_counts(response)
+    return 0 if counts is None else counts.n
+
+
 def read_counts(text: str) -> Counts | None:
     """The counts that a response's text states; None where it is a status, such as "aperiodic"."""
     match = _COUNTS.fullmatch(text)

@@ -54,9 +54,13 @@ class Motion:
 
     status: OrbitStatus
     n: int
+    """Least period in drive periods; 0 unless periodic."""
     p: int
+    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
+    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     more: Pairs
+    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
 
     @property
     def counts(self) -> Counts:

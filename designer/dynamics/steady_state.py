@@ -80,11 +80,8 @@ class SteadyMotion(Motion):
     op-amp is at its limit). Never grazing: a count within rounding of a tangency is given as it was
     run."""
     n: int
-    """Least period in drive periods; 0 unless periodic."""
     p: int
-    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
-    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
     """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
@@ -103,7 +100,6 @@ class SteadyMotion(Motion):
     periods: int
     """Drive periods that were run in all."""
     more: Pairs = ()
-    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
     lyapunov_error: float = float("nan")
     """Standard error of ``lyapunov``; nan of a periodic motion."""
     further: tuple[Array, ...] = ()

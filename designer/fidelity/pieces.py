@@ -18,9 +18,8 @@ from designer.base.guarded_reading import UNREADABLE
 from designer.base.keyed_store import Lines, Note
 from designer.base.plain_json import plain
 from designer.base.progress import quiet
-from designer.base.record_check import checked_record
+from designer.base.record_check import checked_record, read_record
 from designer.fidelity.fidelity_errors import FidelityError, Truth
-from designer.fidelity.label import ResponseLabel
 from designer.fidelity.yields import Tally
 from designer.spice.deck import SolverSettings
 
@@ -124,11 +123,10 @@ def tally(piece: Mapping[str, Any]) -> Tally:
 
 
 def _compared(row: Mapping[str, Any]) -> FidelityError:
-    return checked_record(
+    return read_record(
         FidelityError,
         {
             **row,
-            "label": checked_record(ResponseLabel, row["label"]),
             "seconds": _number(row["seconds"]),
             "error": {of: _number(v) for of, v in row["error"].items()},
             "velocity": {of: _number(v) for of, v in row["velocity"].items()},
@@ -139,11 +137,10 @@ def _compared(row: Mapping[str, Any]) -> FidelityError:
 
 
 def _truth(piece: Mapping[str, Any]) -> Truth:
-    return checked_record(
+    return read_record(
         Truth,
         {
             **piece,
-            "label": checked_record(ResponseLabel, piece["label"]),
             "error": _number(piece["error"]),
             "velocity": _number(piece["velocity"]),
         },

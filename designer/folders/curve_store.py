@@ -8,44 +8,33 @@ from dataclasses import dataclass
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.parquet_entry import ParquetCodec
+from designer.base.parquet_entry import ParquetCodec, columns_of
 from designer.base.si_unit import Unit
-from designer.bifurcations.border_curve import BorderCurve, CurveOrigin, read_curve
+from designer.bifurcations.border_curve import BorderCurve, CurveMeeting, CurveOrigin, read_curve
 from designer.bifurcations.border_curves import BLOCKS
+from designer.bifurcations.curve_switch import OtherCurve
+from designer.bifurcations.grazing_contact import GrazingContact
 from designer.folders.work_files import WorkFiles
 
-_TOUCH = pa.struct(
-    [
-        ("clearance", pa.int64()),
-        ("side", pa.int64()),
-        ("tip", pa.bool_()),
-        ("phase", pa.float64()),
-        ("size", pa.float64()),
-    ]
-)
-_OTHER = pa.struct(
-    [
-        ("kind", pa.string()),
-        ("n", pa.int64()),
-        ("state", pa.list_(pa.float64())),
-        ("stable", pa.bool_()),
-        ("touch", _TOUCH),
-    ]
-)
-_VALUES = ("values", pa.list_(pa.float64()))
-_MEETING = pa.struct([("kind", pa.string()), _VALUES, ("other", _OTHER)])
-_ORIGIN = pa.struct([("curve", pa.int64()), ("kind", pa.string()), _VALUES])
+_TOUCH = [
+    *columns_of(GrazingContact, "clearance side tip".split()),
+    *columns_of(OtherCurve, "phase size".split()),
+]
+_OTHER = [
+    *columns_of(OtherCurve, "kind n state stable".split()),
+    pa.field("touch", pa.struct(_TOUCH)),
+]
+_KIND, _VALUES = pa.field("kind", pa.string()), *columns_of(CurveMeeting, ["values"])
+_MEETING = pa.struct([_KIND, _VALUES, pa.field("other", pa.struct(_OTHER))])
+_ORIGIN = pa.struct([*columns_of(CurveOrigin, ["curve"]), _KIND, _VALUES])
 _CODEC = ParquetCodec(
     pa.schema(
         [
-            ("kind", pa.string()),
-            ("response", pa.string()),
-            ("symmetric", pa.bool_()),
-            ("points", pa.list_(pa.list_(pa.float64()))),
-            ("stable", pa.list_(pa.bool_())),
-            ("ends", pa.list_(pa.string())),
-            ("codimension_two", pa.list_(_MEETING)),
-            ("begun_at", _ORIGIN),
+            *columns_of(BorderCurve, "kind response symmetric".split()),
+            pa.field("points", pa.list_(pa.list_(pa.float64()))),
+            *columns_of(BorderCurve, "stable ends".split()),
+            pa.field("codimension_two", pa.list_(_MEETING)),
+            pa.field("begun_at", _ORIGIN),
         ]
     )
 )

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pyarrow as pa
 
 from designer.base.csv_tables import csv_text
-from designer.base.parquet_entry import ParquetCodec, Rows
-from designer.base.record_check import checked_record
+from designer.base.parquet_entry import ParquetCodec, Rows, columns_of
+from designer.base.record_check import read_record
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares, SharePlan, Step
-from designer.dynamics.orbit import OrbitStatus
 from designer.folders.work_files import WorkFiles
 
-_COLUMNS = [
-    ("attractor", pa.int64()),
-    ("status", pa.string()),
-    ("n", pa.int64()),
-    ("p", pa.int64()),
-    ("q", pa.int64()),
-    ("more", pa.list_(pa.list_(pa.int64()))),
-    ("symmetric", pa.bool_()),
-    ("twin", pa.int64()),
-    ("count", pa.int64()),
-    ("strobes", pa.list_(pa.list_(pa.float64()))),
-]
+_COLUMNS = columns_of(
+    AttractorShare, "attractor status n p q more symmetric twin count strobes".split()
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +44,9 @@ class ShareBlocks:
         def steps(rows: Rows) -> list[Step]:
             by_value: dict[float, list[AttractorShare]] = {}
             for row in map(dict, rows):
-                by_value.setdefault(row.pop(self.parameter), []).append(_read(row))
+                by_value.setdefault(row.pop(self.parameter), []).append(
+                    read_record(AttractorShare, row)
+                )
             return [tuple(step) for step in by_value.values()]
 
         return self.files.read(self.name(block), self._codec, steps, block=block)
@@ -71,14 +62,7 @@ class ShareBlocks:
 
     @property
     def _codec(self) -> ParquetCodec:
-        return ParquetCodec(pa.schema([(self.parameter, pa.float64()), *_COLUMNS]))
-
-
-def _read(row: dict[str, Any]) -> AttractorShare:
-    row["status"] = OrbitStatus(row["status"])
-    for key in ("more", "strobes"):
-        row[key] = tuple(map(tuple, row[key]))
-    return checked_record(AttractorShare, row)
+        return ParquetCodec(pa.schema([pa.field(self.parameter, pa.float64()), *_COLUMNS]))
 
 
 def shares_csv(shares: BasinShares) -> str:

@@ -9,40 +9,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from designer.base.arrays import Array
-from designer.base.parquet_entry import ParquetCodec, Rows
-from designer.base.record_check import checked_record
+from designer.base.parquet_entry import ParquetCodec, Rows, columns_of
+from designer.base.record_check import read_record
 from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import BLOCK, Sweep
-from designer.dynamics.orbit import Motion, OrbitStatus
+from designer.dynamics.orbit import Motion
 from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.work_files import WorkFiles
 
 RULES = 3
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
-_COLUMNS = [
-    ("status", pa.string()),
-    ("n", pa.int64()),
-    ("p", pa.int64()),
-    ("q", pa.int64()),
-    ("symmetric", pa.bool_()),
-    ("lyapunov", pa.float64()),
-    ("lyapunov_error", pa.float64()),
-    ("radius", pa.float64()),
-    ("start", pa.list_(pa.float64())),
-    ("end", pa.list_(pa.float64())),
-    ("minima", pa.list_(pa.float64())),
-    ("velocities", pa.list_(pa.float64())),
-    ("periods", pa.int64()),
-]
-
-_MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
+_STEP = columns_of(
+    SteadyMotion,
+    "status n p q symmetric lyapunov lyapunov_error radius start end minima velocities "
+    "periods".split(),
+)
+_CELL = columns_of(MapCell, "status n p q symmetric lyapunov strobe".split())
+_MORE = pa.schema(columns_of(MapCell, ["more"]))
 """The column of systems with more clearances than one."""
-_FURTHER = pa.schema([*_MORE, ("further", pa.list_(pa.list_(pa.float64())))])
-"""The columns of sweeps that show more stops than one."""
+_FURTHER = pa.schema(columns_of(SteadyMotion, ["more", "further"]))
+"""The same, and the column of sweeps that show more stops than one."""
 
 
 def work_hash(settings: Mapping[str, Any]) -> str:
@@ -70,7 +59,7 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
 
 
 def _sweep_codec(parameter: str, most: int) -> ParquetCodec:
-    schema = pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
+    schema = pa.schema([pa.field("track", pa.string()), pa.field(parameter, pa.float64()), *_STEP])
     return ParquetCodec(schema, _FURTHER, most)
 
 
@@ -84,19 +73,6 @@ def _rows(
 
 def _columns(motion: Motion) -> dict[str, Any]:
     return {**motion.__dict__, "status": str(motion.status)}
-
-
-def _named(row: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``_columns`` says otherwise than the record does."""
-    more = tuple((p, q) for p, q in row.get("more") or ())
-    return {"status": OrbitStatus(row["status"]), "more": more}
-
-
-def _numbers(values: Sequence[float]) -> Array:
-    """An array of a list; TypeError where a value is missing."""
-    if None in values:
-        raise TypeError("a list with nothing in a place")
-    return np.array(values, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -123,11 +99,7 @@ class SweepStore:
         out = []
         for row in map(dict, rows):
             del row["track"], row[self.parameter]
-            row.update(_named(row))
-            for key in ("start", "end", "minima", "velocities"):
-                row[key] = _numbers(row[key])
-            row["further"] = tuple(map(_numbers, row.get("further") or ()))
-            out.append(checked_record(SteadyMotion, row))
+            out.append(read_record(SteadyMotion, row))
         return out
 
     def write(
@@ -168,9 +140,7 @@ class GridStore:
             out = []
             for each in map(dict, rows):
                 del each[self.x], each[self.y]
-                each.update(_named(each))
-                each["strobe"] = tuple(each["strobe"])
-                out.append(checked_record(MapCell, each))
+                out.append(read_record(MapCell, each))
             if [(cell.i, cell.j) for cell in out] != [(row, j) for j in range(len(self.xs))]:
                 raise ValueError("cells of other places")
             return out
@@ -187,14 +157,6 @@ class GridStore:
 
     @property
     def _codec(self) -> ParquetCodec:
-        schema = pa.schema(
-            [
-                ("i", pa.int64()),
-                ("j", pa.int64()),
-                (self.x, pa.float64()),
-                (self.y, pa.float64()),
-                *_COLUMNS[:6],
-                ("strobe", pa.list_(pa.float64())),
-            ]
-        )
+        at = [pa.field(name, pa.float64()) for name in (self.x, self.y)]
+        schema = pa.schema([*columns_of(MapCell, "ij"), *at, *_CELL])
         return ParquetCodec(schema, _MORE, len(self.xs))

@@ -41,6 +41,7 @@ from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import period_of
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.curve_store import CurveBlocks, curves_csv
@@ -327,7 +328,7 @@ def _curve_files(
     from designer.plots import curve_plots
 
     assert work.curves is not None
-    labels = [(w.response, w.low, w.high) for w in swept.windows if window_ends.period(w)]
+    labels = [(w.response, w.low, w.high) for w in swept.windows if period_of(w.response)]
     picture = curve_plots.curves(curves, work.curves, work.title, labels, region)
     table = curves_csv(curves, work.curves.first, work.curves.second, swept.plan.subject.si)
     return {"curves.csv": table, **image_files("curves", picture)}

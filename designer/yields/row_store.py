@@ -8,20 +8,20 @@ that was damaged since is not taken (``base.keyed_store``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_type_hints
+from typing import Any, Generic, TypeVar
 
 import pyarrow as pa
 
 from designer.base.atomic_write import appearing
 from designer.base.keyed_store import KeyedStore, Vouch, nobody
-from designer.base.parquet_entry import MOST_ROWS, ParquetCodec, Rows
+from designer.base.parquet_entry import MOST_ROWS, ParquetCodec, Rows, columns_of
 from designer.base.progress import quiet
-from designer.base.record_check import checked_record
+from designer.base.record_check import read_record
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.verdicts.cross_check import UNDECIDED, CrossCheck, StartKind
@@ -29,14 +29,6 @@ from designer.verdicts.verdict import BLOCK, BoardRow
 
 Row = TypeVar("Row", bound=BoardRow | CrossCheck)
 FORMAT = 2
-_TYPES: dict[type, pa.DataType] = {
-    bool: pa.bool_(),
-    int: pa.int64(),
-    float: pa.float64(),
-    str: pa.string(),
-}
-
-
 _WORDS = {*OrbitStatus, UNDECIDED, ""}
 """What a response is called that has no n-p-q."""
 
@@ -79,7 +71,7 @@ class BlockStore(Generic[Row]):
         self._omegas, self._guard, self._note = omegas, guard, note
         self._labels = labels
         self._noted = 0
-        self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
+        self._names = [f.name for f in fields(row)]
         most = size * len(StartKind) * len(omegas) if omegas else MOST_ROWS
         codec = ParquetCodec(self._schema_of(), most=most)
         self._store: KeyedStore[Rows] = KeyedStore(root, codec, note, vouch, self._write)
@@ -141,13 +133,12 @@ class BlockStore(Generic[Row]):
 
     def _schema_of(self) -> pa.Schema:
         columns = []
-        for name, kind in self._hints.items():
-            plain = str if issubclass(kind, StrEnum) else kind
-            columns.append((name, _TYPES[plain]))
-            if name == "sample" and self._labels:
-                columns.append(("board", pa.string()))
-            if name == "question" and self._omegas:
-                columns.append(("omega", pa.float64()))
+        for column in columns_of(self._row, self._names):
+            columns.append(column)
+            if column.name == "sample" and self._labels:
+                columns.append(pa.field("board", pa.string()))
+            if column.name == "question" and self._omegas:
+                columns.append(pa.field("omega", pa.float64()))
         return pa.schema(columns)
 
     def _columns(self, row: Row) -> dict[str, Any]:
@@ -163,7 +154,7 @@ class BlockStore(Generic[Row]):
 
     def _rows_of(self, block: range, stored: Rows) -> list[Row]:
         """The rows of a file; ValueError where they are not such as a study writes."""
-        rows = [self._row_of(values) for values in stored]
+        rows = [read_record(self._row, {n: row[n] for n in self._names}) for row in stored]
         first = block.start // self.size * self.size
         for row in rows:
             if not first <= row.sample < first + self.size:
@@ -176,12 +167,3 @@ class BlockStore(Generic[Row]):
         if len(set(keys)) < len(keys):
             raise ValueError("two rows of one sample")
         return rows
-
-    def _row_of(self, values: Mapping[str, Any]) -> Row:
-        return checked_record(
-            self._row,
-            {
-                name: kind(values[name]) if issubclass(kind, StrEnum) else values[name]
-                for name, kind in self._hints.items()
-            },
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Literal
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from designer.base.arrays import Array, Mask
-from designer.base.record_check import checked_record
+from designer.base.record_check import checked_record, read_record
 
 
 class Colour(StrEnum):
@@ -88,3 +88,41 @@ def test_a_field_too_many_or_too_few() -> None:
         checked_record(Outer, {**WHOLE, "other": 1})
     with pytest.raises(TypeError):
         checked_record(Outer, {key: WHOLE[key] for key in WHOLE if key != "count"})
+
+
+PLAIN: dict[str, Any] = {
+    **WHOLE,
+    "colour": "red",
+    "pairs": [[1, 2], [3, 4]],
+    "ends": ["a", 1],
+    "inner": {"size": 1.0},
+    "numbers": [0.5, 2],
+}
+"""The same as JSON and Parquet hold it."""
+
+
+def test_a_record_is_read_from_plain_data() -> None:
+    read, wanted = read_record(Outer, PLAIN), Outer(**WHOLE)
+    assert read.numbers.tolist() == [0.5, 2.0]
+    assert read.numbers.dtype == float
+    assert replace(read, numbers=wanted.numbers) == wanted
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("colour", "blue"),
+        ("colour", None),
+        ("pairs", [[1, 2, 3]]),
+        ("pairs", [[1, None]]),
+        ("ends", ["a"]),
+        ("inner", {"size": None}),
+        ("inner", {"width": 1.0}),
+        ("numbers", [0.5, None]),
+        ("numbers", ["a"]),
+        ("size", "1.5"),
+    ],
+)
+def test_plain_data_of_other_types_make_none(key: str, value: Any) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        read_record(Outer, {**PLAIN, key: value})

@@ -20,6 +20,7 @@ from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.bifurcations.windows import NOT_LOCATED
 from designer.cli import entry
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import period_of
 from designer.dynamics.steady_state import TransientSettings
 from designer.model.driven import model_flow
 from designer.model.model_file import read_model_file
@@ -238,7 +239,7 @@ def test_every_end_of_a_drawn_system(tmp_path: Path) -> None:
     system, _ = mechanism_of(tmp_path / "drawn.toml", 1.0)
     seen = set()
     for window, pair in zip(made.windows, found.ends, strict=True):
-        assert (pair is None) == (not window_ends.period(window))
+        assert (pair is None) == (not period_of(window.response))
     for end in ends(found):
         if end.kind in (window_ends.NOT_SOUGHT, End.LIMIT):
             continue

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from designer.bifurcations import basin_shares, border_curves, parameter_map, sweep
@@ -110,6 +111,12 @@ class _Sweep:
         return repr([step.__dict__ for step in made.steps["down"]])
 
     path = SweepStore.name("down", 0)
+    columns = (
+        "track: string, omega: double, status: string, n: int64, p: int64, q: int64, "
+        "symmetric: bool, lyapunov: double, lyapunov_error: double, radius: double, "
+        "start: list<element: double>, end: list<element: double>, minima: list<element: double>, "
+        "velocities: list<element: double>, periods: int64"
+    )
 
 
 class _Map:
@@ -141,6 +148,10 @@ class _Map:
         return parameter_map.run(MapPlan(SUBJECT, *AXES), store=self.store(folder, notes)).cells
 
     path = GridStore.name("map", 0)
+    columns = (
+        "i: int64, j: int64, omega: double, b: double, status: string, n: int64, p: int64, "
+        "q: int64, symmetric: bool, lyapunov: double, strobe: list<element: double>"
+    )
 
 
 class _Shares:
@@ -174,6 +185,11 @@ class _Shares:
         return basin_shares.run(SHARES, store=self.store(folder, notes)).steps
 
     path = ShareBlocks.name(0)
+    columns = (
+        "omega: double, attractor: int64, status: string, n: int64, p: int64, q: int64, "
+        "more: list<element: list<element: int64>>, symmetric: bool, twin: int64, count: int64, "
+        "strobes: list<element: list<element: double>>"
+    )
 
 
 class _Curves:
@@ -234,6 +250,15 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     assert work.run(folder, notes) == first
     assert notes == []
     return work, folder, first, (folder / work.path).read_bytes()
+
+
+def test_blocks_have_the_columns_of_earlier_versions(made: Any) -> None:
+    """Otherwise what those stored is not read."""
+    work, folder, _, content = made
+    if not isinstance(work, _Curves):
+        (folder / work.path).write_bytes(content)
+        schema = pq.read_schema(folder / work.path)
+        assert ", ".join(f"{column.name}: {column.type}" for column in schema) == work.columns
 
 
 def test_what_is_no_record_is_damage(made: Any) -> None:
