@@ -174,7 +174,7 @@ def curved_laws(model: MechanicalModel) -> tuple[CurvedLaw, ...]:
 def _of_spring(model: LumpedSystem, element: NonlinearElement, curve: SmoothLaw) -> CurvedLaw:
     upper = [(0.0, 0.0), *(point for point in element.corners if point[0] > 0.0)]
     return CurvedLaw(
-        element.joins or (),
+        element.between or (),
         curve.span,
         model.row_of(element.factors),
         (0.0, 0.0),

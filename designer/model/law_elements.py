@@ -76,7 +76,6 @@ class SmoothLaw:
     """Of the pieces, over the largest force in the span."""
 
 
-@dataclass(frozen=True)
 class NonlinearElement(FileTable, ABC):
     """An element whose force is a continuous piecewise-linear function of one displacement or one
     velocity: what every kind has."""
@@ -89,11 +88,8 @@ class NonlinearElement(FileTable, ABC):
     """What it is called in a sketch, such as "cubic spring"; the last word where names have it."""
     PARAMETERS: ClassVar[Mapping[str, LawNumber]] = {}
     """Those that a sweep may change, by their keys; the first stands beside it in a drawing."""
-
-    @property
-    @abstractmethod
-    def joins(self) -> tuple[str, str] | None:
-        """The two bodies that it joins; None of a combination of masses."""
+    between: tuple[str, str] | None
+    """The two bodies that it connects, a field of each kind; None of a combination of masses."""
 
     @property
     @abstractmethod
@@ -108,19 +104,19 @@ class NonlinearElement(FileTable, ABC):
     @property
     def factors(self) -> Mapping[str, float]:
         """What that is the sum of: a factor for each body, ground left out of it or not."""
-        assert self.joins is not None
-        first, second = self.joins
+        assert self.between is not None
+        first, second = self.between
         return {first: 1.0, second: -1.0}
 
     @property
-    def between_them(self) -> str:
-        """The bodies that it joins as a part of its name."""
-        return "-".join(self.joins or ())
+    def bodies(self) -> str:
+        """The two bodies as a part of its name, such as "a-ground"."""
+        return "-".join(self.between or ())
 
     @property
-    def called(self) -> str:
+    def law_name(self) -> str:
         """Its name among all laws; a second one between the same bodies gets a number."""
-        return f"{self.between_them}.{self.WORDS.split()[0]}"
+        return f"{self.bodies}.{self.WORDS.split()[0]}"
 
     @property
     def drawn(self) -> Literal["spring", "damper", "friction"]:
@@ -208,15 +204,11 @@ class Law(NonlinearElement):
     these factors."""
 
     @property
-    def joins(self) -> tuple[str, str] | None:
-        return self.between
-
-    @property
     def factors(self) -> Mapping[str, float]:
         return dict(self.of or ()) if self.between is None else super().factors
 
     @property
-    def called(self) -> str:
+    def law_name(self) -> str:
         return self.name
 
     @property
@@ -285,10 +277,6 @@ class CubicSpring(NonlinearElement):
         return cubic_error(self.k1, self.k3, self.range, self.count or MOST_POINTS)
 
     @property
-    def joins(self) -> tuple[str, str]:
-        return self.between
-
-    @property
     def quantity(self) -> Quantity:
         return "displacement"
 
@@ -307,7 +295,7 @@ class CubicSpring(NonlinearElement):
         )
 
     def check(self) -> None:
-        field = f"cubic_spring {self.between_them}"
+        field = f"cubic_spring {self.bodies}"
         for key in ("k1", "k3", "range"):
             check_size(f"{field}.{key}", getattr(self, key))
         if self.points is not None and self.error is not None:
@@ -345,10 +333,6 @@ class Friction(NonlinearElement):
     """Of the surface that the first body slides on, as that of a belt."""
 
     @property
-    def joins(self) -> tuple[str, str]:
-        return self.between
-
-    @property
     def quantity(self) -> Quantity:
         return "velocity"
 
@@ -367,7 +351,7 @@ class Friction(NonlinearElement):
         return tuple((x + self.speed, force) for x, force in points)
 
     def check(self) -> None:
-        field = f"friction {self.between_them}"
+        field = f"friction {self.bodies}"
         if (self.static is None) != (self.stribeck is None):
             key = "static" if self.static is None else "stribeck"
             refuse(f"{field}.{key}", MISSING, "both static and stribeck, or neither")

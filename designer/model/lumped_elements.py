@@ -371,21 +371,16 @@ class Elements:
     """What a system is made of."""
 
     masses: tuple[Mass, ...]
-    """The masses."""
     springs: tuple[Spring, ...] = ()
-    """The springs."""
     dampers: tuple[Damper, ...] = ()
-    """The dampers."""
     gaps: tuple[Gap, ...] = ()
     """The clearances, in the order in which n-p-q names them."""
     forces: tuple[Force, ...] = ()
-    """The forces."""
     base: MovingBase | None = None
     """How the ground moves; None where it rests."""
     laws: tuple[Law, ...] = ()
     """The laws that are given point by point."""
     cubic_springs: tuple[CubicSpring, ...] = ()
-    """The cubic springs."""
     frictions: tuple[Friction, ...] = ()
     """Dry friction."""
     matrices: Matrices | None = None
@@ -399,7 +394,7 @@ class Elements:
         found, met = dict[str, NonlinearElement](), Counter[str]()
         for kind in KINDS:
             for element in getattr(self, kind.LIST):
-                name = element.called
+                name = element.law_name
                 met[name] += 1
                 found[name if met[name] == 1 else f"{name}{met[name]}"] = element
         return found
@@ -483,15 +478,11 @@ class Elements:
 def joined_by(element: NonlinearElement | Gap) -> tuple[str, ...]:
     """The bodies that the force of an element joins; a combination of masses stands on ground."""
     names = tuple(element.factors)
-    return names if _bodies(element) is not None else (*names, GROUND)
+    return names if element.between is not None else (*names, GROUND)
 
 
 def words_of(element: NonlinearElement | Gap) -> str:
     """What an element is between, or of what combination."""
-    if (bodies := _bodies(element)) is not None:
-        return " to ".join(bodies)
+    if element.between is not None:
+        return " to ".join(element.between)
     return " ".join(f"{factor:+g} {name}" for name, factor in element.factors.items())
-
-
-def _bodies(element: NonlinearElement | Gap) -> tuple[str, str] | None:
-    return element.between if isinstance(element, Gap) else element.joins

@@ -120,7 +120,7 @@ def _joints(system: Elements) -> Iterable[tuple[str, tuple[str, ...]]]:
     for gap in system.gaps:
         yield ("clearance.of" if gap.between is None else "clearance.between"), joined_by(gap)
     for law in system.nonlinear.values():
-        yield f"{law.TABLE}.{'of' if law.joins is None else 'between'}", joined_by(law)
+        yield f"{law.TABLE}.{'of' if law.between is None else 'between'}", joined_by(law)
     if system.matrices is not None:
         yield from (("matrices", pair) for pair in system.matrices.coupled)
 
@@ -497,7 +497,7 @@ class LumpedSystem(Elements):
             "gaps": [gap.name for gap in self.gaps],
             "forces": [force.on for force in self.forces],
             "base": ["base"] if self.base is not None else [],
-            **{k.LIST: [e.between_them for e in self._elements(k.LIST)] for k in KINDS},
+            **{k.LIST: [e.bodies for e in self._elements(k.LIST)] for k in KINDS},
         }
         return {
             f"{name}.{key}": (group, index, key)

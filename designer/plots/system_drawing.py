@@ -39,7 +39,7 @@ _LANE, _DEEP = 3.0, 1.7
 _LINE = 0.8
 """Height of a line of text below it."""
 _SHIFT = 0.35
-"""Between the rods of clearances on one mass."""
+"""Distance between the rods of clearances on one mass."""
 _GAP, _STOP = 1.3, 2.3
 """From a rod to a plate, and length of a stop's spring."""
 
@@ -61,7 +61,7 @@ class _Page(MechanicalSheet):
         self.combinations = [
             f"{symbol}({law_variable(model, element)})"
             for symbol, element in self._laws()
-            if element.joins is None
+            if element.between is None
         ]
         self.combinations += [f"{g.name}: {words_of(g)}" for g in model.gaps if g.between is None]
         self._sort()
@@ -79,7 +79,7 @@ class _Page(MechanicalSheet):
         """What joins two bodies, clearances left out, by symbols."""
         springs: dict[str, Spring] = dict(self._numbered("k", self.model.shown_springs))
         dampers: dict[str, Damper] = dict(self._numbered("c", self.model.shown_dampers))
-        return {**springs, **dampers, **{s: e for s, e in self._laws() if e.joins is not None}}
+        return {**springs, **dampers, **{s: e for s, e in self._laws() if e.between is not None}}
 
     def _numbered(self, letter: str, joints: Sequence[T]) -> Iterator[tuple[str, T]]:
         """Springs or dampers by their symbols; those that make a matrix have none in the table, so
@@ -95,7 +95,7 @@ class _Page(MechanicalSheet):
     def _sort(self) -> None:
         """What stands between neighbours, at the right of each place of the row, and what below."""
         for symbol, joint in self.joints.items():
-            left, right = self._ends(_bodies(joint))
+            left, right = self._ends(joint.between or ())
             (self.between[left] if right == left + 1 else self.below).append(symbol)
         for place, name in enumerate(self.row):
             forced = [f"force {name}"] if self._force(name) else []
@@ -201,7 +201,7 @@ class _Page(MechanicalSheet):
 
     def _under(self, y: float, symbol: str) -> None:
         """A joint of what are no neighbours, below the row."""
-        left, right = self._ends(_bodies(self.joints[symbol]))
+        left, right = self._ends(self.joints[symbol].between or ())
         x0 = self._middle(left) + (0.3 * _WIDTH if left else 0.0)
         x1 = self._middle(right) - 0.3 * _WIDTH
         for x, place in ((x0, left), (x1, right)):
@@ -210,7 +210,7 @@ class _Page(MechanicalSheet):
         self._joint(x0, x1, y, symbol)
 
     def _shift(self, number: int) -> float:
-        """Of a clearance's rod from the middle of its mass, where that carries several."""
+        """Distance of a clearance's rod from the middle of its mass, where that carries several."""
         return 0.0 if self._alone(self.gaps[number]) else _SHIFT * (number % 3 - 1)
 
     def _alone(self, gap: Gap) -> bool:
@@ -264,8 +264,3 @@ class _Page(MechanicalSheet):
         spans = [end for _, end in ends]
         self.line([min(*spans, x), max(*spans, x)], [high, high], INK, 1.2)
         self.line([x, x], [self.top, high], INK, 1.2)
-
-
-def _bodies(joint: Joint) -> tuple[str, ...]:
-    """What a joint stands between."""
-    return joint.joins or () if isinstance(joint, NonlinearElement) else joint.between

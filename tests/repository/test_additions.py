@@ -117,10 +117,6 @@ class Drag(NonlinearElement):
     speed: Annotated[float, physical("m/s")]
 
     @property
-    def joins(self) -> tuple[str, str]:
-        return self.between
-
-    @property
     def quantity(self) -> Quantity:
         return "velocity"
 
@@ -130,7 +126,7 @@ class Drag(NonlinearElement):
         return tuple((v, self.factor * abs(v) * v) for v in places)
 
     def check(self) -> None:
-        check_size(f"drag {self.between_them}.factor", self.factor)
+        check_size(f"drag {self.bodies}.factor", self.factor)
 
 
 KINDS: tuple[type[NonlinearElement], ...] = (Law, CubicSpring, Friction, Drag)
