@@ -28,9 +28,7 @@ class OrderStage(str):
 
 ORDERS = "fabrication"
 """Folder of what fabs are sent, one folder in it for each."""
-_Fixed = Literal[
-    "search",
-    "design",
+_OfDesign = Literal[
     "kicad",
     "deck-ltspice",
     "deck-portable",
@@ -40,27 +38,14 @@ _Fixed = Literal[
     "trade",
     "confirmation",
     "cure",
-    "sweep",
-    "map",
-    "basins",
     "rules",
 ]
+_Fixed = Literal["search", "design", _OfDesign, "sweep", "map", "basins"]
 StageName = _Fixed | OrderStage
 STAGES: tuple[StageName, ...] = get_args(_Fixed)
 Stages = dict[StageName, tuple[dict[str, Any], list[str]]]
 """Stages as a folder is asked for them: inputs, and names of files, by name."""
-OF_DESIGN: tuple[StageName, ...] = (
-    "kicad",
-    "deck-ltspice",
-    "deck-portable",
-    "study",
-    "measured",
-    "comparison",
-    "trade",
-    "confirmation",
-    "cure",
-    "rules",
-)
+OF_DESIGN: tuple[StageName, ...] = get_args(_OfDesign)
 """Stages that depend on the design, and on it alone."""
 
 
@@ -100,7 +85,6 @@ class Manifest:
     """What a design folder's ``manifest.json`` says."""
 
     stages: dict[str, ManifestStage] = field(default_factory=dict)
-    """The stages by name."""
     files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     """(stage, hash or None while unfinished) by file name."""
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -190,7 +190,6 @@ class FileLinks:
     """Links to files that stand beside the page."""
 
     names: tuple[str, ...]
-    """Names of the files."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +197,6 @@ class PageSection:
     """A heading with what stands below it."""
 
     title: str
-    """The heading."""
     blocks: Sequence[Block]
     """Paragraphs, tables, pictures, sections of the next level; None stands for nothing."""
     anchor: str = ""
@@ -251,6 +249,11 @@ class Page:
     def linked(self) -> list[PageSection]:
         """The sections of the table of contents, in their order."""
         return [one for section in self.sections for one in section.linked]
+
+
+def titled(title: str, block: Block) -> PageSection | None:
+    """A section of one block; None where there is none."""
+    return None if block is None else PageSection(title, [block])
 
 
 def bullets(texts: Iterable[str]) -> Items:

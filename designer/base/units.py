@@ -112,6 +112,11 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
 
 
+def axis_label(quantity: str, unit: str) -> str:
+    """What stands at an axis; the unit in brackets where there is one."""
+    return f"{quantity} [{unit}]" if unit else quantity
+
+
 def restated(value: float, unit: str, like: str) -> str:
     """``value`` in the unit and prefix of another text of this unit, in no more digits than it
     takes to read it back: 5.5e-4, "m" is "0.55 mm" like "0.4 mm", "550µm" like "400µm"."""
@@ -290,7 +295,6 @@ class _PowerCode:
     """Digits, and one character for the power of ten."""
 
     digits: int
-    """Number of digits."""
     powers: str
     """The character of each power, from ``least`` on."""
     least: int

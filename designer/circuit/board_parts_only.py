@@ -16,7 +16,6 @@ class SupplyCapacitor:
     """A capacitor between the rails, or between a rail and ground."""
 
     name: str
-    """Its name in the circuit."""
     plus: str
     """The higher net."""
     minus: str
@@ -24,11 +23,9 @@ class SupplyCapacitor:
     value: float
     """Capacitance [F]."""
     role: str
-    """What it is for, in words."""
     package: str = ""
     """The op-amp package at whose supply pin it stands; "" for the board's bulk."""
     views: View = View.FITTED
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -40,7 +37,6 @@ class SupplyDiode:
     """A diode between the supply's connector and a rail, which blocks the wrong polarity."""
 
     name: str
-    """Its name in the circuit."""
     anode: str
     """Net of the anode."""
     cathode: str
@@ -52,9 +48,7 @@ class SupplyDiode:
     drop: float
     """Most that it drops at the current that the op-amps draw [V]."""
     role: str
-    """What it is for, in words."""
     views: View = View.FITTED
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -71,15 +65,12 @@ class Connector:
     """A row of pins, or a coaxial jack."""
 
     name: str
-    """Its name in the circuit."""
     ways: tuple[str, ...]
     """Nets of pins 1, 2, …; of a jack the signal's and the shell's."""
     role: str
-    """What it is for, in words."""
     series: str = ""
     """The series of a coaxial jack, "sma" or "bnc"; "" of a row of pins."""
     views: View = View.FITTED
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -93,13 +84,10 @@ class TestPoint:
     __test__ = False  # no test class, whatever its name begins with
 
     name: str
-    """Its name in the circuit."""
     net: str
     """The net that it carries."""
     role: str
-    """What it is for, in words."""
     views: View = View.BOARD
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -111,7 +99,6 @@ class Trimmer:
     """A trimming potentiometer."""
 
     name: str
-    """Its name in the circuit."""
     low: str
     """Net of the track's lower end."""
     wiper: str
@@ -121,9 +108,7 @@ class Trimmer:
     value: float
     """Resistance of the track [ohm]."""
     role: str
-    """What it is for, in words."""
     views: View = View.FITTED
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:

@@ -75,7 +75,6 @@ class Resistor:
     """A resistor."""
 
     name: str
-    """Its name in the circuit."""
     a: str
     """Net of one end."""
     b: str
@@ -83,9 +82,7 @@ class Resistor:
     value: float
     """Resistance [ohm]."""
     role: str
-    """What it is for, in words."""
     views: View = View.EVERYWHERE
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -98,7 +95,6 @@ class Capacitor:
     states (``Circuit.dependent_capacitors``)."""
 
     name: str
-    """Its name in the circuit."""
     plus: str
     """Net of the end where its voltage counts as positive."""
     minus: str
@@ -106,9 +102,7 @@ class Capacitor:
     value: float
     """Capacitance [F]."""
     role: str
-    """What it is for, in words."""
     views: View = View.EVERYWHERE
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -128,11 +122,9 @@ class Section:
     output: str
     """Net of the output."""
     role: str
-    """What it is for, in words."""
     limits: bool = False
     """Whether it is meant to reach its output limits (the dead-zone stage)."""
     views: View = View.EVERYWHERE
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def package(self) -> str:
@@ -148,19 +140,15 @@ class Diode:
     """A diode."""
 
     name: str
-    """Its name in the circuit."""
     anode: str
     """Net of the anode."""
     cathode: str
     """Net of the cathode."""
     model: DiodeModel
-    """Its curve."""
     rest: bool
     """Whether it conducts with every displacement at zero."""
     role: str
-    """What it is for, in words."""
     views: View = View.EVERYWHERE
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -172,7 +160,6 @@ class Reference:
     """A shunt reference; without ``least`` and ``impedance`` it is a source."""
 
     name: str
-    """Its name in the circuit."""
     cathode: str
     """Net of the cathode."""
     anode: str
@@ -184,13 +171,11 @@ class Reference:
     model: str
     """Its name in the catalogue."""
     role: str
-    """What it is for, in words."""
     least: float = 0.0
     """Current that it needs [A]."""
     impedance: float = 0.0
     """Dynamic impedance [ohm]."""
     views: View = View.EVERYWHERE
-    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -202,7 +187,6 @@ class Supply:
     """A rail of the power supply."""
 
     name: str
-    """Its name in the circuit."""
     net: str
     """The net that it holds."""
     volts: float
@@ -214,7 +198,6 @@ class Generator:
     """A channel of the signal generator: a voltage source from ``net`` to ground."""
 
     name: str
-    """Its name in the circuit."""
     net: str
     """The net that it drives."""
 
@@ -222,7 +205,8 @@ class Generator:
 Part = Resistor | Capacitor | Section | Diode | Reference
 """What is simulated."""
 Fitting = Part | SupplyCapacitor | SupplyDiode | Connector | TestPoint | Trimmer
-"""What may stand on the board or the bill alone, or be any part of a view."""
+"""What may stand on the board or the bill alone, or be any part of a view. ``role`` says in
+words what a part is for, ``views`` where it stands: simulated, on the board, bought."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +216,6 @@ class Circuit:
     parts: tuple[Part, ...]
     """The parts that are simulated."""
     generator: Generator
-    """The signal generator."""
     states: tuple[str, ...]
     """Capacitor names in the order of the state equations."""
     state_nets: tuple[str, ...]
@@ -271,10 +254,6 @@ class Circuit:
                 field_ = "circuit.parts" if wanted else "circuit.fittings"
                 expected = "simulated parts" if wanted else "parts that are not simulated"
                 raise InputError(None, field_, ", ".join(lost), expected)
-
-    def view(self, view: View) -> tuple[Fitting, ...]:
-        """The parts that stand in a view, simulated ones first."""
-        return tuple(p for p in (*self.parts, *self.fittings) if view in p.views)
 
     @property
     def generators(self) -> tuple[Generator, ...]:

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.errors import InputError
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
@@ -327,38 +326,6 @@ def shoot(
         if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
             return None
         last, mode = error, None
-    return None
-
-
-def shoot_symmetric(flow: Flow, x: Array, n: int) -> tuple[Array, Array] | None:
-    """A symmetric orbit of odd period n near x, by the half-period map, or None.
-
-    x(t + nT/2) = mirror · x(t); the paper's Eq. (9) is the case of one impact on each stop. Half
-    the work of ``shoot``, and it cannot leave for an asymmetric branch, so beyond a pitchfork it
-    follows the unstable symmetric orbit. Returns the point and the full monodromy matrix.
-
-    Raises
-    ------
-    InputError : n is even, or the system has no mirror.
-    """
-    mirror = flow.system.mirror
-    if n % 2 == 0 or mirror is None:
-        raise InputError(None, "n", n, "an odd period of a system with a mirror")
-    size, last = len(x), np.inf
-    peak = peaks_near(flow, x)
-    for _ in range(12):
-        run = flow.run(x, n, points=2, stretches=n, tangent=np.eye(size))
-        if run.status is not FlowStatus.DONE or run.tangent is None:
-            return None
-        step = mirror @ run.strobes[-1] - x
-        half = mirror @ run.tangent
-        error = float((np.abs(step) / peak).max())
-        if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
-            return x, half @ half
-        x = x - np.linalg.solve(half - np.eye(size), step)
-        if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
-            return None
-        last = error
     return None
 
 

@@ -9,12 +9,13 @@ from bokeh.embed import json_item
 from bokeh.models import BasicTicker, ColumnDataSource, DataRange1d, HoverTool, NoOverlap, Range1d
 from bokeh.plotting import figure
 
+from designer.base.units import axis_label
 from designer.explorer.controls import Control
 
 PLOTS = ("portrait", "trace", "strip")
 """Names of the plots, and of the elements of the page that take them."""
 MAP = "map"
-"""The same of the map, which only a page with a server has."""
+"""Name of the map and of its element, which only a page with a server has."""
 TITLES = {
     "portrait": "phase portrait",
     "trace": "displacement over time",
@@ -36,7 +37,7 @@ COLUMNS = {
 INK, FAINT, STROBE, IMPACT = "#0072b2", "#999999", "#d55e00", "#009e73"
 """Of Okabe and Ito: seen on light and on dark, and told apart by most."""
 NOW = "#767676"
-"""Of the line at the present ω: no period of the diagram has this colour."""
+"""Colour of the line at the present ω: no period of the diagram has this colour."""
 BORDERS = {"left": 72, "right": 24, "top": 10, "bottom": 50}
 """Pixels around a frame: room for labels, also at its corners, before the first are known."""
 TICKS = 5
@@ -62,19 +63,14 @@ def items(omega: Control, unit: str, least: str) -> dict[str, Any]:
     made = (
         _portrait(sources(), unit),
         _trace(sources()),
-        _strip(sources(), omega, in_unit(f"least {least}", unit)),
+        _strip(sources(), omega, axis_label(f"least {least}", unit)),
     )
     return {name: json_item(plot, ID(name)) for name, plot in zip(PLOTS, made, strict=True)}
 
 
 def map_item() -> dict[str, Any]:
-    """The same of the map of responses."""
+    """The item of the map of responses."""
     return {MAP: json_item(_map(sources()), ID(MAP))}
-
-
-def in_unit(words: str, unit: str) -> str:
-    """What an axis is called."""
-    return f"{words} [{unit}]" if unit else words
 
 
 def _empty(tools: str, **more: Any) -> figure:
@@ -115,7 +111,7 @@ def _trace(data: dict[str, ColumnDataSource]) -> figure:
     plot.hspan(y="at", source=data["stops"], color=FAINT, line_dash="dashed", line_width=1)
     plot.line("t", "x", source=data["trace"], color=INK, line_width=1.6)
     plot.scatter("t", "x", source=data["impacts"], color=IMPACT, size=8, marker="triangle")
-    plot.xaxis.axis_label, plot.yaxis.axis_label = in_unit("time", "drive periods"), "x"
+    plot.xaxis.axis_label, plot.yaxis.axis_label = "time [drive periods]", "x"
     return plot
 
 
@@ -131,7 +127,7 @@ def _strip(data: dict[str, ColumnDataSource], omega: Control, least: str) -> fig
     # The period in words too: nobody tells ten colours of small dots apart.
     tooltips = [(omega.label, f"@omega {omega.unit}"), ("period", "@period")]
     plot.add_tools(HoverTool(renderers=[points], tooltips=tooltips, limit=1))
-    plot.xaxis.axis_label = in_unit(omega.label, omega.unit)
+    plot.xaxis.axis_label = axis_label(omega.label, omega.unit)
     plot.yaxis.axis_label = least
     return plot
 

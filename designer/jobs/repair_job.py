@@ -159,7 +159,7 @@ def repair_into(
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place where something else stands
     base = read_design(path, progress=progress)
-    check_wish(base.modelfile, target, budget, without)
+    refuse_unreachable(base.modelfile, target, budget, without)
     folder = Folder(path)
     inputs = {
         "design": design_inputs_of(folder),
@@ -275,7 +275,7 @@ def _write_design(
             write_design(folder, synthesis, stages, options, progress, other)
 
 
-def check_wish(
+def refuse_unreachable(
     modelfile: ModelFile, target: float, budget: float | None, without: Collection[str]
 ) -> None:
     """Refuse what no repair of a design of this model file can reach.

@@ -68,7 +68,6 @@ class TermProgram:
     """Price class of each capacitance."""
     targets: Targets
     conditions: TermConditions
-    """The side conditions."""
     equal: Index
     """(j, 2) places of parts that must be equal."""
 
@@ -141,7 +140,8 @@ class _Tied:
     sets: tuple[int, ...]
     capacitors: frozenset[int]
 
-    def joins(self, entry: Entry) -> bool:
+    def ties(self, entry: Entry) -> bool:
+        """Whether a term ties two states that are not tied yet."""
         return self.sets[entry[0]] != self.sets[entry[1]]
 
     def after(self, entry: Entry) -> _Tied:
@@ -151,7 +151,7 @@ class _Tied:
 
     def choices(self, entry: Entry, resistors: int, capacitors: int) -> float:
         many = resistors * (1 if entry[0] in self.capacitors else capacitors)
-        return many if self.joins(entry) else many * NARROW
+        return many if self.ties(entry) else many * NARROW
 
 
 def order_of(entries: Sequence[Entry], states: int, resistors: int, capacitors: int) -> TermOrder:
@@ -179,11 +179,12 @@ def order_of(entries: Sequence[Entry], states: int, resistors: int, capacitors: 
 
 
 def _group(first: Entry, left: Sequence[Entry], tied: _Tied) -> list[Entry]:
-    """A term and what becomes narrow by it, those without a capacitor yet at the end."""
-    if not tied.joins(first):
+    """The group that is chosen with a term: itself, then the terms whose two states it ties to each
+    other, which leaves few values for them; those without a capacitor yet come last."""
+    if not tied.ties(first):
         return [first]
     now = tied.after(first)
-    narrow = [e for e in left if e != first and tied.joins(e) and not now.joins(e)]
+    narrow = [e for e in left if e != first and tied.ties(e) and not now.ties(e)]
     return [first, *sorted(narrow, key=lambda e: e[0] not in now.capacitors)]
 
 
@@ -198,7 +199,7 @@ def _rank(
         now = now.after(entry)
     # What is new: the states of the smaller of the two sets, and the capacitors.
     sets = [{i for i, n in enumerate(tied.sets) if n == tied.sets[e]} for e in group[0]]
-    states = min(sets, key=len) if tied.joins(group[0]) else set()
+    states = min(sets, key=len) if tied.ties(group[0]) else set()
     new = now.capacitors - tied.capacitors
     needed = any(a in states or b in states or a in new for a, b in rest)
     return not needed, round(float(np.log(total)), 6), work
@@ -212,7 +213,7 @@ def _earliest(group: Sequence[Entry], before: Sequence[Sequence[Entry]], tied: _
     owned = whole.capacitors & {entry[0] for entry in group}
     for number, earlier in enumerate(before):
         now = tied.after(group[0])
-        if owned <= tied.capacitors and not any(now.joins(entry) for entry in group):
+        if owned <= tied.capacitors and not any(now.ties(entry) for entry in group):
             return number
         for entry in earlier:
             tied = tied.after(entry)
@@ -235,7 +236,6 @@ class TermSearch:
     """The choices of a linear block with any pattern of terms."""
 
     question: LinearQuestion
-    """What is searched."""
     first: float = EXACT
     """The first level of error: one up to this is none."""
     growth: float = 1.3

@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 
 from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, ON_LIGHT, new_figure, styled
+from designer.base.units import axis_label
 from designer.bifurcations.attractor_list import SAME
 from designer.bifurcations.basin_shares import AttractorShare, BasinShares
 from designer.bifurcations.basins import BasinPlan, Basins
@@ -240,15 +241,15 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     labels = plan.subject.labels
     name = labels.get("displacement", f"{symbol}₁")
     text = f"least {name}\nin each period" if labels else f"least {name} in each period"
-    least.set_ylabel(_label(_wrapped(text), units.get("x", "")))
+    least.set_ylabel(axis_label(_wrapped(text), units.get("x", "")))
     for speed, stop in zip(speeds, plan.subject.stops, strict=True):
         text = f"impact velocity {stop.velocity}\non {stop.name}"
         if len(speeds) > 1:  # their panels are too low for the stop's name beside them
             heading, text = f"on {stop.name}", f"impact velocity\n{stop.velocity}"
             speed.set_title(heading, loc="left", pad=2.0, fontsize=8, color=MUTED, weight="normal")
-        speed.set_ylabel(_label(_wrapped(text), units.get("v", "")))
+        speed.set_ylabel(axis_label(_wrapped(text), units.get("v", "")))
         si_y(speed, si.get("x1'"))
-    growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
+    growth.set_ylabel(axis_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
     for axes in panels:
         axes.grid(True, color=GRID, lw=0.5)
     si_y(least, si.get("x1"))
@@ -536,7 +537,3 @@ def _attractor_colours(result: Basins) -> list[str]:
 def _wrapped(text: str) -> str:
     """A panel's label on as many lines as keep it within the panel: names may be long."""
     return "\n".join(part for line in text.split("\n") for part in wrap(line, PANEL))
-
-
-def _label(text: str, unit: str) -> str:
-    return f"{text} [{unit}]" if unit else text

@@ -17,11 +17,11 @@ from designer.base.page import (
     PageSection,
     Picture,
     SmallPrint,
-    Table,
     Verbatim,
     Widget,
     bullets,
     table,
+    titled,
 )
 from designer.base.rare_words import boards_at
 from designer.circuit.coefficients import EXACT
@@ -323,9 +323,9 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
         blocks += [
             response_tables.yield_table(data),
             pictures.get("yields"),
-            _one("Board by board", tolerance_tables.boards(data)),
+            titled("Board by board", tolerance_tables.boards(data)),
             PageSection("Does ngspice confirm?", confirmation),
-            _one("How near the boards are to the edge", pictures.get("margins")),
+            titled("How near the boards are to the edge", pictures.get("margins")),
         ]
     kinds = tolerance_tables.kinds(data)
     if kinds is not None:
@@ -335,7 +335,7 @@ def _yields(data: ReportData, pictures: Pictures) -> PageSection:
         blocks.append(
             PageSection(f"{title[0].upper()}{title[1:]}", [SmallPrint(f"Yields {within}."), kinds])
         )
-    blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
+    blocks.append(titled("Where the engines differ", tolerance_tables.differences(data)))
     return PageSection("Yields", blocks, "yields")
 
 
@@ -358,7 +358,7 @@ def _rare(data: ReportData, pictures: Pictures) -> PageSection:
             note,
             pictures.get("rare"),
             tolerance_tables.rare(data),
-            _one("Where boards are lost", tolerance_tables.loss_regions(data)),
+            titled("Where boards are lost", tolerance_tables.loss_regions(data)),
             PageSection(
                 "How far tolerances may widen", [wider, tolerance_tables.tolerance_margins(data)]
             ),
@@ -410,7 +410,7 @@ def _attribution(data: ReportData, pictures: Pictures) -> PageSection:
     if indices is not None:
         moved: list[Block] = [*_indices_note(data, attribution), indices, pictures.get("indices")]
         blocks.append(PageSection("Whose spread moves the margin", moved))
-    blocks.append(_one("Worst corners", tolerance_tables.corners(data)))
+    blocks.append(titled("Worst corners", tolerance_tables.corners(data)))
     title = "Which part is to blame?" if lost else "What comes nearest to a loss?"
     return PageSection(title, blocks, "blame", "", question_lines.attributed(data))
 
@@ -596,8 +596,3 @@ def _provenance(data: ReportData) -> PageSection:
         blocks += [again, Verbatim((data.command,))]
     blocks += [response_tables.provenance_table(data), f"Format of this file: {FORMAT}."]
     return PageSection("Provenance", blocks, "provenance")
-
-
-def _one(title: str, block: Table | Picture | Gallery | None) -> PageSection | None:
-    """A section of one block; None where there is none."""
-    return None if block is None else PageSection(title, [block])

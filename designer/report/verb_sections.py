@@ -18,6 +18,7 @@ from designer.base.page import (
     bullets,
     table,
     table_of,
+    titled,
 )
 from designer.base.si_unit import drive_text
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
@@ -107,9 +108,9 @@ def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
     heads = ("rule", "figure", "found", "limit")
     blocks: list[Block] = [
         "No board was looked at." if board is None else f"The board that was looked at: {board}.",
-        _titled("What fails", table((*heads, "what to do"), failing)),
-        _titled("What was not run", table(("rule", "why"), waiting, names=1)),
-        _titled("What holds", table(heads, holding)),
+        titled("What fails", table((*heads, "what to do"), failing)),
+        titled("What was not run", table(("rule", "why"), waiting, names=1)),
+        titled("What holds", table(heads, holding)),
         FileLinks(tuple(files)),
     ]
     return PageSection("Design rules", blocks, "rules", "", _rules_lead(answer["counts"]))
@@ -163,11 +164,6 @@ def bench_section(answers: Mapping[str, Answer]) -> PageSection:
     return PageSection("On the bench", blocks, "bench", "", line)
 
 
-def _titled(title: str, block: Block) -> PageSection | None:
-    """A section of one block; None where there is none."""
-    return None if block is None else PageSection(title, [block])
-
-
 _MEASURED = ("rate", "low", "high", "failed")
 NEEDED: Mapping[str, Sequence[str]] = {
     "cure": (
@@ -217,7 +213,8 @@ COMMANDS: Mapping[str, str] = {
 
 
 def older_section(verb: str, files: Sequence[str]) -> PageSection:
-    """In place of what an earlier version answered, with fewer figures than are shown now."""
+    """The section of an answer of an earlier version, which has fewer figures than are shown
+    now."""
     text = f"An earlier version made {files[0]}. `designer {COMMANDS[verb]}` makes it anew."
     blocks: list[Block] = [text, FileLinks(tuple(files))]
     return PageSection(verb.capitalize(), blocks, verb, "", "Of an earlier version.")

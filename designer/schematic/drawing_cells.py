@@ -48,7 +48,6 @@ class Chain:
     end: str
     """The net where they end."""
     parts: tuple[TwoPin, ...]
-    """The parts, in order."""
 
     @property
     def turned(self) -> Chain:
@@ -74,7 +73,6 @@ class Amplifier:
 
     section: Section
     title: str
-    """Title of the cell."""
     inputs: tuple[Chain, ...]
     """Chains to the summing node."""
     feedback: tuple[Chain, ...]
@@ -242,14 +240,14 @@ def board_cells(
     tied = [p.name for p in fittings if isinstance(p, Section)]
     outside = [*(circuit.supply_inputs or (POSITIVE, NEGATIVE))]
     outside.insert(1, GROUND)
-    supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in outside]
+    supply = [f"{shown_net(n)}: {', '.join(pads[n])}" for n in outside]
     behind = [n for n in (POSITIVE, NEGATIVE) if n not in outside and n in pads]
     supply += [f"{rail}: {', '.join(pads[rail])}" for rail in behind]
     supply = [*(f"{net}: {', '.join(pads[net])}" for net in circuit.generator_nets), *supply]
     for package in circuit.packages:
         pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
         if pads_of:
-            listed = ", ".join(f"{_net_name(pin)} {pad}" for pin, pad in pads_of.items())
+            listed = ", ".join(f"{shown_net(pin)} {pad}" for pin, pad in pads_of.items())
             supply.append(f"{package}: {listed}")
     if tied:
         supply.append(f"spare, followers of ground: {', '.join(tied)}")
@@ -280,5 +278,6 @@ def _pads(fittings: Sequence[Fitting]) -> dict[str, list[str]]:
     return pads
 
 
-def _net_name(net: str) -> str:
+def shown_net(net: str) -> str:
+    """The name of a net in a drawing."""
     return "GND" if net == GROUND else net

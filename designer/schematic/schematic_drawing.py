@@ -16,7 +16,7 @@ import schemdraw.elements as elm
 from designer.base.units import format_quantity
 from designer.board.component import Numbers, designator
 from designer.circuit.board_parts_only import SupplyCapacitor, SupplyDiode
-from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, Reference, Resistor
+from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor
 from designer.schematic.drawing_cells import (
     Amplifier,
     Cell,
@@ -26,6 +26,7 @@ from designer.schematic.drawing_cells import (
     board_cells,
     circuit_cells,
     role_lines,
+    shown_net,
 )
 
 _SYMBOLS: dict[type, Any] = {
@@ -44,13 +45,13 @@ ROW, LINE, PART, LABEL = 1.9, 0.7, 3.6, 1.3
 """Heights and widths in schemdraw's units, half an inch each: of a row, a line of text, a part, a
 net's name."""
 GAP, TITLE = 1.4, 1.3
-"""Between cells, and of a cell's title."""
+"""Distance between cells, and height of a cell's title."""
 NAME_SIZE, ROLE_SIZE, TITLE_SIZE = 10, 6.5, 11
 ROLE_WIDTH = 30
 """Characters of a role's line."""
 FAINT = "#5c5c5c"
 CLEAR = 0.6
-"""Between the lowest feedback's role and the op-amp."""
+"""Distance between the lowest feedback's role and the op-amp."""
 OPAMP = 2.17
 """Length of the op-amp's symbol."""
 _TAG, _DIGITS = re.compile(r"<[^>]*>"), re.compile(r"-?\d+\.\d{4,}")
@@ -132,7 +133,7 @@ class _Page:
         top = y - ROW * len(cell.feedback) - CLEAR
         after = tip if cell.series is None else tip + PART * len(cell.series.parts)
         for i, chain in enumerate(cell.inputs):
-            self.net_name(x + LABEL - 0.15, top - i * ROW, _net(chain.start), "left")
+            self.net_name(x + LABEL - 0.15, top - i * ROW, shown_net(chain.start), "left")
             self.chain(x + LABEL, top - i * ROW, node, chain)
         low = top - ROW * max(len(cell.inputs) - 1, 0)
         highest = y - 0.5 * ROW if cell.feedback else top
@@ -189,10 +190,10 @@ class _Page:
                 continue
             height = below - 0.4 * ROW
             below -= ROW
-            self.net_name(x + LABEL - 0.15, height, _net(row.start), "left")
+            self.net_name(x + LABEL - 0.15, height, shown_net(row.start), "left")
             end = x + LABEL + PART * len(row.parts)
             self.chain(x + LABEL, height, end, row)
-            name = " ".join([_net(row.end), *cell.at.get(row.end, ())])
+            name = " ".join([shown_net(row.end), *cell.at.get(row.end, ())])
             self.net_name(end + 0.1, height, name, "right")
             width = max(width, end - x + 0.3 + 0.2 * len(name))
         return width, y - below
@@ -274,10 +275,6 @@ class _Page:
         if self.canvas == "matplotlib":
             return text.translate(_LIKE)
         return html.escape(text).replace("$", "&#36;")
-
-
-def _net(net: str) -> str:
-    return "GND" if net == GROUND else net
 
 
 def _named(part: TwoPin) -> str:

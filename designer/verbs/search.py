@@ -164,10 +164,10 @@ def _asked_repair(
     from designer.jobs import repair_job  # a search need not import the repair
 
     target = repair_job.target_of(options.yield_, options.ppm)
-    wish: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
-    repair_job.check_wish(modelfile, **wish)
+    asked: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
+    repair_job.refuse_unreachable(modelfile, **asked)
     Folder(folder / CURED)  # refuses a place where something else stands
-    return partial(repair_job.repair_into, **wish)
+    return partial(repair_job.repair_into, **asked)
 
 
 def _refuse(options: Mapping[str, object], expected: str) -> None:
@@ -184,10 +184,10 @@ def show(result: JobOutcome | CureResult) -> None:
     if isinstance(result, JobOutcome):
         design_written(result, result.answer, tables, _after)
     else:
-        _repair_told(result.answer)
+        _show_repair(result.answer)
 
 
-def _repair_told(repair: Mapping[str, Any]) -> None:
+def _show_repair(repair: Mapping[str, Any]) -> None:
     from designer.centering import repair_table
 
     tell(repair_table.text(repair))
@@ -241,7 +241,7 @@ def tables(answer: Mapping[str, Any]) -> None:
         )
     if "cure" in answer:
         say("")
-        _repair_told(answer["cure"])
+        _show_repair(answer["cure"])
 
 
 def _sigmas(reliability_index: float | None) -> str:

@@ -17,7 +17,7 @@ from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.circuit.resistors import composites_of
-from designer.dynamics.attractors import describe, settle, shoot_symmetric, twin
+from designer.dynamics.attractors import describe, settle, twin
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import OrbitStatus
@@ -25,6 +25,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
 from designer.model.clearance import Sides
 from tests.shared.stages import CATALOG, PAPER, SATURATION, VREF, model, rectifier, stage
+from tests.shared.symmetric_shooting import shoot_symmetric
 
 NOMINAL = rectifier()
 BOTH = stage("rectifier", "both", NOMINAL)

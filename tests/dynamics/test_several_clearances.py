@@ -13,7 +13,6 @@ from designer.dynamics.attractors import (
     mirrored_strobes,
     settle,
     shoot,
-    shoot_symmetric,
     twin,
 )
 from designer.dynamics.coexisting_attractors import coexisting
@@ -25,6 +24,7 @@ from designer.dynamics.steady_state import TransientSettings, by_flow
 from designer.model.clearance import Side
 from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism, integrate
 from tests.shared.mechanisms import CHAIN, absolute, flow_of
+from tests.shared.symmetric_shooting import shoot_symmetric
 
 EVEN = replace(
     CHAIN,

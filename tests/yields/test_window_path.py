@@ -9,7 +9,7 @@ from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.reduction import Reduction
-from designer.dynamics.attractors import settle, shoot_symmetric
+from designer.dynamics.attractors import settle
 from designer.dynamics.continued_orbit import ContinuedOrbit, follow, valleys
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
@@ -20,6 +20,7 @@ from designer.yields.adjustment import Adjustment
 from designer.yields.window_path import MOST_FOLLOWED, PathSetting, find_window
 from tests.shared.bench_plans import period_counts, plan, question
 from tests.shared.paper_cases import MODEL, subject
+from tests.shared.symmetric_shooting import shoot_symmetric
 
 LARGE = {4: 1e-3, 8: 3e-4}
 """Standard deviation of the input offset [V] that is large for the signals of 1-p-p."""

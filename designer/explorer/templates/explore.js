@@ -42,7 +42,7 @@
     // What the server makes the number of: with its unit, so that 36 Hz stays 36 Hz.
     c.asText = (shown) => (c.scale === 1 || shown === "" || !Number.isFinite(Number(shown)) ? shown
       : recording ? String(Number(shown) / c.scale) : `${shown} ${c.unit}`);
-    c.told = (value) => `${d.label} = ${c.round(value)} ${c.unit}`.trim();
+    c.labelled = (value) => `${d.label} = ${c.round(value)} ${c.unit}`.trim();
     c.round = (value) => String(Number((value * c.scale).toPrecision(6)));
     c.show = (text) => {
       c.text = text;
@@ -463,7 +463,7 @@
     const { columns, rows } = mapOf;
     const response = responseAt(Math.round(mapPart("y", y) * (rows - 1)),
       Math.round(mapPart("x", x) * (columns - 1)));
-    const [across, up] = [named[mapOf.x.name].told(x), named[mapOf.y.name].told(y)];
+    const [across, up] = [named[mapOf.x.name].labelled(x), named[mapOf.y.name].labelled(y)];
     by("map-at").textContent = `${across}, ${up}: ${response}`;
   };
   const goToPoint = (x, y) => {
