@@ -71,7 +71,6 @@ class KeyedStore(Generic[Entry]):
     """
 
     root: Path
-    """The folder."""
     codec: EntryCodec[Entry]
     """How an entry is written."""
     note: Note = quiet

@@ -81,7 +81,7 @@ class AttractorList:
         return None
 
     def distance(self, x: Array, y: Array) -> float:
-        """Of two states (states,), relative to the largest entry of y."""
+        """Distance of two states (states,), relative to the largest entry of y."""
         size = max(float(np.abs(self.weights * y).max()), 1e-300)
         return float(np.abs(self.weights * (x - y)).max()) / size
 

@@ -37,9 +37,9 @@ BLOCKS = 8
 """Blocks that the curves through the sweep's points are kept in: point number k belongs to block k
 modulo this. As many more for the curves of each depth."""
 SAME = 1e-6
-"""In widths of the window: a point this near to a curve of its kind lies on it."""
+"""Distance in widths of the window: a point this near to a curve of its kind lies on it."""
 BESIDE = 1e-3
-"""The same of the straight way between two points of a curve."""
+"""The same distance, from the straight way between two points of a curve."""
 
 
 class CurveStore(Protocol):
@@ -150,7 +150,6 @@ class _Start:
     """A point of codimension two at which another curve is to be begun."""
 
     origin: CurveOrigin
-    """The point."""
     own: PointKind
     """Kind of the curve that it was found on."""
     other: OtherCurve

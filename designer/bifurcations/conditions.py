@@ -153,7 +153,6 @@ class MultiplierPair:
     total: float
     """Sum of the pair at the last point."""
     kind: PointKind = PointKind.TORUS
-    """Torus."""
     unknowns: int = 0
     """None beside state and parameters."""
 
@@ -222,7 +221,6 @@ class Grazing:
     size: float
     """Peak of the displacement in the clearance."""
     kind: PointKind = PointKind.GRAZING
-    """Grazing."""
     unknowns: int = 1
     """The phase of the turning point, in drive periods."""
     clear: float = CLEAR

@@ -250,7 +250,7 @@ def _closing(curve: Curve, points: list[BranchPoint], new: BranchPoint) -> list[
     step = curve.distance(current.solved, new.solved)
 
     def way(y: Array) -> float:
-        """By y from the last point to the new one."""
+        """The length of the way by y from the last point to the new one."""
         ends = (current.solved.y, new.solved.y)
         return float(sum(np.linalg.norm((end - y) / curve.scale) for end in ends))
 

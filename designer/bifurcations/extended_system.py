@@ -95,7 +95,6 @@ class ExtendedSystem:
     symmetric: bool
     """Whether they are those that the half-period map finds."""
     states: int
-    """Number of states."""
     scale: Array
     """(unknowns,) what each unknown is measured in: peaks, 1 for a phase, widths of the window."""
     _flows: dict[tuple[float, float], Flow] = field(default_factory=dict, repr=False)
@@ -234,7 +233,7 @@ class ExtendedSystem:
         return found
 
     def distance(self, a: Array, b: Array) -> float:
-        """Between two points, in scaled units."""
+        """Distance between two points, in scaled units."""
         return float(np.linalg.norm((b - a) / self.scale))
 
     def _value(self, z: Array, condition: Condition) -> _Value | None:

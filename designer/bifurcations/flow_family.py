@@ -22,7 +22,6 @@ class Family:
     """One flow for each value of a parameter."""
 
     parameter: str
-    """Name of the parameter."""
     low: float
     """Lower end of the parameter's domain."""
     high: float

@@ -86,7 +86,7 @@ class Solved:
 
     @property
     def value(self) -> float:
-        """Of the parameter."""
+        """Value of the parameter."""
         return float(self.y[-1])
 
     @property
@@ -100,7 +100,6 @@ class Curve:
     """Periodic orbits of a family along its parameter."""
 
     family: Family
-    """The family of flows."""
     n: int
     """Period of the orbits, in drive periods."""
     symmetric: bool
@@ -213,7 +212,7 @@ class Curve:
         return np.asarray(J @ J if self.symmetric else J)
 
     def distance(self, a: Solved, b: Solved) -> float:
-        """Between two points, in scaled units."""
+        """Distance between two points, in scaled units."""
         return float(np.linalg.norm((b.y - a.y) / self.scale))
 
 

@@ -79,7 +79,6 @@ class Bifurcation:
     """A bifurcation point."""
 
     parameter: str
-    """Name of the parameter."""
     value: float
     """Value of the parameter at the point."""
     kind: PointKind

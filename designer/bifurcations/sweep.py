@@ -117,7 +117,7 @@ class Window:
     """Largest standard error of these exponents; None of others."""
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of the contract."""
+        """Plain data by the keys of the contract."""
         chaos = {"lyapunov": self.lyapunov, "lyapunov_error": self.lyapunov_error}
         return {
             "from": self.low,

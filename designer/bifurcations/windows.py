@@ -41,17 +41,13 @@ class BranchWindow:
     """A stretch of a branch on which a response is stable."""
 
     parameter: str
-    """Name of the parameter."""
     response: str
     """The response that is stable, as "n-p-q"."""
     symmetric: bool
     """Whether the response is its own mirror image, by the branch it lies on."""
     low: WindowEnd
-    """Lower end of the window."""
     high: WindowEnd
-    """Upper end of the window."""
     branch: int
-    """The number of the branch."""
     span: tuple[int, int] = (0, -1)
     """The numbers of its first and of its last point on the branch."""
 
@@ -174,7 +170,7 @@ def outside(family: Family, end: WindowEnd, direction: float) -> tuple[float, Or
 
 
 def _unlocated(branch: Branch, outer: int, inner: int) -> WindowEnd:
-    """Between two neighbouring points, the second of which still belongs to the window."""
+    """The end between two neighbouring points, the second of which still belongs to the window."""
     a, b = branch.points[outer], branch.points[inner]
     half = 0.5 * abs(a.value - b.value)
     return WindowEnd(0.5 * (a.value + b.value), half, NOT_LOCATED, None, b.orbit)

@@ -49,7 +49,6 @@ class BoardFacts:
     silk_stroke: float | None
     """Width of the finest line in silk [mm]; None where there is none."""
     vias: int
-    """Number of vias."""
     holes: int
     """Number of holes in pads."""
     screw_holes: int

@@ -163,7 +163,7 @@ def drive_resistance(circuit: Circuit, node: str) -> float:
 
 
 def _resistances(circuit: Circuit, node: str) -> Iterator[float]:
-    """Between each channel and a node that it drives [Ω]."""
+    """Resistance between each channel and a node that it drives [Ω]."""
     for channel in circuit.generators:
         path = driven_nodes(circuit, channel).get(node, ())
         if path and all(set(r.nets) == {channel.net, node} for r in path):

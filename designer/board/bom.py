@@ -67,7 +67,6 @@ class Line:
     rating: str
     """What it has to stand."""
     price_class: int
-    """Price class, from 1."""
     grade: str
     """Tolerance, as text."""
     substitute: str = ""

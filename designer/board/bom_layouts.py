@@ -59,11 +59,9 @@ class Layout:
     """The columns of a bill."""
 
     name: str
-    """Name of the layout."""
     separator: str
     """What stands between designators."""
     columns: tuple[LayoutColumn, ...]
-    """The columns, in order."""
 
     @property
     def file(self) -> str:

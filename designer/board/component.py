@@ -44,7 +44,6 @@ class Bought:
     rating: str
     """What it has to stand."""
     price_class: int
-    """Price class, from 1."""
     grade: float | None = None
     """Tolerance, a fraction, or None."""
     substitute: str = ""

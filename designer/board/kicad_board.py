@@ -45,7 +45,7 @@ LAYERS = (
 )
 """KiCad 9's numbers of the layers of a board with two sides."""
 THICKNESS = 1.6
-"""Of the board [mm]."""
+"""Thickness of the board [mm]."""
 LINE, LINES, SHORTEST = 1.7, 4, 12
 """From one line of the title to the next [mm]; how many there is room for; letters of one that are
 written however narrow the board is."""

@@ -22,11 +22,8 @@ class Item:
     """Something with a symbol."""
 
     reference: str
-    """Its designator."""
     value: str
-    """The value that is shown."""
     shape: SymbolShape
-    """Symbol that it is drawn with."""
     pins: Mapping[str, str]
     """Net by pin number, "" where none is."""
 
@@ -36,9 +33,7 @@ class Entry:
     """An item of the sheet with its fields, and where it stands besides the sheet."""
 
     item: Item
-    """The item with its symbol."""
     fields: Fields
-    """The fields, by name."""
     component: Component | None = None
     """The component; None for sources, flags and power symbols."""
 

@@ -30,13 +30,13 @@ from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Sectio
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
 
 STEP = 0.25
-"""Of the grid of places [mm]."""
+"""Step of the grid of places [mm]."""
 REACH = 30.0
-"""From the middle of the package to the farthest place that is tried [mm]."""
+"""Distance from the middle of the package to the farthest place that is tried [mm]."""
 CHANNEL = 0.6
 """Round a package, for the tracks of its pins [mm]."""
 BETWEEN = 0.35
-"""Between parts [mm]."""
+"""Distance between parts [mm]."""
 OTHER = 0.2
 """Weight of the distance from a net that is no summing node."""
 CENTRE = 0.02
@@ -173,14 +173,15 @@ def _decoupling(package: PlacedComponent, near: Sequence[PlacedComponent]) -> li
 
 
 EDGE = 3.0
-"""From the outermost part to the board's edge on the left and right [mm]."""
+"""Distance from the outermost part to the board's edge on the left and right [mm]."""
 BAND = 8.0
-"""The same above and below, for screws and the title [mm]."""
+"""The same distance above and below, for screws and the title [mm]."""
 SCREW = 4.0
-"""From the middle of a mounting hole to both edges [mm]."""
+"""Distance from the middle of a mounting hole to both edges [mm]."""
 MOUNTING_HOLE = "MountingHole:MountingHole_3.2mm_M3"
 MARK, FIDUCIAL = 14.0, "Fiducial:Fiducial_1mm_Mask2mm"
-"""From the middle of a mark for the assembler's camera to the side [mm], and its footprint."""
+"""Distance from the middle of a mark for the assembler's camera to the side [mm], and its
+footprint."""
 APART = 2.0
 """Least room between jacks, so that the name below one is not read with the next [mm]."""
 PER_COLUMN = 12
@@ -196,7 +197,6 @@ class Placement:
     spots: tuple[PlacedComponent, ...]
     """Every component with a footprint."""
     outline: PlacedBox
-    """Outline of the board."""
 
     @property
     def holes(self) -> tuple[PlacedComponent, ...]:

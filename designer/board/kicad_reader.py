@@ -64,9 +64,7 @@ class PlacedFootprint:
     """A footprint as it stands on a board."""
 
     reference: str
-    """Its designator."""
     value: str
-    """Its value as written."""
     pads: tuple[PlacedPad, ...]
     courtyard: bool
     """Whether the footprint has a courtyard."""
@@ -104,7 +102,7 @@ class BoardFile:
     """The board's edge."""
 
     def footprint(self, reference: str) -> PlacedFootprint | None:
-        """That of one component."""
+        """The footprint of one component."""
         return next((f for f in self.footprints if f.reference == reference), None)
 
     def pads(self, reference: str) -> tuple[PlacedPad, ...]:

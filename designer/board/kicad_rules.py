@@ -49,7 +49,6 @@ class CustomRule:
     id: str
     """Id of the rule that it says."""
     constraint: str
-    """Type of its constraint."""
     limit: float
     """The limit [mm], or a count."""
     least: bool

@@ -15,7 +15,7 @@ fabs."""
 LETTER = 1.06
 """Width of one of its letters [mm]."""
 ROOM = 0.4
-"""Between cells [mm]."""
+"""Distance between cells [mm]."""
 Label: TypeAlias = Literal["above", "left", "right"]
 
 
@@ -25,7 +25,6 @@ class PlacedComponent:
 
     component: Component
     footprint: FootprintShape
-    """The footprint, with its pads."""
     x: float = 0.0
     """Place to the right [mm]."""
     y: float = 0.0

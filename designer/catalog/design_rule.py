@@ -15,7 +15,7 @@ FAIL: Status = "fail"
 NOT_RUN: Status = "not run"
 
 ROUNDING = 1e-9
-"""Relative: a limit that is met exactly is kept, whatever the last digit says."""
+"""Relative tolerance: a limit that is met exactly is kept, whatever the last digit says."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class RuleOutcome:
     """The limit that ``override`` replaces; nan where there is none."""
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of docs/contract.md, and more."""
+        """The outcome by the keys of docs/contract.md, and more."""
         changed = self.override is not None
         limit = self.limit_text
         return {

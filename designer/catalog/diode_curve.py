@@ -29,7 +29,8 @@ TYPICAL_SHARE = 0.72
 EMISSION, RESISTANCE = 1.8, 1.0
 """Assumed: emission coefficient, and series resistance [ohm], of a small silicon diode."""
 LEAST_EMISSION = 0.5
-"""No junction is steeper than 1; below half of that the figures do not belong together."""
+"""Least emission coefficient. No junction is steeper than 1; below half of that the figures do not
+belong together."""
 LEAKAGE_SHARE = 0.5
 """Largest saturation current over the reverse current that the sheet allows."""
 TRACE = 2e-14
@@ -46,7 +47,6 @@ class DiodeModel:
     """The curve of a diode, and the figures of its simulation model."""
 
     name: str
-    """Its name in the catalogue."""
     saturation_current: float
     """Saturation current [A]."""
     emission: float

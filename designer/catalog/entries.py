@@ -511,7 +511,6 @@ class PartChoice:
     """A part that can be bought: a value of a family."""
 
     family: PartFamily
-    """The family that it belongs to."""
     value: float
     """Its value [Ω or F]."""
     part_number: str

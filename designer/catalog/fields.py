@@ -72,7 +72,7 @@ class Figure:
 
     @property
     def about_zero(self) -> tuple[float, float]:
-        """Of a size of either sign: its standard deviation, and what none lies beyond.
+        """(standard deviation, bound) of a figure that gives the size of something of either sign.
 
         The typical size is taken for the deviation. Of the two, the one that the sheet does not
         give is a third of the other, or three times it.
@@ -149,7 +149,7 @@ _PARTS = {"ppm": 1e6, "%": 1e2, None: 1.0}
 
 
 def _share_per_kelvin(value: object) -> object:
-    """Of text that ends in /K, ppm/K or %/K the number; anything else as it is."""
+    """The number of a text that ends in /K, ppm/K or %/K; anything else as it is."""
     if not isinstance(value, str):
         return value
     # One space for many: the pattern would try each of them in three places.

@@ -381,7 +381,7 @@ def _nearest(ascending: Sequence[float], value: float) -> float:
 
 
 def _footprints(entry: _Cased) -> tuple[str, ...]:
-    """Of every case that it is sold in."""
+    """The footprints of every case that an entry is sold in."""
     return entry.footprint, *(case.footprint for case in entry.cases)
 
 

@@ -104,7 +104,8 @@ def _folders(extra: Path | None) -> tuple[Path, ...]:
 
 
 def _shipped() -> Path:
-    """In a wheel inside the package; in a checkout at its top level, beside the package."""
+    """The catalogue that comes with the tool: inside the package in a wheel, beside it in a
+    checkout."""
     package = Path(str(importlib.resources.files("designer")))
     for folder in (package / "catalogs", package.parent / "catalogs"):
         if folder.is_dir():

@@ -27,7 +27,6 @@ class Offer:
     bought."""
 
     kind: Kind
-    """Kind of the parts."""
     grade: float
     """The grade that is asked for, a fraction."""
     families: tuple[PartFamily, ...]
@@ -39,7 +38,7 @@ class Offer:
 
     @property
     def unit(self) -> str:
-        """Of the values."""
+        """Unit of the values."""
         return UNITS[self.kind]
 
     def bars(self, family: PartFamily) -> bool:
@@ -78,7 +77,8 @@ def _listed(families: Sequence[PartFamily]) -> str:
 def no_values(
     offer: Offer, series: Sequence[str], limits: tuple[float, float], others: Offer
 ) -> Unreachable:
-    """No value of the series within the limits can be bought: grade, range or series binds.
+    """The refusal where no value of the series within the limits can be bought: grade, range or
+    series binds.
 
     others : the offer at any grade.
     """
@@ -102,7 +102,8 @@ def no_values(
 
 
 def _nothing(others: Offer) -> Unreachable:
-    """No part of the kind can be bought at any grade: the model file's families, or the cases."""
+    """The refusal where no part of the kind can be bought at any grade: the model file's families
+    or the cases bind."""
     kind, refused = others.kind, others.refused
     would = [f for f in others.families if others.mounting in ("mixed", f.mounting)]
     if would:
@@ -121,7 +122,7 @@ def _nothing(others: Offer) -> Unreachable:
 def no_part(
     offer: Offer, value: float, holding: Sequence[PartFamily], others: Offer
 ) -> Unreachable:
-    """One value cannot be bought at the grade.
+    """The refusal where one value cannot be bought at the grade.
 
     holding : families of the offer that have it, none of which may be bought. others : the offer
     at any grade.

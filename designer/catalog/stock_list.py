@@ -55,13 +55,12 @@ class StockRow:
     grade: float
     """Its tolerance, a fraction; nan where there is a part number."""
     distributor: str
-    """Name of the distributor."""
     number: str
     """The distributor's order number."""
     price: float | None
     """Euro apiece, or None."""
     from_pieces: int
-    """From how many pieces that price holds."""
+    """The number of pieces from which that price holds."""
     date: str
     """When it was looked up, as YYYY-MM-DD."""
     source: str

@@ -27,14 +27,15 @@ from designer.catalog.netlist_guard import RefusedNetlist, check_netlist
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
 ELEMENTS = "BCDEFGHIJKLMQRSVWX"
-"""No code models, digital or compiled devices: those read files or run programs."""
+"""First letters of the elements that a model may have. Code models, digital and compiled devices
+are none of them: those read files or run programs."""
 CARDS = (".subckt", ".ends", ".model", ".param", ".func")
 PREFIX = "vendor_"
 MOST_BYTES, MOST_STATEMENTS, LONGEST = 256_000, 5_000, 4_000
-"""Of a file, in a file, and characters of a statement with its continuations."""
+"""The most bytes and statements of a file, and characters of a statement with its continuations."""
 MOST_EXPANDED, MOST_CHARACTERS = 10_000, 1_000_000
-"""Statements of one op-amp, and their characters, with calls and functions written out: both can
-double with every line of a file."""
+"""The most statements of one op-amp, and their characters, with calls and functions written out:
+both can double with every line of a file."""
 
 _FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*+\(?\s*+file|\bd?pwlfile\b", re.IGNORECASE)
 _FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\(([^()]*)\)\s*=?", re.IGNORECASE)

@@ -31,7 +31,6 @@ class LawCurve:
     """The force that one law puts on its mass, over what it depends on."""
 
     name: str
-    """Of the law."""
     symbol: str
     """What it depends on, such as "x₁" or "x₁′ − x₂′", with its unit."""
     unit: str

@@ -71,7 +71,6 @@ class ComparedCircuit:
     """A circuit with its generator's settings, to be compared."""
 
     name: str
-    """A short name."""
     what: str
     """What it is, in one sentence."""
     circuit: Circuit

@@ -39,7 +39,6 @@ class Control:
     """A slider with a number field."""
 
     name: str
-    """Name of the parameter."""
     label: str
     """What people read."""
     unit: str

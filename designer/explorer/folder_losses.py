@@ -28,7 +28,6 @@ class ResponseLosses:
     summary: str
     """The response in words."""
     words: str
-    """Its losses in words."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from designer.model.mechanics import frequency_range
 from designer.model.swept_model import ModelSubject
 
 WIDTH = 0.15
-"""Half of the strip over the present ω."""
+"""Half the width of the strip over the present ω."""
 STEPS = 60
 """Steps on each side."""
 TOGETHER = 3

@@ -51,7 +51,7 @@ REPORT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Of a report, which is one file with scripts of its own."""
+"""Content policy of a report, which is one file with scripts of its own."""
 TYPES = {"css": "text/css", "js": "text/javascript", "html": "text/html"}
 
 
@@ -60,7 +60,6 @@ class Explorer:
     """What all pages of one server share."""
 
     modelfile: ModelFile
-    """The model that is looked at."""
     queue: WorkQueue
     """The thread that computes."""
     root: Path
@@ -326,7 +325,7 @@ class _Socket(WebSocketHandler, _Guarded):
         self.explorer.board_queue.forget(self)
 
     def send(self, message: Message) -> None:
-        """From any thread."""
+        """Send a message, from any thread."""
         self._loop.add_callback(self._write, text_of(message))
 
     def _write(self, text: str) -> None:

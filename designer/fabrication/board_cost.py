@@ -71,7 +71,7 @@ class BoardCost:
         return self.parts + self.bare_board + self.assembly
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of docs/contract.md."""
+        """Plain data by the keys of docs/contract.md."""
         return {**asdict(self), "total": self.total}
 
 
@@ -85,7 +85,7 @@ class CostEstimate:
     """One for each size of order that the catalogue knows, ascending."""
 
     def as_dict(self) -> dict[str, Any]:
-        """By the keys of docs/contract.md."""
+        """Plain data by the keys of docs/contract.md."""
         return {
             "estimate": True,
             "assembly_class": self.size.assembly,

@@ -33,7 +33,6 @@ class _View:
     """One side of a board, and how it is seen."""
 
     side: Side
-    """Which side is seen."""
     box: tuple[float, float, float, float]
     """Left, top, right and bottom of the board's edge [mm]."""
 

@@ -39,7 +39,6 @@ class PartPosition:
     """Where a part stands."""
 
     reference: str
-    """Its designator."""
     value: str
     """Its value, as written on the board."""
     package: str

@@ -132,7 +132,7 @@ class BoardOrder:
     """A board that is to be ordered."""
 
     name: str
-    """Of the files: the project's."""
+    """Name of the files: the project's."""
     title: str
     """Title of the model file, as it is."""
     board: BoardFile

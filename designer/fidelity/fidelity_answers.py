@@ -74,7 +74,6 @@ class FidelityAnswer:
     """What one fidelity at one setting says of a response."""
 
     fidelity: str
-    """Name of the fidelity."""
     level: str
     """Name of the setting, alike for all responses."""
     settings: dict[str, Any]

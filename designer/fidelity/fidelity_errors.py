@@ -27,7 +27,6 @@ class FidelityError:
     """What one fidelity at one setting shows of one response, and how far it is off."""
 
     label: ResponseLabel
-    """The response that it is about."""
     rung: str
     """Name of the fidelity."""
     level: str
@@ -62,7 +61,6 @@ class Truth:
     """What the board does, as computed at the finest steps."""
 
     label: ResponseLabel
-    """The response that it is about."""
     response: str
     """n-p-q or status that the board shows."""
     sure: bool

@@ -82,7 +82,6 @@ class TradedResponse:
     """What was found of one response."""
 
     rows: tuple[FidelityError, ...]
-    """Its errors by fidelity and setting."""
     truth: Truth
     """What the board does."""
     boards: BoardTrade | LeftOut | None = None

@@ -40,7 +40,6 @@ class LeftOut:
     """A response of which no boards were asked, and why."""
 
     label: ResponseLabel
-    """The response that it is about."""
     reason: str
     """Why no boards were asked."""
 
@@ -107,7 +106,6 @@ class BoardTrade:
     """One response on its boards; see ``Tally``."""
 
     label: ResponseLabel
-    """The response that it is about."""
     boards: int
     """Boards that both engines decided."""
     ok: int

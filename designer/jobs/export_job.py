@@ -59,7 +59,6 @@ class OrderRequest:
     """What is to be ordered, and from whom."""
 
     fabs: tuple[str, ...]
-    """Names of the fabs."""
     board: Path | None
     """The board file; None for the folder's own."""
     parts: Path | None

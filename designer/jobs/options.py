@@ -21,7 +21,6 @@ class Options:
     """Options of the verbs that write."""
 
     seed: int = SEED
-    """Seed of the boards."""
     jobs: int | None = None
     """Workers; None for one a core."""
     samples: int = SAMPLES

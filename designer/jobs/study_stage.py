@@ -130,13 +130,11 @@ class StudyStage:
     """A study that is worked on in a folder."""
 
     folder: Folder
-    """The design folder."""
     place: Place
     """Where in the folder the study is."""
     synthesis: Synthesis
     """The design with its model."""
     options: Options
-    """Options of the verb."""
     command: str
     """The command line that its report states."""
     progress: Progress

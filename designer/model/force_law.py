@@ -26,12 +26,10 @@ class ForceLaw:
     damper that is drawn out."""
 
     name: str
-    """Its name."""
     row: tuple[float, ...]
     """(n,) coefficients over the masses' displacements, or velocities, of what it depends on. The
     force acts on each mass with the negative of its coefficient, or of ``push``."""
     quantity: Quantity
-    """What that is."""
     points: tuple[tuple[float, float], ...]
     """(x, force) by rising x, at least two: corners, and a point on each piece beyond them."""
     push: tuple[float, ...] = ()

@@ -37,7 +37,6 @@ class ModelLimit:
     """One thing that is not modelled."""
 
     feature: str
-    """What it is."""
     example: str
     """Keys or values by which a file asks for it, in Markdown."""
     nearest: str

@@ -51,7 +51,7 @@ KEPT, LOST, NO_RUN = "#cfe3d6", "#f2c9b4", "#eeeeee"
 
 
 def circuit_page(pieces: Mapping[str, Piece], command: str) -> Page:
-    """From the pieces by name, as ``reproduce_circuit`` keeps them."""
+    """The page from the pieces by name, as ``reproduce_circuit`` keeps them."""
     circuits = [p for name, p in pieces.items() if name.startswith("circuit-")]
     offsets = [p for name, p in pieces.items() if name.startswith("offsets-")]
     clock, misprints = pieces["clock"], pieces["misprints"]["misprints"]

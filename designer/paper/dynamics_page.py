@@ -27,7 +27,7 @@ from designer.plots.titles import NAMES
 
 KINDS = ("S", "AS")
 COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")
-"""Of the branches, by how many times they left another."""
+"""Colours of the branches, by how many times they left another."""
 CAPTIONS = {
     "borders-b": "Borders of the symmetric responses 1-1-1 to 1-8-8 over ω and b; a response lives "
     "between its two borders.",
@@ -55,7 +55,7 @@ class Dynamics:
     """Response right beyond an end of a main window, by its p and "S low", "S high", "AS low" or
     "AS high"."""
     shared: Mapping[float, tuple[str, ...]]
-    """By ω, the coexisting responses."""
+    """The coexisting responses, by ω."""
     chatter: tuple[tuple[float, Orbit], ...]
     """(ω, orbit) of the response from rest."""
     statements: tuple[Statement, ...]

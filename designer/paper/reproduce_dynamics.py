@@ -61,7 +61,7 @@ FIRST = 1.55
 DEPTH = 2
 """Branch switches in a row: to the twins, and to their doubled orbits."""
 TITLE = "Soft-impacting system with two-sided stops"
-"""Of the sweeps' pictures: the paper's case, as its model file calls it."""
+"""Title of the sweeps' pictures: the paper's case, as its model file calls it."""
 DATA = "dynamics.json"
 FIGURES = {"fig2a": (0.1, 1.8, 1801), "fig2b": (0.2, 0.6, 801), "fig2c": (1.25, 1.6, 701)}
 """ω from, to and steps of each picture of the paper's Fig. 2."""
@@ -74,7 +74,7 @@ NAMES = frozenset(
     + [f"{name}.{kind}" for name in ("branches", "fig3", *FIGURES) for kind in ("png", "svg")]
     + [f"borders-{name}.{kind}" for name in SECOND for kind in ("png", "svg", "csv")]
 )
-"""Of the report's files."""
+"""Names of the report's files."""
 CHATTER = (0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 """ω at which the impacts of the response from rest are counted."""
 

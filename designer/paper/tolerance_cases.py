@@ -38,7 +38,6 @@ class SpreadCase:
     """A circuit under a spread."""
 
     circuit: str
-    """Name of the circuit."""
     resistor: float
     """Grade of the resistors, a fraction."""
     capacitor: float
@@ -69,7 +68,6 @@ class YieldRow:
     """The yield of one response in one case."""
 
     circuit: str
-    """Name of the circuit."""
     resistor: float
     """Grade of the resistors, a fraction."""
     capacitor: float

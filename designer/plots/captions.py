@@ -21,7 +21,8 @@ from designer.plots.point_captions import caption, doubled, label
 LAG = 2
 """Steps past a point within which its change has to show: motion near one settles slowly."""
 RISING = "rising"
-"""For a track of fixed starts, which has no direction: by the rising parameter."""
+"""How changes on a track of fixed starts are told, which has no direction: as the parameter
+rises."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ def changes(sweep: Sweep, point: Bifurcation) -> list[TrackChange]:
 
 
 def missing(end: SweptEnd, parameter: str, unit: str = "") -> str:
-    """Of an end that was not located, such as "lower end of 1-1-0 not located; 1-1-0 is known down
-    to ω = 0.9: its branch was followed to here and lost".
+    """The caption of an end that was not located, such as "lower end of 1-1-0 not located; 1-1-0 is
+    known down to ω = 0.9: its branch was followed to here and lost".
 
     parameter : how it is written. unit : of it.
     """

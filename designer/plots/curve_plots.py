@@ -35,7 +35,7 @@ lower end."""
 SWITCHED = (0, (3.5, 1.2))
 """Dashes of a curve that was begun where others meet."""
 UPRIGHT = 0.012
-"""Of the axes: width of a name that is written upwards, for want of room."""
+"""Width, as a share of the axes, of a name that is written upwards for want of room."""
 
 
 def _round_values(low: float, high: float) -> list[float]:

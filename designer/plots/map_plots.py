@@ -125,7 +125,7 @@ def _shade_outside(axes: Axes, one: YieldMap) -> None:
 
 
 def _scale(one: YieldMap, angular: bool) -> float:
-    """From a value of the first axis to what is shown."""
+    """The function from a value of the first axis to what is shown."""
     return PER_TURN if angular and one.axes[0].name == "omega" else 1.0
 
 

@@ -8,7 +8,7 @@ from matplotlib.patches import Rectangle
 from designer.base.figure_style import CONTACT, INK, MUTED, new_figure
 
 INCH = 0.4
-"""Of one unit of a drawing."""
+"""Inches of one unit of a drawing."""
 _SIZE = 8.5
 
 

@@ -61,7 +61,7 @@ def phase_portrait(
 def small_portrait(
     checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
 ) -> Figure:
-    """The same of the model and the exact circuit, a thumbnail without axes."""
+    """The phase portrait of the model and the exact circuit as a thumbnail without axes."""
     figure = Figure(figsize=(1.4, 1.25))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()

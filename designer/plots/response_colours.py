@@ -20,7 +20,7 @@ not settled."""
 WITHOUT_N: dict[str, str] = {OrbitStatus.APERIODIC: CHAOS, OrbitStatus.QUASI_PERIODIC: TORUS}
 """Colour of what has settled without a period, by its status."""
 SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
-"""Of windows of symmetric responses and of others."""
+"""Colours of windows of symmetric responses and of others."""
 MARKS = {
     "pitchfork": ("o", "#0072b2"),
     "period-doubling": ("s", "#e69f00"),

@@ -58,7 +58,7 @@ def parameter_x(
 
 
 def parameter_y(axes: Axes, subject: Subject, name: str, ending: str = "") -> None:
-    """The same of the y axis."""
+    """``parameter_x`` for the y axis."""
     if _own_axis(axes.yaxis, axes.get_ylim(), subject, name, ending):
         si_y(axes, subject.si.get(name))
 
@@ -86,7 +86,7 @@ class _RoundIn(MaxNLocator):
         self._scale = scale
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        """In the units of the data."""
+        """Ticks in the units of the data."""
         ticks = super().tick_values(vmin * self._scale, vmax * self._scale)
         return [float(tick) / self._scale for tick in ticks]
 

@@ -352,7 +352,7 @@ def drive_terms(force: Force, number: int, naming: Naming) -> list[str]:
 
 
 def _wave_terms(drive: Force | MovingBase, P: str, φ: str, naming: Naming) -> list[str]:
-    """The same of a drive whose amplitude and phase have these symbols."""
+    """The terms of a drive whose amplitude and phase have these symbols."""
 
     def wave(shape: str, order: int, amplitude: float, phase: float, names: tuple[str, str]) -> str:
         turn = f"{order if order > 1 else ''}ωt"

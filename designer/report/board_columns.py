@@ -30,17 +30,17 @@ from designer.spread.board_quantities import column, quantities
 from designer.verdicts.verdict import Answer, Verdict
 
 MOST_ORBITS = 90
-"""Of a page, over all responses."""
+"""The most orbits that a page has, over all responses."""
 POINTS = 256
-"""Of a stored motion."""
+"""Points of a stored motion."""
 MANY_IMPACTS = 8
-"""A motion of more has twice the points."""
+"""A motion of more impacts has twice the points."""
 LEAST_POINTS = 64
-"""Of one of its drive periods."""
+"""The fewest points of one of its drive periods."""
 PERIODS = 8
 """Drive periods of a stored motion, at most."""
 UNITS = {"offset": "V", "low": "V", "high": "V", "bias": "A", "reference": "V", "supply": "V"}
-"""Of the quantities by their group; a part's value has its own."""
+"""Units of the quantities by their group; a part's value has its own."""
 
 
 def boards_json(data: ReportData) -> str:

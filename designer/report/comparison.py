@@ -48,7 +48,8 @@ _PROBE = 1e-3
 
 
 _GAIN = 1e9
-"""Of op-amps that are ideal but for offsets; between two diodes an infinite one has no answer."""
+"""Gain of op-amps that are ideal but for offsets; between two diodes an infinite one has no
+answer."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class OffsetShare:
     typical: float
     """Root of the sum of squares over all sections, of typical offsets; nan where unknown."""
     maximum: float
-    """The same of the largest offsets."""
+    """The same root, of the largest offsets."""
     largest: str
     """Name of the section with the largest part in it."""
 
@@ -212,7 +213,8 @@ def _show(
     response: ModelResponse,
     drive: Drive,
 ) -> ComparedResponse:
-    """From the model's orbit, or from rest where the circuit has no scale to carry it over."""
+    """What the circuit shows from the model's orbit; from rest where the circuit has no scale to
+    carry the orbit over."""
     start = np.zeros(len(reduction.circuit.states))
     if errors is not None:
         start = response.orbit.start * errors.scales.volts * (model.b / response.b)
@@ -257,7 +259,8 @@ def _b(candidate: ComparedCircuit, model: Dimensionless, errors: CoefficientErro
 
 
 def _frequency_error(candidate: ComparedCircuit, errors: CoefficientErrors | None) -> float:
-    """Against ω = 2π f √(M1/K1), with M1 and K1 of the parts: free of scales too."""
+    """ln of the stated frequency over that of ω = 2π f √(M1/K1), with M1 and K1 of the parts: free
+    of scales too."""
     if errors is None:
         return float("nan")
     own = 0.5 * (errors.errors["x1' x1'"] + errors.errors["x1'' x1"])

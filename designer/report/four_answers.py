@@ -31,11 +31,11 @@ from designer.yields.loss_attribution import AttributionStage
 from designer.yields.yield_count import Yield
 
 FEW = 100
-"""Below so many samples the report says that the intervals are wide."""
+"""Samples below which the report says that the intervals are wide."""
 MANY = 1000
 """Boards that a study is told to take then."""
 WANTED = 0.95
-"""Below this yield a cure is advised; a user may want more or less."""
+"""Yield below which a repair is advised; a user may want more or less."""
 NAMED = 3
 """Parts that an advice names."""
 

@@ -33,7 +33,7 @@ def inserted_html(html: str, sections: Sequence[PageSection]) -> str:
 
 
 def inserted_markdown(text: str, sections: Sequence[PageSection]) -> str:
-    """The same of ``report.md``."""
+    """``report.md`` with these sections, and with no others that were put into it."""
     return _before(_BETWEEN.sub("", text), _MARKDOWN, paragraphs(sections) + "\n")
 
 

@@ -47,9 +47,9 @@ from designer.workbench.prediction import PredictedStop
 from designer.yields.yield_count import Yield
 
 MOST_POINTS = 4096
-"""Of one curve."""
+"""The most points of one curve."""
 POINTS = 1024
-"""Of one drive period, at most."""
+"""The most points of one drive period."""
 BOARD = "board"
 """Name of the data that the page fills in for the boards of a study (``boards.js``)."""
 ROW = 30

@@ -27,7 +27,8 @@ def rows(study: Study) -> list[dict[str, Any]] | None:
 
 
 def table(plan: StudyPlan, answers: Sequence[Sequence[Answer]]) -> list[dict[str, Any]]:
-    """The same of the answers to each response, none where it was left out."""
+    """The rows of ``rows`` from the answers to each response; a response that was left out has
+    none."""
     by_sample = [{a.sample: a for a in row} for row in answers]
     out = []
     for sample, label in enumerate(plan.labels):

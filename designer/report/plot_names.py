@@ -4,10 +4,10 @@ from __future__ import annotations
 
 
 def portrait_name(response: int, motion: int) -> str:
-    """Of one response by one of its motions, by their numbers."""
+    """Name of the portrait of a response, by the numbers of the response and of its motion."""
     return f"portrait {response} {motion}"
 
 
 def stop_name(clearance: int) -> str:
-    """Of the dead zone of a clearance."""
+    """Name of the plot of the dead zone of a clearance."""
     return f"stop {clearance}"

@@ -45,7 +45,7 @@ def boards(data: ReportData) -> Table | None:
 
 
 def kinds(data: ReportData) -> Table | None:
-    """As built, tuned, trimmed, reached and both engines together, side by side."""
+    """The yields as built, tuned, trimmed, reached and of both engines together, side by side."""
     study, census = data.study, data.plan.census
     bench = [replace(t, verdict=t.bench_verdict) for t in study.tuned or ()]
 
@@ -267,7 +267,7 @@ def loss_regions(data: ReportData) -> Table | None:
 
 
 def tolerance_margins(data: ReportData) -> Table | None:
-    """By how much tolerances would have to widen until the first loss."""
+    """The factors by which tolerances would have to widen until the first loss."""
     rows = [(r, margin) for r in data.study.rare for margin in r.margins]
     columns: dict[str, Callable[[tuple[RareLosses, ToleranceMargin]], str]] = {
         "response": lambda row: _asked(data, row[0]),

@@ -31,7 +31,7 @@ def name(c: CheckedResponse) -> str:
 
 
 def label(c: CheckedResponse, join: str = "   ") -> str:
-    """The same in a picture, where n-p-q may stand on a line of its own."""
+    """The name of a response in a picture, where n-p-q may stand on a line of its own."""
     return f"{c.model.spec.place_text()}{join}{c.model.expected or c.model.orbit.response}"
 
 

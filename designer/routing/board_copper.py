@@ -24,7 +24,7 @@ LAYERS = (FRONT, BACK)
 ALL = "*.Cu"
 """KiCad's name of every copper layer."""
 CHORDS = 8
-"""Of a quarter of a circle."""
+"""Chords of a quarter of a circle."""
 MOST_MEETINGS = 10_000
 """Pairs of pieces of an edge that meet, beyond those that follow each other: a drawing of lines
 that cross has as many faces, and an edge has none."""

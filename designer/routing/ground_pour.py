@@ -30,7 +30,6 @@ class Pour:
     """A pour of one layer."""
 
     layer: str
-    """Name of the layer."""
     border: Array
     """(n, 2) corners of its border [mm]."""
     pieces: tuple[Geometry, ...]

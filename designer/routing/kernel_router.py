@@ -24,11 +24,11 @@ STRAIGHT, DIAGONAL = 1000, 1414
 BEND = 300
 """Cost of a change of direction."""
 UNIT = 16
-"""Of factors: of layers, of pressure."""
+"""Unit of the factors of layers and of pressure."""
 HISTORY = 1024
-"""Of the history of a node: this much doubles its cost."""
+"""History of a node that doubles its cost."""
 BREAK = -1
-"""Between two paths of a route."""
+"""Mark between two paths of a route."""
 FREE, NOBODY = 0, -1
 """Owners of a node: any net may pass, none may; else the one net that may."""
 
@@ -63,7 +63,6 @@ class Tariff(NamedTuple):
     back: int
     """Factor of a step on the back, in units of UNIT."""
     via: int
-    """Cost of a via."""
     pressure: int
     """Price of each net that is in the way, in units of UNIT."""
 

@@ -32,7 +32,7 @@ class NetKind:
 
 
 VIA_RADIUS = VIA["via_diameter"] / 2.0
-"""Of every via [mm]."""
+"""Radius of every via [mm]."""
 GROUND_KIND = "ground"
 
 

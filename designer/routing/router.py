@@ -36,7 +36,7 @@ from designer.routing.net_kinds import GROUND_KIND, NetKind
 from designer.routing.routing_grid import STEP, Nodes, RoutingGrid, routing_grid
 
 STITCH = 7.5
-"""Between the vias that join the pours [mm]."""
+"""Distance between the vias that join the pours [mm]."""
 ROUNDS = 100
 """Most rounds of negotiation."""
 PRESSURE, GROWTH, MOST_PRESSURE = 8, 1.4, 4000

@@ -19,13 +19,13 @@ from designer.routing.kernel_router import FREE, NOBODY, Grid, SearchSpace
 from designer.routing.net_kinds import GROUND_KIND, VIA_RADIUS, NetKind
 
 STEP = 0.125
-"""Between places [mm]."""
+"""Distance between places [mm]."""
 MOST_PLACES = 8_000_000
-"""Of a layer: each takes some 200 bytes while a board is routed."""
+"""The most places of a layer: each takes some 200 bytes while a board is routed."""
 MARGIN = 0.015
 """Added to clearances [mm]: two tracks come as much nearer between the places of the grid."""
 EDGE = 0.5
-"""Between copper and the board's edge [mm]: KiCad's own least."""
+"""Distance between copper and the board's edge [mm]: KiCad's own least."""
 THINNEST = 0.25
 """Least width of a pour [mm]."""
 RELIEF = 0.3
@@ -36,9 +36,9 @@ OVERLAP = 0.25
 """How far a bridge reaches past the gap [mm], to the middle of its round end: more than half its
 width and the slack, so that the end lies in the pour."""
 BRIDGED = RELIEF + OVERLAP + 0.5 * BRIDGE + 0.01
-"""From a pad to the far end of its bridges [mm], and a slack."""
+"""Distance from a pad to the far end of its bridges [mm], and a slack."""
 BESIDE_PAD = 0.1
-"""Between a via and a pad of its own net [mm]: solder does not run into it."""
+"""Distance between a via and a pad of its own net [mm]: solder does not run into it."""
 Nodes = NDArray[np.int32]
 
 
@@ -49,7 +49,7 @@ class RoutingGrid:
     origin: tuple[float, float]
     """The first place [mm]."""
     arrays: Grid
-    """For the kernel."""
+    """The grid as the kernel takes it."""
     work: SearchSpace
     """Scratch space of the kernel."""
     reaches: NDArray[np.int64]

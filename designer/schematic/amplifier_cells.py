@@ -34,7 +34,7 @@ PART = 16
 HANGING = 14
 """Room of a part on end, with its texts beside it."""
 FIRST_FEEDBACK = 8
-"""Of the lowest feedback above the level."""
+"""Height of the lowest feedback above the level."""
 PIN, AMPLIFIER, OUTPUT = 3, 9, 15
 """From the summing node to the inverting input, the middle of the op-amp, its output."""
 ROLE_LETTERS, NARROW_LETTERS = 24, 14
@@ -54,7 +54,7 @@ class SheetParts:
 
     @classmethod
     def of(cls, entries: Sequence[Entry]) -> SheetParts:
-        """From the entries of the sheet."""
+        """The parts from the entries of the sheet."""
         items: dict[str, Item] = {}
         units: dict[str, tuple[Item, int]] = {}
         roles: dict[str, str] = {}

@@ -31,9 +31,9 @@ from designer.schematic.sheet_drawing import (
 )
 
 WIDTH = 50
-"""Of a cell of parts in rows."""
+"""Width of a cell of parts in rows."""
 STACK = 18
-"""Of two capacitors one above the other, with their texts."""
+"""Height of two capacitors one above the other, with their texts."""
 
 
 def node_fittings(circuit: Circuit) -> tuple[Resistor | Diode, ...]:
@@ -148,7 +148,7 @@ def decoupling_cell(circuit: Circuit, package: str, parts: SheetParts) -> SheetC
 
 
 def _capacitors(circuit: Circuit, package: str) -> list[SupplyCapacitor]:
-    """Of a package, that of the positive rail first."""
+    """The capacitors of a package, that of the positive rail first."""
     capacitors = [p for p in circuit.fittings if isinstance(p, SupplyCapacitor)]
     return [p for p in capacitors if p.package == package]
 

@@ -179,7 +179,6 @@ class Project:
     """Title of the model file."""
     circuit: Circuit
     components: tuple[Component, ...]
-    """The components of the board."""
     run: FirstRun
     """What the simulation of the project shows."""
     rules: str
@@ -191,7 +190,7 @@ class Project:
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """Name of its files."""
         return project_name(self.title)
 
 

@@ -21,7 +21,7 @@ TextKind = Literal["title", "role", "line"]
 SIZES: Mapping[TextKind, float] = {"title": 1.8, "role": 0.9, "line": TEXT}
 """Heights of the letters of each kind of text [mm]."""
 LINE_STEP = 1.62
-"""From a line of text to the next one, in heights of its letters, as KiCad sets them."""
+"""Distance from a line of text to the next one, in heights of its letters, as KiCad sets them."""
 _TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}
 _WIDTHS = {
     **dict.fromkeys("iIlj.,:;'|!", 0.6),
@@ -36,9 +36,8 @@ class Placed:
     """A unit of a symbol on the sheet."""
 
     item: Item
-    """Whose symbol it is."""
+    """The item whose symbol it is."""
     unit: int
-    """Number of the unit."""
     x: int
     """Place to the right, in units of the grid."""
     y: int
@@ -85,9 +84,7 @@ class NetLabel:
     """A net's name on the sheet."""
 
     net: str
-    """Name of the net."""
     at: Point
-    """The point that it names."""
     left: bool
     """Whether it is written to the left of it."""
 
@@ -125,13 +122,10 @@ class SheetCell:
 
     title: str
     symbols: list[Placed] = field(default_factory=list)
-    """Units of symbols in the cell."""
     wires: list[Wire] = field(default_factory=list)
     """Wires, horizontal or vertical, from point to point."""
     labels: list[NetLabel] = field(default_factory=list)
-    """Names of nets in the cell."""
     notes: list[Note] = field(default_factory=list)
-    """Texts of the cell."""
     open_pins: list[Point] = field(default_factory=list)
     """Points of the pins that nothing is connected to."""
     inlets: list[Inlet] = field(default_factory=list)

@@ -28,13 +28,13 @@ from designer.schematic.drawing_cells import Amplifier, Cell, circuit_cells
 from designer.schematic.sheet_drawing import Point, Sheet, SheetCell
 
 GAP, CHANNEL = 4, 2
-"""Between cells, and for each wire that leads up there."""
+"""Distance between cells, and the room of each wire that leads up there."""
 APART = 5
-"""Between blocks."""
+"""Distance between blocks."""
 MARGIN, TITLE_BLOCK = 16.0, 36.0
 """Millimetres that the frame takes on each side, and its title block at the bottom."""
 STEP = 10
-"""Between the heights of columns that are tried."""
+"""Distance between the heights of columns that are tried."""
 ROOM = 230
 """Width of a block of small cells."""
 

@@ -166,7 +166,7 @@ class RawPlot:
     name: str
     """Name of the analysis, such as ``Transient Analysis``."""
     vectors: dict[str, NDArray[Any]]
-    """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
+    """The vectors by the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
 
 
 def read_raw(content: bytes) -> list[RawPlot]:

@@ -32,7 +32,8 @@ REMEDIES: tuple[Remedy, ...] = ("step", "method", "tolerance", "start")
 SMALLER_STEP = 0.25
 LOOSER = 10.0
 NUDGE = 1e-3
-"""Of each capacitor's initial voltage: half the strobe tolerance of docs/definitions.md."""
+"""Change of each capacitor's initial voltage, as a share: half the strobe tolerance of
+docs/definitions.md."""
 
 _NOT_CONVERGED = re.compile(
     r"ngspice said: .*(timestep too small|stepping failed|convergence|iteration limit"

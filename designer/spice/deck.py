@@ -47,7 +47,6 @@ class SolverSettings:
     """What ngspice is told."""
 
     method: str
-    """Integration method."""
     max_step: float
     """Largest step [s]."""
     reltol: float = 1e-4

@@ -121,7 +121,7 @@ class EquationCheck:
 
     @classmethod
     def read(cls, record: Mapping[str, Any]) -> EquationCheck:
-        """From what `as_dict` made, in JSON."""
+        """The check that ``as_dict`` wrote."""
 
         def number(value: float | None) -> float:
             return float("nan") if value is None else value
@@ -341,8 +341,8 @@ def _resting_states(reduction: Reduction, generator: float, sides: tuple[int, ..
 
 
 def _holding(reduction: Reduction, sides: tuple[int, ...]) -> Iterator[str]:
-    """Beside each capacitor its voltage at rest, which follows the generator, behind an inductor.
-    The first states are the capacitors' voltages."""
+    """Sources that hold each capacitor, behind an inductor, at its voltage at rest, which follows
+    the generator. The first states are the capacitors' voltages."""
     circuit = reduction.circuit
     without = _resting_states(reduction, 0.0, sides)
     by_generator = _resting_states(reduction, 1.0, sides) - without
@@ -372,7 +372,7 @@ def _ac(
 
 
 def _dc(design: Design, resting: StaticRest) -> SpiceJob[Waveforms]:
-    """From the near end, where the stage carries least; upwards, as every sweep goes."""
+    """The DC sweep of a rest from its near end, where the stage carries least, upwards."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
     first, last = (-near, -far) if turned else (near, far)

@@ -47,8 +47,8 @@ from designer.spice.simulator import SimulationFailed, SpiceJob
 
 STEPS_PER_PERIOD, STEPS_PER_CONTACT, STEPS_PER_WAVE = 200, 20, 50
 MOST_STEPS = 40_000
-"""Of a period, at the first level: a contact shorter than T/2000 gets fewer steps than others. A
-run of more would take minutes, and such an orbit is next to grazing."""
+"""The most steps of a period at the first level: a contact shorter than T/2000 gets fewer steps
+than others. A run of more would take minutes, and such an orbit is next to grazing."""
 LEVELS = 5
 """How often the step is halved before the gate gives up."""
 REMEDIES_OF_GATE: tuple[Remedy, ...] = ("tolerance", "start")

@@ -41,7 +41,6 @@ class OpAmpBench:
     opamp: OpAmp
     """The catalogue's entry, at its rated supply and with every figure typical."""
     fidelity: Fidelity
-    """Fidelity of its model."""
     vos: float
     """Input offset voltage [V]."""
     rails: tuple[float, float]
@@ -204,7 +203,6 @@ class FigureCheck:
     """One figure of the catalogue, and what the model shows."""
 
     figure: str
-    """Name of the figure."""
     unit: str
     expected: float
     """What the catalogue says."""

@@ -69,7 +69,8 @@ def recovery(opamp: OpAmp) -> float:
 
 
 def headroom(opamp: OpAmp) -> tuple[float, float | None]:
-    """From the lower and the upper rail to the input common-mode range [V]; None: no limit.
+    """Distances [V] of the input common-mode range from the lower and the upper rail; None: no
+    limit.
 
     An op-amp with phase reversal has its upper end at the positive rail.
     """

@@ -19,12 +19,12 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice.simulator import Waveforms
 
 STROBE_TOLERANCE = 2e-3
-"""Of the peak of each state."""
+"""How near two strobes are that count as one, as a share of the peak of each state."""
 BRIEF = 2 * MAX_PERIOD
 """Drive periods in which no strobe of the second half need be like one before it, whatever the
 period: the shortest proof that there is none."""
 ENGINE_ERROR = 5e-4
-"""Of the peak of the moving state: contacts shallower, misses nearer than this are undecided."""
+"""Share of the peak of the moving state: shallower contacts and nearer misses are undecided."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class ClearanceRows:
     """(states + 2,) guard row over (states, generator, 1), positive in contact with the upper stop;
     None where there is none."""
     lower: Array | None
-    """The same of the lower stop."""
+    """The row of the lower stop, likewise."""
     displacement: Array
     """(states + 2,) row of the displacement in the clearance."""
     velocity: Array

@@ -113,7 +113,6 @@ class SpiceJob(Generic[T_co]):
     """What is made of the waveforms, inside the worker. It and its result must pickle: a function
     of a module or a ``functools.partial`` of one, not a lambda."""
     analysis: Analysis = "tran"
-    """The analysis of the deck."""
     patience: float = 1.0
     """How many times the pool's time it may take: a run at a finer step takes longer."""
 

@@ -35,8 +35,8 @@ FORMAT = 1
 INNER = 1e3
 """Resistance [ohm] inside an op-amp, whose voltage the clamps limit."""
 EMISSION, SATURATION_CURRENT = 0.001, 1e-14
-"""Of the clamps: no diode is so steep. Their voltage is 0.7 mV, and changes by 0.12 mV while the
-current grows a hundredfold."""
+"""Curve of the clamps' diodes: no real diode is so steep. Their voltage is 0.7 mV, and changes by
+0.12 mV while the current grows a hundredfold."""
 CLAMP = f".model clamp d(is={SATURATION_CURRENT!r} n={EMISSION!r})"
 LOAD = 1e6
 """Resistance [ohm] on a rail that no part uses: some simulators refuse a node with one element."""
@@ -151,7 +151,8 @@ def _instances(circuit: Circuit, board: Board) -> Iterator[str]:
 
 
 def _elements(circuit: Circuit, board: Board) -> Iterator[str]:
-    """The same elements once more for each section; offsets and bias currents that are not 0."""
+    """The elements of an op-amp, written out for each section; offsets and bias currents that are
+    not 0."""
     limits = list(dict.fromkeys(board.rails[s.name] for s in circuit.sections))
     for number, (low, high) in enumerate(limits):
         yield f"Vhigh{number} high{number} 0 {literal(high - _drop(circuit))}"

@@ -22,11 +22,11 @@ DEPTH = 0.5
 deep; the near end lies at `NEAR` of that."""
 NEAR = 0.1
 INSIDE = 0.9
-"""Of the force that closes the clearance: how far the dead zone's line goes."""
+"""Share of the force that closes the clearance up to which the dead zone's line goes."""
 ROOM = 0.8
-"""Of the saturation: how far any state may be pushed by the constant force."""
+"""Share of the saturation up to which the constant force may push any state."""
 STILL = 1e-9
-"""Of the largest displacement: a smaller one is none."""
+"""Share of the largest displacement below which a displacement is none."""
 ROUNDS = 8
 """How often the contacts of a rest are corrected before it counts as none."""
 
@@ -36,13 +36,13 @@ class StaticRest:
     """Where the masses rest over a stretch of constant forces."""
 
     sides: tuple[int, ...]
-    """For each dead zone the side that is in contact, 1 or -1, or 0."""
+    """The side of each dead zone that is in contact, 1 or -1; 0 where none is."""
     zone: int | None
     """Index of the dead zone whose contact is looked at; None where all are open."""
     near: float
     """The least force, over the drive's amplitude."""
     far: float
-    """The largest."""
+    """The greatest force, likewise."""
 
     @property
     def side(self) -> int:
@@ -50,7 +50,8 @@ class StaticRest:
         return 0 if self.zone is None else self.sides[self.zone]
 
     def place(self, model: SecondOrderSystem) -> str:
-        """In words: "open", "upper contact", of several dead zones "upper contact A"."""
+        """The contacts in words: "open", "upper contact", of several dead zones "upper contact
+        A"."""
         word = {0: "open", 1: "upper contact", -1: "lower contact"}[self.side]
         if self.zone is None or len(model.dead_zones) == 1:
             return word
@@ -153,8 +154,8 @@ class _Statics:
         return max(tops) > 1.0
 
     def open(self) -> StaticRest | None:
-        """All dead zones open: up to near the force that closes the first one, either way, as far
-        as the circuit rests there."""
+        """The rest with all dead zones open: up to near the force that closes the first one, either
+        way, as far as the circuit rests there."""
         sides = (0,) * len(self.model.dead_zones)
         ends = []
         for k, zone in enumerate(self.model.dead_zones):
@@ -191,7 +192,7 @@ class _Statics:
         return force
 
     def contact(self, zone: int, side: int) -> StaticRest | None:
-        """In contact with one stop, and with whichever others that takes."""
+        """The rest in contact with one stop, and with whichever others that takes."""
         zones = self.model.dead_zones
         stop = dict(zones[zone].sides)[side]
         size = abs(stop.gap) or max(reach.peak for reach in self.reaches)

@@ -25,8 +25,8 @@ from designer.spice.read_orbit import Read, strobes_after
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
 APART = 1e-4
-"""Of each state's peak: the distance of the two runs at the beginning of a stretch. It is above
-what the steps of the integration leave by a factor of a hundred."""
+"""Distance of the two runs at the beginning of a stretch, as a share of each state's peak. It is
+above what the steps of the integration leave by a factor of a hundred."""
 PAIRS = 32
 """Pairs of runs: the error is taken from how their growths differ."""
 TURNS, STRETCHES = 2, 6

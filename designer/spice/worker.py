@@ -31,7 +31,7 @@ class Reply:
     """What a worker says: first how its start went, then one for each job."""
 
     text: str = ""
-    """At the start: ngspice's version, or what is missing."""
+    """ngspice's version, or what is missing; said at the start alone."""
     value: bytes = b""
     """Pickled result or ``SimulationFailed``."""
     last: bool = False

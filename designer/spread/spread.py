@@ -51,7 +51,6 @@ class Group:
     name: str
     """Name of the network or the reel."""
     parts: tuple[str, ...]
-    """Names of the parts."""
     share: float
     """Share in [0, 1] of a part's deviation that it has in common with the others; the rest is its
     own."""

@@ -37,7 +37,6 @@ class Question:
     """One wanted response of the nominal design: what every board is asked."""
 
     spec: Response
-    """The wanted response."""
     excitation: Excitation
     """The generator's setting."""
     start: Orbit

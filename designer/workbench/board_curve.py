@@ -36,7 +36,7 @@ from designer.workbench.record import RecordedMotion
 FAR = 8.0
 """Standard errors beyond which the curve alone decides."""
 DISTANCES = 321
-"""That are tried within ``FAR`` of either side of the curve's own."""
+"""Distances that are tried within ``FAR`` of either side of the curve's own."""
 
 
 @dataclass(frozen=True)

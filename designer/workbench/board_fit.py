@@ -265,7 +265,6 @@ class BoardFit:
 
     prior: Prior
     observations: tuple[Observation, ...]
-    """The records."""
     centre: Array
     """(K,) coordinates of the most probable board."""
     covariance: Array

@@ -14,7 +14,7 @@ from designer.dynamics.attractors import peaks_near, shoot
 from designer.dynamics.flow import Flow
 
 POINTS = 512
-"""Of an orbit per drive period."""
+"""Points of an orbit per drive period."""
 
 
 @dataclass(frozen=True)

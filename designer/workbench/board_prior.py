@@ -57,7 +57,7 @@ class Prior:
 
     @cached_property
     def _moved(self) -> tuple[tuple[Quantity, ...], Array]:
-        """By one coordinate after the other, the rest at their medians."""
+        """(quantities, slopes): each coordinate is moved by itself, the rest at their medians."""
         count = len(self.spread.coordinates(self.circuit))
         cube = np.full((count, NODES, count), 0.5)
         own = np.arange(count)

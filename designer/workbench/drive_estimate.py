@@ -17,17 +17,18 @@ ROUNDS = 6
 COARSE = 32
 """Knots of a period while the frequency is refined."""
 HARMONICS = 24
-"""Of the drive, whose power is counted."""
+"""Harmonics of the drive whose power is counted."""
 FINE = 8
 """Points of the spectrum for each line that the record can tell."""
 MUCH = 0.2
-"""Of the most power that any frequency explains: candidates have more."""
+"""Share of the most power that any frequency explains: candidates have more."""
 CANDIDATES = 24
-"""At most."""
+"""The most candidates that are tried."""
 FEW = 4
 """Tops of a spectrum that are tried for a sine."""
 STRAY = 0.3
-"""Of a line of the spectrum: how far a frequency is from where it was first seen."""
+"""Distance of a frequency from where it was first seen, over the width of a line of the
+spectrum."""
 FEWEST_LINES = 1.5
 """Periods of a sine that is looked for."""
 TWICE, FAINT = 2.0, 0.01
@@ -44,7 +45,7 @@ class SineFit:
     amplitude: float
     """[V peak]."""
     phase: float
-    """At the record's first sample [rad], in [0, 2 pi)."""
+    """Phase at the record's first sample [rad], in [0, 2 pi)."""
     offset: float
     """[V]."""
     left: float

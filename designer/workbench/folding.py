@@ -23,9 +23,9 @@ SAMPLES = 1024
 KNOTS = (32, 64, 128, 256, 512)
 """Knots of a drive period that are tried."""
 SAMPLES_A_KNOT = 4
-"""At least."""
+"""The fewest samples of a knot."""
 POINTS = 1024
-"""Of a drive period, of the curve."""
+"""Points of the curve in a drive period."""
 DITHER = 0.5
 """Of a converter's step: noise that makes its rounding independent from sample to sample."""
 EXACT = 1e-6

@@ -64,25 +64,25 @@ and the fewest of them."""
 NOISE_ROOM = 1.25
 """How much more than the noise a curve may leave over and still be the whole motion."""
 SCOPE_GAIN = 0.03
-"""Of a channel's value: how wrong scope and probe may be where they are not told."""
+"""Error of scope and probe, over a channel's value, where they are not told."""
 KINK = 5e-4
-"""Of the peak: the least error of a threshold that is a corner only on paper, and of a curve
+"""Share of the peak: the least error of a threshold that is a corner only on paper, and of a curve
 through such corners."""
 FLAT, FEWEST_FLAT = 0.15, 0.1
-"""Of the output's range: how far from its level it is still inside the clearance; and share of a
-lap that it is there at least."""
+"""Distance from its level, over its range, at which an output is still inside the clearance; and
+the least share of a lap that it is there."""
 CORNER, BEYOND = 0.03, 0.1
-"""Of a channel that is cut off: how far from there its curve is round, of its range; and how far
-beyond a stop it has to reach, of the stop."""
+"""Distance from where a channel is cut off, over its range, in which its curve is round; and how
+far beyond a stop it has to reach, over the stop."""
 FEWEST_FREE, POOR = 0.1, 0.05
-"""Of the curve: what has to be left to fit a stage; and of its output's range, by how much it may
-be off the lines of one."""
+"""Share of the curve that has to be left to fit a stage; and share of its output's range by which
+it may be off the lines of one."""
 SURELY = 2.0
 """Times the noise that a curve leaves over of a motion that surely does not repeat."""
 STRETCHES, FEWEST_ALIKE, MOST_OF_IT, COLOURED = 16, 4, 0.9, 0.15
-"""Of a drive period, in which what is left over ought to be noise; samples of one, and share of
-those that most of them have; and how much more than white noise has the squared mean of one may
-have, for a converter's steps."""
+"""Stretches of a drive period in which what is left over ought to be noise; the fewest samples of
+one that counts, alone and over the median of all; and how much more than that of white noise the
+squared mean of one may be, for a converter's steps."""
 MOST_OTHERS = 8
 """Other responses that are listed."""
 
@@ -118,7 +118,7 @@ class NamedMotion:
     moving: str
     """The first state among them, else the first of them: what a phase portrait shows."""
     dead_zones: Mapping[str, DeadZoneCurve]
-    """By clearance: its stage as the record shows it, where its output and displacement are
+    """The stage of each clearance as the record shows it, where its output and displacement are
     there."""
     by_board: bool = False
     """Whether impacts that the curve leaves open were counted on the board behind the record."""
@@ -617,8 +617,8 @@ def _reaches(stop: PredictedStop, side: int, limits: Mapping[str, tuple[float, f
 def _by_output(
     curve: Fold, nets: Sequence[str], stop: PredictedStop, side: int
 ) -> ContactEvidence | None:
-    """By the output of the dead zone alone: what it shows beyond its level inside the clearance,
-    and beyond what it varies there. None where it does not stay near that level."""
+    """The contacts by the output of the dead zone alone: what it shows beyond its level inside the
+    clearance, and beyond what it varies there. None where it does not stay near that level."""
     if stop.output not in nets:
         return None
     place = nets.index(stop.output)
@@ -706,7 +706,7 @@ def _why(
 def _asymmetry(
     curve: Fold, nets: Sequence[str], prediction: BoardPrediction
 ) -> tuple[float, float]:
-    """Of the first displacement that was recorded, with four standard errors."""
+    """Asymmetry of the first displacement that was recorded, with four standard errors."""
     first = _moving(nets, prediction)
     if curve.n % 2 == 0 or first not in prediction.circuit.state_nets:
         return math.nan, math.nan

@@ -28,14 +28,14 @@ class ScopeErrors:
     """Standard deviations of what stands between a board and its record."""
 
     gain: float = 0.02
-    """Of the gain of each channel, probe and all, a fraction."""
+    """Error of the gain of each channel, probe and all, a fraction."""
     offset: float = 0.02
-    """Of the offset of each channel, over the range of the screen."""
+    """Error of the offset of each channel, over the range of the screen."""
     shift: float = 1e-3
-    """Of the time between the generator's channel and the others, in drive periods."""
+    """Error of the time between the generator's channel and the others, in drive periods."""
     amplitude: float = 0.0
-    """Of the generator's amplitude, a fraction. 0: the generator is the standard of the fit; its
-    own error is not seen in a record and goes with every setting."""
+    """Error of the generator's amplitude, a fraction. 0: the generator is the standard of the fit;
+    its own error is not seen in a record and goes with every setting."""
     model: float = 5e-4
     """What the exact circuit with its op-amps' bandwidth leaves out, over the peak of the orbit:
     slew, second poles, recovery (measured against ngspice on full op-amps)."""

@@ -24,7 +24,7 @@ from designer.workbench.board_prior import Prior
 from designer.workbench.record import RecordedMotion
 
 POINTS = 512
-"""Of a drive period, of a predicted wave."""
+"""Points of a predicted wave in a drive period."""
 DRAWN = 60
 """Boards that say how far the stops of one may be off."""
 DRAWN_WITH = 1

@@ -125,8 +125,8 @@ class RecordedMotion:
     """Mean of the generator's channel [V], the scope's own offset included; nan where it was not
     recorded."""
     phase: float
-    """Of the drive at the first sample [rad], in [0, 2 pi): 0 where amplitude · sin(phase + 2 pi f
-    t) rises through its mean; nan where the generator was not recorded."""
+    """Phase of the drive at the first sample [rad], in [0, 2 pi): 0 where amplitude · sin(phase + 2
+    pi f t) rises through its mean; nan where the generator was not recorded."""
     doubt: str = ""
     """What may be otherwise: which channel shows what, or the drive frequency; "" where nothing
     is."""

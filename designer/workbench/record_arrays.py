@@ -29,7 +29,7 @@ LONGEST_HEADER = 1 << 14
 KIND = re.compile(r"[<>|=]?([fiu][1248]|f16|b1)")
 """Types of numbers."""
 MOST_ARRAYS = 64
-"""In an archive."""
+"""The most arrays of an archive."""
 EXPECTED = "arrays of numbers, as NumPy writes them"
 PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -112,7 +112,7 @@ def _shape(header: dict[str, Any]) -> tuple[int, ...]:
 
 
 def _dtype(descr: Any) -> np.dtype[Any]:
-    """Of numbers, or of named fields that are numbers."""
+    """The type of an array of numbers, or of named fields that are numbers."""
     fields = [("", descr)] if isinstance(descr, str) else [(name, kind) for name, kind in descr]
     if not fields:
         raise ValueError("values without fields")

@@ -38,7 +38,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import read_bytes, reading
 
 MOST_BYTES = 1 << 26
-"""Of a file: a million and more samples of three channels."""
+"""The most bytes of a file: a million and more samples of three channels."""
 HEAD = 1 << 16
 """Characters in which a header has to end."""
 MIDDLE = 1 << 13
@@ -84,7 +84,7 @@ class _Layout:
         return bool(NUMBER.fullmatch(plain) or OVERRANGE.fullmatch(plain))
 
     def value(self, cell: str) -> float:
-        """Of a cell that is a number."""
+        """The number of a cell that is one."""
         return float(cell.translate(COMMAS) if self.decimal == "," else cell)
 
     def places(self, lines: Sequence[str]) -> tuple[int, ...]:

@@ -123,7 +123,7 @@ def _improved(
 
 
 def _interval(kind: str, square: float, told: float) -> KindSpread:
-    """With as many degrees of freedom as numbers were told."""
+    """The interval with as many degrees of freedom as numbers were told."""
     low, high = (told / chi2.ppf(p, told) for p in (0.975, 0.025))
     factor = float(np.sqrt(square))
     return KindSpread(kind, factor, factor * float(np.sqrt(low)), factor * float(np.sqrt(high)),
