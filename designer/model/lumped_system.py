@@ -559,22 +559,16 @@ class LumpedSystem(Elements):
         """
         out = asdict(self)
         for gap in out["gaps"]:
-            for key in ("preload_over", "restitution"):
+            for key in ("preload_over", "restitution", "of"):
                 if gap[key] is None:
                     del gap[key]
-        for force in out["forces"]:
+        bases = [] if self.base is None else [out["base"]]
+        for drive in (*out["forces"], *bases):
             for key in ("phase", "waveform", "terms", "harmonics"):
-                if not force[key]:
-                    del force[key]
-        if self.base is not None:
-            if self.base.unit == "m":
-                del out["base"]["unit"]
-            for key in ("phase", "waveform", "terms", "harmonics"):
-                if not out["base"][key]:
-                    del out["base"][key]
-        for gap in out["gaps"]:
-            if gap["of"] is None:
-                del gap["of"]
+                if not drive[key]:
+                    del drive[key]
+        if self.base is not None and self.base.unit == "m":
+            del out["base"]["unit"]
         for later in (*(kind.LIST for kind in KINDS), "matrices"):
             if not out[later]:
                 del out[later]
