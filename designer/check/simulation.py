@@ -106,8 +106,8 @@ class Simulated:
     """Of the orbit and of each of ``others``, (states, 2): least and greatest absolute displacement
     of each mass in the place of its state, refined; (0, 2) where it is not known."""
     misfits: tuple[tuple[LawMisfit, ...], ...] = ()
-    """Of the orbit and of each of ``others``, the curved laws whose force is off there;
-    () where the engine was not asked (ngspice)."""
+    """Of the orbit and of each of ``others``, the curved laws whose force is off there; of ngspice
+    where the exact circuit's orbit draws them, from which it began."""
     sticking: tuple[tuple[Sticking, ...] | None, ...] = ()
     """Of the orbit and of each of ``others``, what each friction does there, None where that is not
     known; () in ngspice."""
@@ -512,23 +512,24 @@ def _in_ngspice(
     reduction = nominal.nominal_reduction(design)
     rows, subjects = [], []
     for spec in specs:
-        r, _, orbits = _circuit_orbits(synthesis, spec, scan)
+        r, flow, orbits = _circuit_orbits(synthesis, spec, scan)
         drive = design.excitation(r.b, r.omega)
         settled = [o for o in orbits if len(o.start)]
         subjects += [
             numerics_gate.GateSubject(reduction, drive, o, fidelity=fidelity) for o in settled
         ]
-        rows.append((r, drive, len(settled)))
+        rows.append((r, drive, flow, settled))
         step()
     progress.stage("ngspice, numerics gate")
     passed = numerics_gate.check(pool, subjects)
     results = iter(twin_runs.with_exponents(pool, subjects, passed))
     seconds = (time.perf_counter() - began) / max(len(specs), 1)
     out = []
-    for r, excitation, count in rows:
+    for r, excitation, flow, settled in rows:
         volts, scale = design.volts(r.b), design.errors.scales.seconds
-        gates = [next(results) for _ in range(count)]
+        gates = [next(results) for _ in settled]
         answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
+        begun = [o for o, answer in zip(settled, answers, strict=True) if answer is not None]
         orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
         scaled = [design.in_model_units(o, volts) for o in orbits]
         out.append(
@@ -544,6 +545,11 @@ def _in_ngspice(
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
                 absolute=_unmoved(model, [scaled[i] for i in _distinct(scaled)]),
+                misfits=tuple(
+                    law_misfits(model.at(r.b), flow, begun[i], volts)
+                    for i in _distinct(scaled)
+                    if begun
+                ),
                 **_of_system(model.at(r.b), r.omega),
             )
         )

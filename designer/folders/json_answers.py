@@ -169,6 +169,8 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         own = {**orbit_json(orbit, si), **_frequencies_hz(orbit, si)}
         return {**own, **_in_clearances(simulated, orbit, si), "twin": twin}
     answer = {**orbit_json(orbit), **_frequencies_hz(orbit, si)}
+    from designer.check.curved_laws import misfits_json
+
     is_known = simulated.absolute and len(simulated.absolute[number])
     x = simulated.absolute[number][0::2] if is_known else None
     low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
@@ -179,7 +181,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x_min": low,
         **_from_base(simulated, orbit),
         **_in_clearances(simulated, orbit),
-        **_misfits(simulated, number),
+        **misfits_json(simulated.misfits[number] if simulated.misfits else ()),
         **_sticking(simulated, number),
         "twin": twin,
     }
@@ -219,14 +221,6 @@ def _in_clearances(
                 row[key] = {**(row[key] or {}), **depth, f"speed{rate}": speed * met}
         rows.append(row)
     return {"in_clearances": rows} if rows else {}
-
-
-def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:
-    """Curved laws whose force is off over an orbit, by what they are; nothing without any."""
-    kinds: dict[str, Any] = {}
-    for each in simulated.misfits[number] if simulated.misfits else ():
-        kinds.setdefault(each.kind, []).append(each.as_dict())
-    return kinds
 
 
 def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:
