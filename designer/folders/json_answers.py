@@ -179,7 +179,7 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x1_min": None if low is None else low[0],
         "x_max": high,
         "x_min": low,
-        **_from_base(simulated, orbit),
+        **_from_base(simulated, number),
         **_in_clearances(simulated, orbit),
         **misfits_json(simulated.misfits[number] if simulated.misfits else ()),
         **_sticking(simulated, number),
@@ -190,11 +190,13 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
     return answer
 
 
-def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
+def _from_base(simulated: Simulated, number: int) -> dict[str, Any]:
     """Extremes of the displacements from a base that moves, and its amplitude."""
     if not simulated.base:
         return {}
-    z = orbit.extremes[0::2] if len(orbit.extremes) else None
+    spans = simulated.from_base
+    span = spans[number] if spans else (simulated.orbit, *simulated.others)[number].extremes
+    z = span[0::2] if len(span) else None
     low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
     return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
 
