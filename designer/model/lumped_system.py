@@ -415,6 +415,7 @@ class LumpedSystem(Elements):
                 tuple(float(each) for each in self.row_of(element.factors)),
                 element.quantity,
                 element.corners,
+                curved=element.curve is not None,
             )
             for name, element in self.nonlinear.items()
         ]

@@ -248,12 +248,6 @@ class SecondOrderSystem:
             _without_rounding(self.damping.sum(axis=1), self.damping),
         )
 
-    @cached_property
-    def _without_forces(self) -> SecondOrderSystem:
-        """Driven by the ground alone."""
-        none = np.zeros(self.size)
-        return replace(self, force=none, quadrature=none, harmonics=())
-
     @property
     def _own_waves(self) -> tuple[HarmonicForce, ...]:
         """Without the ground's."""
@@ -265,7 +259,7 @@ class SecondOrderSystem:
         motion, and where forces take more than two."""
         if not self.ground_moves:
             return None
-        ground = channels(_parts(self._without_forces.drive_waves(omega)))
+        ground = channels({n: wave for _, n, wave in self._ground_waves(omega)})
         every = self.channels(omega)
         if not ground or not every:
             return None
@@ -542,6 +536,8 @@ class _Contact:
     """Coefficient of the drive in what is watched."""
     clearance: int = -1
     """Index of the clearance whose contact it is; -1 of a law."""
+    law: str = ""
+    """Name of the law whose corners are its own; "" of one that stands for a curve."""
 
     @classmethod
     def with_stops(cls, system: SecondOrderSystem, index: int, ground: float) -> _Contact:
@@ -566,7 +562,8 @@ class _Contact:
         along = np.array(law.row)
         watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
         push_back = _interleaved(system.over_mass(system.push(law)), 1)
-        return cls(watched, np.zeros_like(watched), push_back, law.bends, {})
+        name = "" if law.curved else law.name
+        return cls(watched, np.zeros_like(watched), push_back, law.bends, {}, law=name)
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:
         """Add the force of what has joined in to the equations.
@@ -604,7 +601,9 @@ class _Contact:
         # Contact begins or ends; deeper springs only stiffen it.
         touches = not (level and key[index])
         clearance = self.clearance if touches else -1
-        return Guard(sign * self.row, sign * self.on_drive, constant, target, clearance)
+        corner = f"{self.law} at {-sign * constant:.6g}" if self.law else ""
+        row = sign * self.row, sign * self.on_drive, constant
+        return Guard(*row, target, clearance, corner=corner)
 
 
 def _interleaved(row: Array, first: int) -> Array:

@@ -137,8 +137,7 @@ class ModelSubject:
         return out
 
     def drawn(self, change: Mapping[str, float]) -> tuple[MechanicalModel, Array]:
-        """The model with these changes, and (states,) units of a state of its flow per unit of the
-        model's."""
+        """The model with these changes, and (states,) units of its flow's states: its own."""
         return _changed(self.model, change), np.ones(len(self.states))
 
     def family(self, parameter: str) -> Family:
