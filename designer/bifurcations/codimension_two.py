@@ -30,7 +30,7 @@ from designer.bifurcations.conditions import (
     grazings,
 )
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
-from designer.bifurcations.points import PointKind
+from designer.bifurcations.points import TOUCHES, PointKind
 
 APART = 1e-5
 """The step, in scaled units, of the difference that gives the second derivative of the map."""
@@ -40,10 +40,16 @@ ORDER = (
     PointKind.DOUBLING,
     PointKind.PITCHFORK,
     PointKind.TORUS,
+    PointKind.CORNER,
 )
 """The order in which the kinds that meet are named."""
 SHORT = {PointKind.DOUBLING: "flip"}
-ENDS = ("degenerate grazing", "degenerate pitchfork", "degenerate period doubling")
+ENDS = (
+    "degenerate grazing",
+    "degenerate pitchfork",
+    "degenerate period doubling",
+    "degenerate corner",
+)
 """The points of codimension two at which every curve ends."""
 FALLEN = 1e-7
 """An orbit no farther than this from its partner, in scaled units, has fallen together with it."""
@@ -126,7 +132,7 @@ def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
         n = system.states
         phase = float(p.z[n])
         curvature = p.condition.curvature(system.flow(p.z), p.z[:n], phase)
-        out["degenerate grazing", None] = curvature
+        out[f"degenerate {kind}", None] = curvature
         for value, other_kind in ((1.0, PointKind.FOLD), (-1.0, flip)):
             out[meeting(kind, other_kind), other_kind] = float(characteristic(value))
     if not isinstance(p.condition, MultiplierPair):
@@ -147,8 +153,10 @@ def _resonances(total: float, *, symmetric: bool) -> dict[str, float]:
 def meeting(one: PointKind, other: PointKind) -> str:
     """Name of the point where curves of two kinds meet on the same orbit."""
     if one is other:
-        return "two grazings" if one is PointKind.GRAZING else f"double {one}"
+        return f"two {one}s" if one in TOUCHES else f"double {one}"
     a, b = sorted((one, other), key=ORDER.index)
+    if b is PointKind.CORNER:
+        return f"corner meets {a}"
     if a is PointKind.GRAZING:
         return f"grazing meets {b}"
     return f"{SHORT.get(a, a)}-{SHORT.get(b, b)}"
@@ -249,11 +257,11 @@ def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> Codimensi
 
 
 def _grazing_within(
-    system: ExtendedSystem, p: CurvePoint, reach: float
+    system: ExtendedSystem, p: CurvePoint, reach: float, *, corners: bool = False
 ) -> tuple[CurvePoint, Grazing, Array] | None:
-    """The point no farther than ``reach`` from p at which a turning point touches its stop, with
-    that condition and its unknowns."""
-    for grazing, phase in _turning(system, p)[:2]:
+    """The point no farther than ``reach`` from p at which a turning point touches its stop, or
+    corner, with that condition and its unknowns."""
+    for grazing, phase in _turning(system, p, corners=corners)[:2]:
         found = system.meet(p, grazing, np.array([phase]))
         found = _from_clear_of(system, p, grazing, phase) if found is None else found
         if found is not None and system.distance(p.z, found[0].z) <= reach:
@@ -294,18 +302,24 @@ def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> Codimensi
     has a corner, for beyond it the multipliers change with the square root of the penetration."""
     if isinstance(p.condition, Grazing):
         return None
-    grazed = _grazing_within(system, p, CORNER)
-    if grazed is None:
-        return None
-    name = meeting(p.condition.kind, PointKind.GRAZING)
-    return CodimensionTwo(name, grazed[0], float(index + 1), *grazed[1:])
+    if grazed := _grazing_within(system, p, CORNER):
+        name = meeting(p.condition.kind, PointKind.GRAZING)
+        return CodimensionTwo(name, grazed[0], float(index + 1), *grazed[1:])
+    if cornered := _grazing_within(system, p, CORNER, corners=True):
+        # The curve of the corner itself is that of any point of a branch.
+        name = meeting(p.condition.kind, PointKind.CORNER)
+        return CodimensionTwo(name, cornered[0], float(index + 1))
+    return None
 
 
-def _turning(system: ExtendedSystem, p: CurvePoint) -> list[tuple[Grazing, float]]:
-    """The orbit's turning points but the curve's own, nearest to its stop first."""
+def _turning(
+    system: ExtendedSystem, p: CurvePoint, *, corners: bool = False
+) -> list[tuple[Grazing, float]]:
+    """The orbit's turning points but the curve's own, nearest to its stop, or corner, first."""
     n = system.states
     own = (p.condition, float(p.z[n])) if isinstance(p.condition, Grazing) else None
-    return grazings(system.flow(p.z), p.z[:n], system.n, own, symmetric=system.symmetric)
+    kinds = {"symmetric": system.symmetric, "corners": corners}
+    return grazings(system.flow(p.z), p.z[:n], system.n, own, **kinds)
 
 
 def partner(system: ExtendedSystem, p: CurvePoint) -> Array:

@@ -221,6 +221,7 @@ class Grazing:
     size: float
     """Peak of the displacement in the clearance."""
     kind: PointKind = PointKind.GRAZING
+    """Grazing, or a corner."""
     unknowns: int = 1
     """The phase of the turning point, in drive periods."""
     clear: float = CLEAR
@@ -313,13 +314,19 @@ def grazings(
     but: tuple[Grazing, float] | None = None,
     *,
     symmetric: bool = False,
+    corners: bool = False,
 ) -> list[tuple[Grazing, float]]:
     """The turning points of an orbit as what may graze, nearest to its stop first, each with its
     phase. but : one that is left out, and its mirror image. symmetric : whether the second half of
-    the orbit is the mirror image of the first, in which case that tells all."""
+    the orbit is the mirror image of the first, in which case that tells all. corners : those at
+    corners of laws in the place of those at stops."""
     orbit = Orbit(OrbitStatus.PERIODIC, n=n, start=x)
-    spans = np.abs(flow.run(x, n, measure=True).spans).max(axis=1)
-    near = sorted(turning_points_of(flow, orbit), key=lambda t: abs(t.height))
+    spans = np.abs(flow.run(x, n, measure=True).spans).max(axis=1, initial=0.0)
+    first, kind = len(flow.system.clearances), PointKind.GRAZING
+    numbers = range(first)
+    if corners:
+        numbers, kind = range(first, first + len(flow.system.corners)), PointKind.CORNER
+    near = sorted(turning_points_of(flow, orbit, numbers), key=lambda t: abs(t.height))
     out = []
     for t in near:
         if symmetric and t.phase >= 0.5 * n:
@@ -328,7 +335,9 @@ def grazings(
         if but is None or not _is_same(
             contact, t.phase, *but, mirrored=flow.system.mirror is not None
         ):
-            out.append((Grazing(contact, n, float(spans[t.clearance])), t.phase))
+            own = [abs(other.height) for other in near if other.clearance == t.clearance]
+            size = max(own) if corners else float(spans[t.clearance])
+            out.append((Grazing(contact, n, size, kind), t.phase))
     return out
 
 

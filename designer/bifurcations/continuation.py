@@ -23,6 +23,7 @@ from designer.bifurcations.orbit_curve import Curve, Solved
 from designer.dynamics.attractors import describe
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.turning_points import corner_crossings
 
 FIRST, LEAST, GREATEST = 5e-3, 1e-9, 5e-2
 """Arclength of the first, the shortest and the longest step, in scaled units. Past a grazing point
@@ -68,6 +69,8 @@ class BranchPoint:
     orbit: Orbit
     solved: Solved
     """Where on its curve it lies."""
+    crossings: tuple[int, ...] = ()
+    """As of ``turning_points.corner_crossings``."""
 
     @property
     def stable(self) -> bool:
@@ -134,11 +137,10 @@ def at(curve: Curve, solved: Solved) -> BranchPoint | None:
     """The orbit at a solved point, or None where it does not close."""
     flow = curve.family.flow(solved.value)
     orbit = describe(flow, solved.x, curve.n, curve.monodromy(solved), laps=1)
-    return (
-        None
-        if orbit.status is OrbitStatus.NOT_SETTLED
-        else BranchPoint(solved.value, orbit, solved)
-    )
+    if orbit.status is OrbitStatus.NOT_SETTLED:
+        return None
+    crossings = corner_crossings(flow, orbit) if flow.system.corners else ()
+    return BranchPoint(solved.value, orbit, solved, crossings)
 
 
 def trace(
@@ -298,7 +300,7 @@ def _between(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[BranchPoint] 
     while stack:
         a, b = stack.pop()
         length = curve.distance(a.solved, b.solved)
-        counts = a.counts != b.counts and length > NEAREST
+        counts = (a.counts, a.crossings) != (b.counts, b.crossings) and length > NEAREST
         jump = abs(_size(a) - _size(b)) > JUMP and length > FINEST
         middle = None
         if counts or jump:

@@ -32,7 +32,7 @@ class GrazingContact:
     """Which turning point grazes which stop."""
 
     clearance: int
-    """Index of the clearance."""
+    """Index of the clearance, or number of a corner (``PiecewiseLinearSystem.corners``)."""
     side: int
     """1 for its upper stop, -1 for the lower."""
     tip: bool
@@ -80,7 +80,8 @@ def height_along(
 def _nodes(flow: Flow, contact: GrazingContact) -> int:
     """Nodes in a drive period: a step of the general kernel apart, in contact too."""
     rest = flow.system.mode(flow.system.start)
-    contacts = [flow.system.mode(g.target) for g in rest.guards if g.clearance == contact.clearance]
+    guards = [g for g in rest.guards if g.clearance == contact.clearance]
+    contacts = [flow.system.mode(g.target) for g in guards or flow.system.corners]
     step = min(step_length(mode.A, flow.fastest) for mode in (rest, *contacts))
     return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
 
@@ -89,6 +90,13 @@ def _mode(flow: Flow, x: Array, angle: float, contact: GrazingContact) -> Mode:
     """The mode about the turning point: the one at x but for the contact at the stop itself."""
     system = flow.system
     mode = system.mode(flow.mode_at(x, angle))
+    if contact.clearance >= len(system.clearances):
+        # At a corner the guard of the piece within is that of the corner, of the piece beyond its
+        # negative.
+        row = system.contact_rows(contact.clearance)[1]
+        leads_away = -row if contact.tip else row
+        across = (g for g in mode.guards if np.array_equal(g.row, leads_away))
+        return next((system.mode(guard.target) for guard in across), mode)
     wanted = 0 if contact.tip else contact.side
     if mode.sides[contact.clearance] == wanted:
         return mode

@@ -24,7 +24,7 @@ from designer.bifurcations.codimension_two import (
 from designer.bifurcations.conditions import Condition, Multiplier, MultiplierPair, grazings
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem, hermite
 from designer.bifurcations.flow_family import FlowPlane
-from designer.bifurcations.points import Bifurcation, PointKind
+from designer.bifurcations.points import TOUCHES, Bifurcation, PointKind
 from designer.dynamics.attractors import peaks_near
 from designer.dynamics.flow import Flow
 
@@ -214,10 +214,10 @@ def _conditions(
     kind = bifurcation.kind
     if kind is PointKind.TORUS:
         return [(MultiplierPair.at(jacobian), np.zeros(0))]
-    if kind is not PointKind.GRAZING:
+    if kind not in TOUCHES:
         return [(Multiplier.at(kind, jacobian), np.zeros(0))]
     x, n = bifurcation.point.solved.x, bifurcation.point.orbit.n
-    near = grazings(flow, x, n, symmetric=symmetric)[:4]
+    near = grazings(flow, x, n, symmetric=symmetric, corners=kind is PointKind.CORNER)[:4]
     return [(grazing, np.array([phase])) for grazing, phase in near]
 
 

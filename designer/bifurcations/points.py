@@ -13,6 +13,8 @@ it on a converged orbit.
 - torus: a pair of complex multipliers crosses the unit circle.
 - grazing: a turning point of a displacement lies on a stop (``dynamics.turning_points``): in a
   clearance whose counts of impacts change.
+- corner: a turning point lies on a corner of a law of force, which it passes more or less often
+  from there on. The multipliers change beyond it as beyond a grazing; the counts stay.
 """
 
 from __future__ import annotations
@@ -45,6 +47,11 @@ class PointKind(StrEnum):
     FOLD = "fold"
     GRAZING = "grazing"
     TORUS = "torus"
+    CORNER = "corner"
+
+
+TOUCHES = (PointKind.GRAZING, PointKind.CORNER)
+"""At which a turning point lies on a border of the equations."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +115,7 @@ class Bifurcation:
     """What leaves the branch here, where that was looked for (``branch_switch.birth``)."""
     stops: str = ""
     """The stops that are grazed, "the upper stop of A" or "both stops of A", where there are more
-    clearances than one."""
+    clearances than one; of a corner "NAME at X"."""
 
     @property
     def response(self) -> str:
@@ -215,7 +222,16 @@ def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[PointKind
         out = [(kind, test) for kind, test in out if kind is not PointKind.FOLD]
     if a.counts != b.counts:
         out.append((PointKind.GRAZING, _gap(curve, {k for k, _ in _changed(a, b)})))
+    if corners := _corners(a, b):
+        first = len(curve.family.flow(a.value).system.clearances)
+        out.append((PointKind.CORNER, _gap(curve, {first + k for k in corners})))
     return out
+
+
+def _corners(a: BranchPoint, b: BranchPoint) -> list[int]:
+    """Numbers of the corners that are not passed as often at both."""
+    pairs = enumerate(zip(a.crossings, b.crossings, strict=False))
+    return [k for k, (before, after) in pairs if before != after]
 
 
 def _pair(p: BranchPoint) -> float:
@@ -231,10 +247,12 @@ def _changed(a: BranchPoint, b: BranchPoint) -> list[tuple[int, int]]:
     return [(k, i) for k, both in pairs for i in (0, 1) if both[0][i] != both[1][i]]
 
 
-def _stops(curve: Curve, a: BranchPoint, b: BranchPoint) -> str:
-    """The stops that are grazed between two points, "the upper stop of A", where there are more
-    clearances than one."""
-    names = curve.family.flow(a.value).system.clearances
+def _stops(curve: Curve, a: BranchPoint, b: BranchPoint, kind: PointKind) -> str:
+    """``Bifurcation.stops`` of what happens between two points."""
+    system = curve.family.flow(a.value).system
+    if kind is PointKind.CORNER:
+        return " and ".join(system.corners[k].corner for k in _corners(a, b))
+    names = system.clearances
     changed = _changed(a, b)
     words = []
     for k in sorted({k for k, _ in changed}):
@@ -277,19 +295,19 @@ def _locate(
 
     def on_first_side(p: BranchPoint) -> bool:
         """Whether a point lies on a's side."""
+        if kind is PointKind.CORNER:
+            return p.crossings == a.crossings
         return p.counts == a.counts if kind is PointKind.GRAZING else test(p) * test(a) > 0.0
 
     try:
         if test(a) * test(b) < 0.0:
             root = float(brentq(lambda s: test(point(s)), 0.0, 1.0, xtol=1e-15, rtol=1e-14))
-        elif kind is PointKind.GRAZING:
+        elif kind in TOUCHES:
             root = _bisect(lambda s: on_first_side(point(s)))
         else:
             return None
         middle = point(root)
-        if kind is not PointKind.GRAZING and abs(test(middle)) > ZERO * max(
-            abs(test(a)), abs(test(b))
-        ):
+        if kind not in TOUCHES and abs(test(middle)) > ZERO * max(abs(test(a)), abs(test(b))):
             return None  # a jump over zero: two complex multipliers that became real
         stalled = max(1.0, middle.solved.residual / CONVERGED)
         error = _width(point, on_first_side, root, stalled * ROUNDING * float(curve.scale[-1]))
@@ -309,7 +327,7 @@ def _locate(
         branch=number,
         side=int(np.sign(a.value + b.value - 2.0 * middle.value)) if kind is PointKind.FOLD else 0,
         symmetric=_symmetric(curve, middle),
-        stops=_stops(curve, a, b) if kind is PointKind.GRAZING else "",
+        stops=_stops(curve, a, b, kind) if kind in TOUCHES else "",
     )
 
 

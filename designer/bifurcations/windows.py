@@ -80,7 +80,9 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
     out = []
     # Where branches meet a multiplier is 1 but for rounding: that orbit judges nothing.
     meets = [int(end is End.JOINED) for end in branch.ends]
-    ends = [None, *sorted(points, key=lambda p: p.position), None]
+    # A corner of a law ends no response.
+    ended = [p for p in points if p.kind is not PointKind.CORNER]
+    ends = [None, *sorted(ended, key=lambda p: p.position), None]
     for before, after in itertools.pairwise(ends):
         first = meets[0] if before is None else int(before.position) + 1
         last = len(branch.points) - 1 - meets[1] if after is None else int(after.position)

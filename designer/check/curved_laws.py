@@ -7,7 +7,7 @@ its end. A motion beyond it, or over a small part of it, meets another law than 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -87,6 +87,14 @@ class LawMisfit:
         own = {"between": self.where} if self._spring else {"clearance": self.where[0]}
         span = {"range" if self._spring else "depth": self.span}
         return {**own, **span, "reached": self.reached, "error": self.error}
+
+
+def misfits_json(misfits: Iterable[LawMisfit]) -> dict[str, Any]:
+    """Misfits by their kinds, for JSON; nothing without any."""
+    kinds: dict[str, Any] = {}
+    for each in misfits:
+        kinds.setdefault(each.kind, []).append(each.as_dict())
+    return kinds
 
 
 def misfits_in(answer: Mapping[str, Any]) -> Iterator[LawMisfit]:

@@ -33,7 +33,6 @@ from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import settle, starts as sobol_starts
 from designer.dynamics.coexisting_attractors import coexisting, outlived
 from designer.dynamics.counts import MAX_PERIOD
-from designer.dynamics.drive_shape import Shape
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
@@ -105,9 +104,11 @@ class Simulated:
     absolute: tuple[Array, ...] = ()
     """Of the orbit and of each of ``others``, (states, 2): least and greatest absolute displacement
     of each mass in the place of its state, refined; (0, 2) where it is not known."""
+    from_base: tuple[Array, ...] = ()
+    """Likewise from a base that moves; () where the states themselves are counted from it."""
     misfits: tuple[tuple[LawMisfit, ...], ...] = ()
-    """Of the orbit and of each of ``others``, the curved laws whose force is off there;
-    () where the engine was not asked (ngspice)."""
+    """Of the orbit and of each of ``others``, the curved laws whose force is off there; of ngspice
+    where the exact circuit's orbit draws them, from which it began."""
     sticking: tuple[tuple[Sticking, ...] | None, ...] = ()
     """Of the orbit and of each of ``others``, what each friction does there, None where that is not
     known; () in ngspice."""
@@ -132,7 +133,7 @@ class Simulated:
 
     def motion(self, times: ArrayLike | None = None, *, orbit: Orbit | None = None) -> pd.DataFrame:
         """The states x1, x1', x2, … at any times, in model units; where the base moves, "y" is its
-        displacement and the states are counted from it.
+        displacement, and the states are counted from it unless its stops stay.
 
         times : (k,) from 0, where the drive's phase is 0; without it the period, or
         ``SHOWN_PERIODS`` drive periods of a motion that has none, at ``TRACE_POINTS`` a drive
@@ -344,10 +345,15 @@ def _on_model(
         record=record_of(flow, orbits[0], units, 1.0) if traces else None,
         trust=trust.of_orbit(flow, orbits[0]),
         coexistence=result,
-        absolute=tuple(absolute_extremes(flow, o, ground_of(model, r.omega)) for o in orbits),
+        **_displacements(model, r.omega, flow, orbits, units),
         misfits=tuple(law_misfits(model, flow, o, units) for o in orbits),
         sticking=tuple(stick_phases(model, flow, o, units, 1.0) for o in orbits),
-        flow=UnitFlow(partial(model_flow, model, r.omega), units, 1.0, _ground(model, r.omega)),
+        flow=UnitFlow(
+            partial(model_flow, model, r.omega),
+            units,
+            1.0,
+            model.second_order().ground_shape(r.omega),
+        ),
         **_of_system(model, r.omega),
     )
 
@@ -385,9 +391,20 @@ def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
     return [o for o in orbits if o.status in ANSWERS]
 
 
-def _ground(model: MechanicalModel, omega: float) -> Shape:
-    system = model.second_order()
-    return system.ground_shape(omega) if system.ground_moves else ()
+def _displacements(
+    model: MechanicalModel, omega: float, flow: Flow, orbits: Sequence[Orbit], volts: Array
+) -> dict[str, Any]:
+    """``Simulated.absolute`` and ``Simulated.from_base`` of orbits of a flow. volts (states,) : its
+    units of a state in one of the model's."""
+    system, ground = model.second_order(), ground_of(model, omega) * volts[:, None]
+
+    def moved(ground: Array) -> tuple[Array, ...]:
+        spans = (absolute_extremes(flow, orbit, ground) for orbit in orbits)
+        return tuple(span / volts[:, None] if len(span) else span for span in spans)
+
+    if not (system.absolute and system.driven_by_ground):
+        return {"absolute": moved(ground)}
+    return {"absolute": moved(0.0 * ground), "from_base": moved(-ground)}
 
 
 def _of_system(model: MechanicalModel, omega: float) -> dict[str, Any]:
@@ -459,7 +476,7 @@ def _on_circuit(
     rows = [i for i in _distinct(scaled) if i == 0 or scaled[i].status in ANSWERS]
     first = _attractors([measured[i] for i in rows])
     model = synthesis.modelfile.model.at(r.b)
-    box, ground = scale_of(model, r.omega), ground_of(model, r.omega) * volts[:, None]
+    box = scale_of(model, r.omega)
     even = model.second_order().even
     result, more = _drawn(flow, box, *sampling, first, volts, even=even)
     rows += range(len(measured), len(measured) + len(more))
@@ -480,10 +497,15 @@ def _on_circuit(
         record=record_of(flow, measured[0], volts, seconds) if traces else None,
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=result,
-        absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in rows),
+        **_displacements(model, r.omega, flow, [measured[i] for i in rows], volts),
         misfits=tuple(law_misfits(model, flow, measured[i], volts) for i in rows),
         sticking=tuple(stick_phases(model, flow, measured[i], volts, seconds) for i in rows),
-        flow=UnitFlow(partial(board_flow, design, r), volts, seconds, _ground(model, r.omega)),
+        flow=UnitFlow(
+            partial(board_flow, design, r),
+            volts,
+            seconds,
+            model.second_order().ground_shape(r.omega),
+        ),
         **_of_system(model, r.omega),
     )
 
@@ -512,23 +534,24 @@ def _in_ngspice(
     reduction = nominal.nominal_reduction(design)
     rows, subjects = [], []
     for spec in specs:
-        r, _, orbits = _circuit_orbits(synthesis, spec, scan)
+        r, flow, orbits = _circuit_orbits(synthesis, spec, scan)
         drive = design.excitation(r.b, r.omega)
         settled = [o for o in orbits if len(o.start)]
         subjects += [
             numerics_gate.GateSubject(reduction, drive, o, fidelity=fidelity) for o in settled
         ]
-        rows.append((r, drive, len(settled)))
+        rows.append((r, drive, flow, settled))
         step()
     progress.stage("ngspice, numerics gate")
     passed = numerics_gate.check(pool, subjects)
     results = iter(twin_runs.with_exponents(pool, subjects, passed))
     seconds = (time.perf_counter() - began) / max(len(specs), 1)
     out = []
-    for r, excitation, count in rows:
+    for r, excitation, flow, settled in rows:
         volts, scale = design.volts(r.b), design.errors.scales.seconds
-        gates = [next(results) for _ in range(count)]
+        gates = [next(results) for _ in settled]
         answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
+        begun = [o for o, answer in zip(settled, answers, strict=True) if answer is not None]
         orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
         scaled = [design.in_model_units(o, volts) for o in orbits]
         out.append(
@@ -543,18 +566,25 @@ def _in_ngspice(
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
-                absolute=_unmoved(model, [scaled[i] for i in _distinct(scaled)]),
+                **_unmoved(model, [scaled[i] for i in _distinct(scaled)]),
+                misfits=tuple(
+                    law_misfits(model.at(r.b), flow, begun[i], volts)
+                    for i in _distinct(scaled)
+                    if begun
+                ),
                 **_of_system(model.at(r.b), r.omega),
             )
         )
     return tuple(out)
 
 
-def _unmoved(model: MechanicalModel, orbits: Sequence[Orbit]) -> tuple[Array, ...]:
-    """Extremes of the absolute displacements where the ground rests; of a moving one ngspice has
-    none."""
-    moved = model.second_order().ground_moves
-    return tuple(np.zeros((0, 2)) if moved else orbit.extremes for orbit in orbits)
+def _unmoved(model: MechanicalModel, orbits: Sequence[Orbit]) -> dict[str, Any]:
+    """As ``_displacements``; of those that are no states ngspice has no extremes."""
+    system, unknown = model.second_order(), (np.zeros((0, 2)),) * len(orbits)
+    if system.ground_moves:
+        return {"absolute": unknown}
+    own = tuple(orbit.extremes for orbit in orbits)
+    return {"absolute": own, "from_base": unknown if system.driven_by_ground else ()}
 
 
 def _gate_settings(result: numerics_gate.GateResult) -> dict[str, Any]:

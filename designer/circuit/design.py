@@ -149,7 +149,8 @@ class Design:
 
     def excitation(self, b: float, omega: float) -> Excitation:
         """The generator's setting at a clearance and a dimensionless frequency."""
-        frequency, (shape, *others) = self.errors.scales.frequency(omega), self.drive_shapes
+        frequency = self.errors.scales.frequency(omega)
+        shape, *others = self.model.second_order().drive_shapes(omega)
         amplitude = self.amplitude(b, omega)
         second = SecondDrive(self.amplitude(b, omega, 1), others[0]) if others else None
         return Excitation(frequency, amplitude, shape=shape, second=second)
@@ -157,8 +158,9 @@ class Design:
     @property
     def drive_shapes(self) -> tuple[Shape, ...]:
         """What the voltage of each of the generator's channels is the negative of, over its
-        amplitude."""
-        return self.model.second_order().drive_shapes
+        amplitude, at the model's own frequency."""
+        system = self.model.second_order()
+        return system.drive_shapes(system.own_frequency)
 
     def parts_table(self) -> pd.DataFrame:
         """The resistors and capacitors as a frame: ``name``, ``value``, ``unit``, ``role``."""

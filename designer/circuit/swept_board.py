@@ -25,7 +25,12 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import UPPER, DrivenSystem
 from designer.model.find_responses import scale_of
-from designer.model.mechanics import SecondOrderSystem, check_omega, frequency_range
+from designer.model.mechanics import (
+    MechanicalModel,
+    SecondOrderSystem,
+    check_omega,
+    frequency_range,
+)
 from designer.model.model import GREATEST, SMALLEST
 from designer.model.relative_motion import shown_stops, subscripted
 from designer.model.si_units import NO_UNITS
@@ -119,12 +124,20 @@ class BoardSubject:
         """(states,) size of the states that starts are drawn from: one for all changes."""
         out = np.zeros(len(self.states))
         for change in changes:
-            e = self.excitation(change)
-            omega = 2.0 * np.pi * e.frequency * self.design.errors.scales.seconds
-            b = self.design.model.b * self.design.amplitude(omega=omega) / e.amplitude
-            model = self.design.model.at(b)
-            out = np.maximum(out, scale_of(model, omega) * self.design.volts(b))
+            model, volts = self.drawn(change)
+            out = np.maximum(out, scale_of(model, self._omega(change)) * volts)
         return out
+
+    def drawn(self, change: Mapping[str, float]) -> tuple[MechanicalModel, Array]:
+        """The model whose motion the board shows at a setting, and (states,) volts per unit of each
+        of its states."""
+        volts = self.design.amplitude(omega=self._omega(change))
+        b = self.design.model.b * volts / self.excitation(change).amplitude
+        return self.design.model.at(b), self.design.volts(b)
+
+    def _omega(self, change: Mapping[str, float]) -> float:
+        seconds = self.design.errors.scales.seconds
+        return 2.0 * np.pi * self.excitation(change).frequency * seconds
 
     def family(self, parameter: str) -> Family:
         """One flow for each value of a setting, the others as they stand."""

@@ -96,6 +96,7 @@ from .step_budget import (
     Budget as Budget,
 )
 from .turning_points import (
+    corner_crossings as corner_crossings,
     heights as heights,
     turning_points_of as turning_points_of,
 )

@@ -55,6 +55,13 @@ class Guard:
     displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop."""
     second: float = 0.0
     """Coefficient of the second drive."""
+    corner: str = ""
+    """Of a corner of a force that is no stop's, what it is called."""
+
+    @property
+    def row(self) -> Array:
+        """(n + 2,) over (states, drive, 1)."""
+        return np.concatenate([self.C, [self.D, self.e]])
 
 
 @dataclass(frozen=True)
@@ -271,18 +278,32 @@ class PiecewiseLinearSystem:
         raise ArithmeticError(f"no mode holds at x = {x}, u = {u}")
 
     def contact_rows(self, clearance: int) -> dict[int, Array]:
-        """How far the displacement is past each stop, by side (1 upper, -1 lower).
+        """How far the displacement is past each stop, by side (1 upper, -1 lower); of a number of
+        ``corners`` past that, by 1.
 
         Rows (n + 2,) over (states, drive, 1), scaled to displacement and positive in contact: the
         guards of the mode that holds at rest. They hold however deep the contact is.
         """
+        if clearance >= len(self.clearances):
+            return {1: self.corners[clearance - len(self.clearances)].row}
         rest = self.mode(self.start)
         rows: dict[int, Array] = {}
         for guard in rest.guards:
             if guard.clearance == clearance:
-                side = self.mode(guard.target).sides[clearance]
-                rows[side] = np.concatenate([guard.C, [guard.D, guard.e]])
+                rows[self.mode(guard.target).sides[clearance]] = guard.row
         return rows
+
+    @cached_property
+    def corners(self) -> tuple[Guard, ...]:
+        """The corners of forces that are no stops', positive on the side away from rest. Where
+        turning points are looked at they are numbered after the clearances."""
+        found, keys = dict[str, Guard](), [self.start]
+        while keys:
+            for guard in self.mode(keys.pop(0)).guards:
+                if guard.corner and guard.corner not in found:
+                    found[guard.corner] = guard
+                    keys.append(guard.target)
+        return tuple(found.values())
 
     @property
     def built(self) -> int:

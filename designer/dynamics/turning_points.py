@@ -30,7 +30,7 @@ class TurningPoint:
     """A turning point of the displacement in a clearance, seen from one of its stops."""
 
     clearance: int
-    """Index of the clearance."""
+    """Index of the clearance, or number of a corner (``PiecewiseLinearSystem.corners``)."""
     side: int
     """1 for its upper stop, -1 for the lower."""
     tip: bool
@@ -79,10 +79,20 @@ def turning_points_of(
     return turning
 
 
+def corner_crossings(flow: Flow, orbit: Orbit) -> tuple[int, ...]:
+    """How often an orbit passes each of ``PiecewiseLinearSystem.corners`` in its period."""
+    first = len(flow.system.clearances)
+    numbers = range(first, first + len(flow.system.corners))
+    turning = turning_points_of(flow, orbit, numbers)
+    beyond = [[t.height > 0.0 for t in turning if t.clearance == k] for k in numbers]
+    return tuple(sum(a != b for a, b in zip(row, row[1:] + row[:1], strict=True)) for row in beyond)
+
+
 def _rate(flow: Flow, orbit: Orbit) -> float:
     """Largest modulus of an eigenvalue, of the open mode and of those that it leads to."""
     rest = flow.system.mode(flow.system.start)
     keys = {orbit.mode or flow.system.start, *(g.target for g in rest.guards if g.clearance >= 0)}
+    keys |= {corner.target for corner in flow.system.corners}
     matrices = [rest.A, *(flow.system.mode(key).A for key in keys)]
     return max(float(np.abs(np.linalg.eigvals(A)).max()) for A in matrices)
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.si_unit import prefixed
+from designer.check.curved_laws import law_misfits
 from designer.dynamics.attractors import ENGINE_ERROR, settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -221,6 +222,9 @@ def facts(orbit: Orbit, place: ModelPlace) -> list[tuple[str, str]]:
         rows.append(("shallowest contact", _in_one_unit([orbit.penetration], "m", place, 3)))
     if np.isfinite(orbit.miss):
         rows.append(("nearest miss", _in_one_unit([orbit.miss], "m", place, 3)))
+    flow = model_flow(place.model, place.omega)
+    for misfit in law_misfits(place.model, flow, orbit, np.ones(flow.system.size)):
+        rows.append(("curved law", misfit.text(orbit.response, in_si=place.in_si)))
     return rows
 
 

@@ -60,7 +60,8 @@ def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
         along = system.displacement(stop)
         force = np.zeros(size)
         force[1::2] = system.over_mass(system.push(stop))
-        moves = system.ground(omega) if system.fixed_stops and stop.other is None else 0.0
+        follows = system.fixed_stops and system.ground_moves and stop.other is None
+        moves = system.ground(omega) if follows else 0.0
         moves *= float(along.sum())
         rate = np.zeros(size)
         rate[1::2] = along

@@ -70,9 +70,8 @@ def texts(synthesis: Synthesis) -> dict[str, str]:
 def waveform_names(modelfile: ModelFile) -> tuple[str, ...]:
     """The waveforms that a generator's channels have to be given; none where all are sines."""
     system = modelfile.model.second_order()
-    if not has_harmonics(*system.drive_shapes):
-        return ()
-    return WAVEFORMS[: len(system.drive_shapes)]
+    shapes = system.drive_shapes(system.own_frequency)
+    return WAVEFORMS[: len(shapes)] if has_harmonics(*shapes) else ()
 
 
 def write(folder: Folder, synthesis: Synthesis, files: Mapping[str, str]) -> None:

@@ -169,6 +169,8 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         own = {**orbit_json(orbit, si), **_frequencies_hz(orbit, si)}
         return {**own, **_in_clearances(simulated, orbit, si), "twin": twin}
     answer = {**orbit_json(orbit), **_frequencies_hz(orbit, si)}
+    from designer.check.curved_laws import misfits_json
+
     is_known = simulated.absolute and len(simulated.absolute[number])
     x = simulated.absolute[number][0::2] if is_known else None
     low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
@@ -177,9 +179,9 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
         "x1_min": None if low is None else low[0],
         "x_max": high,
         "x_min": low,
-        **_from_base(simulated, orbit),
+        **_from_base(simulated, number),
         **_in_clearances(simulated, orbit),
-        **_misfits(simulated, number),
+        **misfits_json(simulated.misfits[number] if simulated.misfits else ()),
         **_sticking(simulated, number),
         "twin": twin,
     }
@@ -188,11 +190,13 @@ def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> di
     return answer
 
 
-def _from_base(simulated: Simulated, orbit: Orbit) -> dict[str, Any]:
+def _from_base(simulated: Simulated, number: int) -> dict[str, Any]:
     """Extremes of the displacements from a base that moves, and its amplitude."""
     if not simulated.base:
         return {}
-    z = orbit.extremes[0::2] if len(orbit.extremes) else None
+    spans = simulated.from_base
+    span = spans[number] if spans else (simulated.orbit, *simulated.others)[number].extremes
+    z = span[0::2] if len(span) else None
     low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
     return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
 
@@ -219,14 +223,6 @@ def _in_clearances(
                 row[key] = {**(row[key] or {}), **depth, f"speed{rate}": speed * met}
         rows.append(row)
     return {"in_clearances": rows} if rows else {}
-
-
-def _misfits(simulated: Simulated, number: int) -> dict[str, Any]:
-    """Curved laws whose force is off over an orbit, by what they are; nothing without any."""
-    kinds: dict[str, Any] = {}
-    for each in simulated.misfits[number] if simulated.misfits else ():
-        kinds.setdefault(each.kind, []).append(each.as_dict())
-    return kinds
 
 
 def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:

@@ -36,13 +36,14 @@ from designer.bifurcations.parameter_map import MapPlan, ParameterMap
 from designer.bifurcations.points import SIDES, Bifurcation
 from designer.bifurcations.response_region import ResponseRegion, SpreadBox
 from designer.bifurcations.subject import Subject
-from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.bifurcations.sweep import Sweep, SweepPlan, Window
 from designer.bifurcations.window_ends import SweptEnd, WindowEnds
 from designer.catalog.parts_catalog import load_catalog
+from designer.check.curved_laws import LawMisfit, curved_laws, law_misfits, misfits_json
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import period_of
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.curve_store import CurveBlocks, curves_csv
 from designer.folders.model_source import model_of
@@ -268,7 +269,7 @@ def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[
     """The windows of a sweep; where they were looked for, families and ends of periodic ones."""
     out = []
     for number, window in enumerate(swept.windows):
-        row = with_si(window.as_dict(), unit)
+        row = with_si(window.as_dict(), unit) | misfits_json(_misfits(swept, window))
         ends = None if found is None else found.ends[number]
         if found is not None:
             row["family"] = found.families[number]
@@ -277,6 +278,30 @@ def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[
             row |= {key: with_si(end.as_dict(), unit) for key, end in keys}
         out.append(row)
     return out
+
+
+def _misfits(swept: Sweep, window: Window) -> list[LawMisfit]:
+    """Where the first, the middle or the last step of a window draws a curved law beyond its span,
+    or over few of its pieces: of each law the largest error."""
+    plan, subject = swept.plan, swept.plan.subject
+    assert isinstance(subject, ModelSubject | BoardSubject)
+    if not curved_laws(subject.drawn({plan.parameter: window.low})[0]):
+        return []
+    family, values = subject.family(plan.parameter), plan.values.tolist()
+    first, last = values.index(window.low), values.index(window.high)
+    worst: dict[tuple[str, ...], LawMisfit] = {}
+    for k in {first, (first + last) // 2, last}:
+        model, units = subject.drawn({plan.parameter: values[k]})
+        steps = [swept.steps[track][k] for track in plan.tracks]
+        shown = next((step for step in steps if step.response == window.response), None)
+        if shown is None:
+            continue
+        orbit = Orbit(shown.status, shown.n, shown.p, shown.q, shown.start)
+        for misfit in law_misfits(model, family.flow(values[k]), orbit, units):
+            known = worst.get(misfit.where)
+            if known is None or (misfit.beyond, misfit.error) > (known.beyond, known.error):
+                worst[misfit.where] = misfit
+    return list(worst.values())
 
 
 def _missing(parameter: str, end: SweptEnd) -> dict[str, Any]:

@@ -34,6 +34,8 @@ class ForceLaw:
     """(x, force) by rising x, at least two: corners, and a point on each piece beyond them."""
     push: tuple[float, ...] = ()
     """(n,) as of ``Clearance.push``; () where it is ``row``."""
+    curved: bool = False
+    """Whether its pieces stand for a curve, whose corners are none."""
 
     @cached_property
     def slopes(self) -> tuple[float, ...]:

@@ -26,10 +26,10 @@ from designer.dynamics.drive_shape import SINE
 from designer.model.clearance import Clearance, combined
 from designer.model.element_keys import GROUND, check_joined, check_size, refuse
 from designer.model.force_law import ForceLaw
-from designer.model.law_elements import KINDS
+from designer.model.law_elements import KINDS, NonlinearElement
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
 from designer.model.matrices import Matrices
-from designer.model.mechanics import HarmonicForce, SecondOrderSystem
+from designer.model.mechanics import HarmonicForce, SecondOrderSystem, reaches_ground
 from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")
@@ -206,18 +206,16 @@ def _check_driven(system: Elements) -> None:
         driven |= set(system.names)  # the ground's inertia force is on every mass
     if not driven:
         refuse("force", MISSING, "a [[force]] with an amplitude, or a [base]: nothing moves")
-    if system.base is not None and system.base.stops == "fixed":
+    moving = [name for name, law in system.nonlinear.items() if _moves_with_ground(law)]
+    if moving and system.base is not None and system.base.stops == "fixed":
+        beside = f'beside [base] stops = "fixed" and {moving[0]}, which moves with the ground'
         if not system.base.is_sine:
-            expected = (
-                '"base", or a sine in phase for stops that stay; a phase of the base is that of '
-                "every force, turned the other way"
-            )
+            expected = f'"base", or a sine in phase {beside}'
             refuse("base.stops", '"fixed", with another phase or shape', expected)
         for gap in system.gaps:
             for key in ("damping", "restitution"):
                 if getattr(gap, key) and GROUND in joined_by(gap):
-                    expected = f'no {key} where [base] stops = "fixed": its other end moves'
-                    refuse(f"clearance {gap.name}.{key}", getattr(gap, key), expected)
+                    refuse(f"clearance {gap.name}.{key}", getattr(gap, key), f"no {key} {beside}")
     joints = [between for _, between in _joints(system) if GROUND not in between]
     moved = _reached(driven, joints)
     for gap in system.gaps:
@@ -225,6 +223,10 @@ def _check_driven(system: Elements) -> None:
             expected = "a force, a base motion or a spring that moves it: it can never be reached"
             key = "of" if gap.between is None else "between"
             refuse(f"clearance {gap.name}.{key}", f"{' and '.join(gap.factors)}, at rest", expected)
+
+
+def _moves_with_ground(law: NonlinearElement) -> bool:
+    return reaches_ground(factor for name, factor in law.factors.items() if name != GROUND)
 
 
 def _reached(start: set[str], joints: Sequence[tuple[str, ...]]) -> set[str]:
@@ -413,6 +415,7 @@ class LumpedSystem(Elements):
                 tuple(float(each) for each in self.row_of(element.factors)),
                 element.quantity,
                 element.corners,
+                curved=element.curve is not None,
             )
             for name, element in self.nonlinear.items()
         ]

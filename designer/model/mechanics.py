@@ -5,13 +5,14 @@
 with any number of masses, clearances and force laws; Eq. (1)-(2) of the paper is the case of two
 masses and one two-sided clearance. Where the ground moves, by y = Y sin ωt, z = x - y is the
 displacement relative to it: the force is then that of the file and M Y ω² (every spring, damper and
-law to ground stands on what moves). Y or the acceleration Y ω² is given. Stops that do not move
-with the ground watch z + y.
+law to ground stands on what moves). Y or the acceleration Y ω² is given. Where the stops stay, z is
+the absolute displacement, and the force is that of the file and (K y + C y') of springs and dampers
+to ground; a law to ground keeps displacements relative, and such stops watch z + y.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -40,6 +41,8 @@ class HarmonicForce:
     """(masses,) amplitudes."""
 
 
+MOST_CHANNELS = 2
+"""Of a generator."""
 ROUNDING = 1e-12
 """Of the size of its terms: a sum below it is none."""
 
@@ -145,9 +148,20 @@ class SecondOrderSystem:
         return more
 
     @property
-    def ground_moves(self) -> bool:
+    def driven_by_ground(self) -> bool:
         """Whether there is a motion of the ground."""
         return bool(self.base or self.base_acceleration)
+
+    @cached_property
+    def absolute(self) -> bool:
+        """Whether displacements are absolute though the ground may move: its stops stay, and no
+        law moves with it."""
+        return self.fixed_stops and not any(reaches_ground(law.row) for law in self.laws)
+
+    @property
+    def ground_moves(self) -> bool:
+        """Whether displacements are counted from a ground that moves."""
+        return self.driven_by_ground and not self.absolute
 
     def ground(self, omega: float) -> float:
         """Amplitude of the ground's displacement at a drive frequency; of a motion that is no sine
@@ -175,8 +189,20 @@ class SecondOrderSystem:
         return {}
 
     def _ordered_channels(self, omega: float) -> tuple[Channel, ...] | None:
-        found = self._two_channels(omega) if self._ratio_varies else self._of_one_ratio(omega)
-        if found is None or len(found) == 1 or not self.dead_zones:
+        groups = self._groups(omega)
+        if len(groups) < 2 or (self.absolute and not self.orders and _parallel(groups)):
+            if self.driven_by_sine:
+                return (Channel(SINE, self.drive_waves(omega)[0].sine),)
+            groups = [_parts(self.drive_waves(omega))]
+        found: tuple[Channel, ...] = ()
+        for group in groups:
+            own = channels(group)
+            if own is None:
+                return None
+            found += own
+        if len(found) > MOST_CHANNELS:
+            return None
+        if len(found) == 1 or not self.dead_zones:
             return found
         row = np.linalg.lstsq(
             self.spanning_stiffness.T, self.displacement(self.dead_zones[0]), rcond=None
@@ -184,31 +210,43 @@ class SecondOrderSystem:
         moved = [abs(float(row @ each.force)) / float(np.abs(each.force).max()) for each in found]
         return found[::-1] if moved[1] > moved[0] * (1.0 + ROUNDING) else found
 
-    def _of_one_ratio(self, omega: float) -> tuple[Channel, ...] | None:
-        if self.driven_by_sine:
-            return (Channel(SINE, self.drive_waves(omega)[0].sine),)
-        return channels(_parts(self.drive_waves(omega)))
+    def _groups(self, omega: float) -> list[dict[int, Array]]:
+        """The forces in groups that change alike with the drive frequency, those of the file first;
+        without those that are 0. Of each the ``_parts``."""
+        own, powers = _parts(self._own_waves), dict[int, dict[int, Array]]()
+        for power, n, wave in self._ground_waves(omega):
+            group = powers.setdefault(power, {} if power else own)
+            group[n] = group.get(n, np.zeros((2, self.size))) + wave
+        return [
+            group
+            for group in (own, *(powers[power] for power in sorted(powers) if power))
+            if any(wave.any() for wave in group.values())
+        ]
 
-    def _two_channels(self, omega: float) -> tuple[Channel, ...] | None:
-        """Of forces of their own and of the ground's."""
-        own = channels(_parts(self._own_waves))
-        ground = channels(_parts(self._without_forces.drive_waves(omega)))
-        if own is None or ground is None or len(own) > 1:
-            return None
-        return (*own, *ground)
-
-    @property
-    def _ratio_varies(self) -> bool:
-        """Whether forces of their own act beside the ground's, which grow with the frequency."""
-        return bool(self.base) and any(
-            wave.sine.any() or wave.cosine.any() for wave in self._own_waves
-        )
+    def _ground_waves(self, omega: float) -> Iterator[tuple[int, int, Array]]:
+        """(power of the drive frequency, order, (2, n) amplitudes of sine and cosine) of the forces
+        that the ground's motion makes."""
+        if not self.driven_by_ground:
+            return
+        over = 0 if self.base else -2
+        for n, sine, cosine in self.base_shape:
+            acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
+            if not self.absolute:
+                yield over + 2, n, np.outer(np.array([sine, cosine]) * acceleration, self.mass)
+                continue
+            displacement = acceleration / (n * omega) ** 2
+            springs, dampers = self._ground_joints
+            yield over, n, np.outer(np.array([sine, cosine]) * displacement, springs)
+            rate = n * omega * displacement
+            yield over + 1, n, np.outer(np.array([-cosine, sine]) * rate, dampers)
 
     @cached_property
-    def _without_forces(self) -> SecondOrderSystem:
-        """Driven by the ground alone."""
-        none = np.zeros(self.size)
-        return replace(self, force=none, quadrature=none, harmonics=())
+    def _ground_joints(self) -> tuple[Array, Array]:
+        """(n,) stiffness and damping from each mass to ground."""
+        return (
+            _without_rounding(self.stiffness.sum(axis=1), self.stiffness),
+            _without_rounding(self.damping.sum(axis=1), self.damping),
+        )
 
     @property
     def _own_waves(self) -> tuple[HarmonicForce, ...]:
@@ -221,7 +259,7 @@ class SecondOrderSystem:
         motion, and where forces take more than two."""
         if not self.ground_moves:
             return None
-        ground = channels(_parts(self._without_forces.drive_waves(omega)))
+        ground = channels({n: wave for _, n, wave in self._ground_waves(omega)})
         every = self.channels(omega)
         if not ground or not every:
             return None
@@ -244,15 +282,15 @@ class SecondOrderSystem:
         every = self._channels(omega)
         return every[channel].force if channel < len(every) else np.zeros(self.size)
 
+    def drive_shapes(self, omega: float) -> tuple[Shape, ...]:
+        """Of each channel at a drive frequency, which only the phase of a sole sine depends on;
+        raises as ``drive_force``."""
+        return tuple(each.shape for each in self._channels(omega))
+
     @property
     def largest_force(self) -> float:
         """Largest amplitude of a force at the model's own frequency."""
         return max(float(np.abs(c.force).max()) for c in self._channels(self.own_frequency))
-
-    @cached_property
-    def drive_shapes(self) -> tuple[Shape, ...]:
-        """Of each channel; raises as ``drive_force``."""
-        return tuple(each.shape for each in self._channels(self.own_frequency))
 
     def _channels(self, omega: float) -> tuple[Channel, ...]:
         found = self.channels(omega)
@@ -264,24 +302,20 @@ class SecondOrderSystem:
         """All forces at a drive frequency, the ground's included, by their order; the first is that
         of the drive itself."""
         waves = _parts(self._own_waves)
-        if self.ground_moves:
-            for n, *parts in self.base_shape:
-                acceleration = self.base * (n * omega) ** 2 + self.base_acceleration
-                before = waves.get(n, np.zeros((2, self.size)))
-                waves[n] = before + np.outer(np.array(parts) * acceleration, self.mass)
+        for _, n, wave in self._ground_waves(omega):
+            waves[n] = waves.get(n, np.zeros((2, self.size))) + wave
         return tuple(HarmonicForce(n, *waves[n]) for n in sorted(waves))
 
     @property
     def orders(self) -> tuple[int, ...]:
         """Multiples of the drive's frequency at which a force or the ground acts."""
-        of_base = [n for n, *_ in self.base_shape] if self.ground_moves else []
+        of_base = [n for n, *_ in self.base_shape] if self.driven_by_ground else []
         return tuple(sorted({*(wave.order for wave in self.harmonics), *of_base} - {1}))
 
     @property
     def driven_by_sine(self) -> bool:
         """Whether all forces are in phase, or in antiphase, and of one frequency."""
-        turned = self.ground_moves and any(cosine for _, _, cosine in self.base_shape)
-        return not (self.quadrature.any() or self.orders or turned)
+        return not (self.orders or self.drive_waves(1.0)[0].cosine.any())
 
     @property
     def even(self) -> bool:
@@ -406,10 +440,10 @@ class SecondOrderSystem:
         ------
         ValueError : a moving ground without ``omega``.
         """
-        if self.ground_moves and omega is None:
+        if self.driven_by_ground and omega is None:
             raise ValueError("what a moving ground does depends on omega")
         n = self.size
-        ground = self.ground(1.0 if omega is None else omega)
+        ground = self.ground(omega or 1.0) if self.ground_moves else 0.0
         contacts = [
             *(_Contact.with_stops(self, k, ground) for k in range(len(self.clearances))),
             *(_Contact.with_law(self, law) for law in self.laws),
@@ -463,6 +497,20 @@ def _without_rounding(less: Array, whole: Array) -> Array:
     return np.where(np.abs(less) > rounding, less, 0.0)
 
 
+def reaches_ground(factors: Iterable[float]) -> bool:
+    """Whether a sum of displacements with these factors changes where all masses move alike."""
+    sizes = list(factors)
+    return abs(sum(sizes)) > ROUNDING * sum(map(abs, sizes))
+
+
+def _parallel(groups: Iterable[Mapping[int, Array]]) -> bool:
+    """Whether all forces have one ratio, whatever their phases."""
+    rows = np.concatenate([wave for group in groups for wave in group.values()])
+    sizes = np.linalg.norm(rows, axis=1)
+    rows = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
+    return bool((np.abs(np.abs(rows @ rows[0]) - 1.0) < ROUNDING).all())
+
+
 def _parts(waves: Iterable[HarmonicForce]) -> dict[int, Array]:
     """By order the (2, n) amplitudes of sine and cosine."""
     return {wave.order: np.stack([wave.sine, wave.cosine]) for wave in waves}
@@ -488,6 +536,8 @@ class _Contact:
     """Coefficient of the drive in what is watched."""
     clearance: int = -1
     """Index of the clearance whose contact it is; -1 of a law."""
+    law: str = ""
+    """Name of the law whose corners are its own; "" of one that stands for a curve."""
 
     @classmethod
     def with_stops(cls, system: SecondOrderSystem, index: int, ground: float) -> _Contact:
@@ -512,7 +562,8 @@ class _Contact:
         along = np.array(law.row)
         watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
         push_back = _interleaved(system.over_mass(system.push(law)), 1)
-        return cls(watched, np.zeros_like(watched), push_back, law.bends, {})
+        name = "" if law.curved else law.name
+        return cls(watched, np.zeros_like(watched), push_back, law.bends, {}, law=name)
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:
         """Add the force of what has joined in to the equations.
@@ -550,7 +601,9 @@ class _Contact:
         # Contact begins or ends; deeper springs only stiffen it.
         touches = not (level and key[index])
         clearance = self.clearance if touches else -1
-        return Guard(sign * self.row, sign * self.on_drive, constant, target, clearance)
+        corner = f"{self.law} at {-sign * constant:.6g}" if self.law else ""
+        row = sign * self.row, sign * self.on_drive, constant
+        return Guard(*row, target, clearance, corner=corner)
 
 
 def _interleaved(row: Array, first: int) -> Array:

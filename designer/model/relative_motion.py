@@ -108,9 +108,9 @@ def mass_motion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
         subscripted(f"x{mass + 1}"),
         _names(system, [mass]),
         np.eye(system.size)[mass],
-        system.base,
+        system.base if system.ground_moves else 0.0,
         (),
-        base_acceleration=system.base_acceleration,
+        base_acceleration=system.base_acceleration if system.ground_moves else 0.0,
         base_shape=system.base_shape,
     )
 
@@ -118,7 +118,7 @@ def mass_motion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
 def companion_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
     """Where the ground moves, the other displacement of each mass that has a clearance to it: the
     absolute one where the stops move with the ground, the one from the ground where they stay."""
-    if not system.ground_moves:
+    if not system.driven_by_ground:
         return ()
     masses = dict.fromkeys(stop.mass for stop in system.clearances if stop.other is None)
     return tuple(_companion(system, mass) for mass in masses)
@@ -129,9 +129,13 @@ def _companion(system: SecondOrderSystem, mass: int) -> RelativeMotion:
     names = f"{motion.names}, " if motion.names else ""
     if not system.fixed_stops:
         return replace(motion, names=f"{names}absolute")
-    symbol = f"{motion.symbol} − y"
+    turned = -1.0 if system.absolute else 0.0
     return replace(
-        motion, symbol=symbol, names=f"{names}from the base", base=0.0, base_acceleration=0.0
+        motion,
+        symbol=f"{motion.symbol} − y",
+        names=f"{names}from the base",
+        base=turned * system.base,
+        base_acceleration=turned * system.base_acceleration,
     )
 
 
@@ -169,7 +173,7 @@ def ground_of(model: MechanicalModel, omega: float) -> Array:
     drive's sine and cosine and those of each of the h ``SecondOrderSystem.orders``; without
     columns that are 0 of a sine."""
     system = model.second_order()
-    orders = (1, *system.orders) if system.ground_moves else (1,)
+    orders = (1, *system.orders) if system.driven_by_ground else (1,)
     ground = np.zeros((2 * system.size, 2 * len(orders)))
     for n, sine, cosine in system.ground_shape(omega):
         place = 2 * orders.index(n)
@@ -180,7 +184,7 @@ def ground_of(model: MechanicalModel, omega: float) -> Array:
 def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
     stop = system.clearances[number]
     masses = [stop.mass] if stop.other is None else [stop.mass, stop.other]
-    fixed = system.fixed_stops and stop.other is None
+    fixed = system.ground_moves and system.fixed_stops and stop.other is None
     row = system.displacement(stop)
     if stop.combination:
         return _of_combination(system, number, row)
@@ -202,7 +206,7 @@ def _of(system: SecondOrderSystem, number: int) -> RelativeMotion:
 def _of_combination(system: SecondOrderSystem, number: int, row: Array) -> RelativeMotion:
     """The same of a sum of displacements, from the base where the stops move with it."""
     stop = system.clearances[number]
-    fixed = float(row.sum()) if system.fixed_stops else 0.0
+    fixed = float(row.sum()) if system.ground_moves and system.fixed_stops else 0.0
     names = system.names or [subscripted(f"x{mass + 1}") for mass in range(system.size)]
     terms = [f"{factor:+.4g} {name}" for factor, name in zip(row, names, strict=True) if factor]
     return RelativeMotion(

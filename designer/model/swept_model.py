@@ -136,6 +136,10 @@ class ModelSubject:
             out = np.maximum(out, scale_of(_changed(self.model, change), omega))
         return out
 
+    def drawn(self, change: Mapping[str, float]) -> tuple[MechanicalModel, Array]:
+        """The model with these changes, and (states,) units of its flow's states: its own."""
+        return _changed(self.model, change), np.ones(len(self.states))
+
     def family(self, parameter: str) -> Family:
         """One flow for each value of a parameter, the others as they stand."""
         return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)

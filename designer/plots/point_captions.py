@@ -15,6 +15,7 @@ NAMES = {
     PointKind.FOLD: "fold",
     PointKind.GRAZING: "grazing",
     PointKind.TORUS: "torus bifurcation",
+    PointKind.CORNER: "corner of a law",
 }
 """The names of the kinds in a sentence."""
 
@@ -29,6 +30,8 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     owner = f" of {label(point.response, point.symmetric)}"
     if point.kind is PointKind.GRAZING:
         owner = f" at {point.stops}" if point.stops else ""
+    elif point.kind is PointKind.CORNER:
+        owner = f", {point.stops}, touched by {label(point.response, point.symmetric)}"
     return f"{NAMES[point.kind]}{owner}{place}: {_change(point)}"
 
 
@@ -59,6 +62,8 @@ def _change(point: Bifurcation) -> str:
             "the counts of impacts change"
         )
         return f"{counts}; {_stability(point)}"
+    if point.kind is PointKind.CORNER:
+        return _stability(point)
     return f"{_stability(point)}; {_born(point)}"
 
 

@@ -27,6 +27,7 @@ MARKS = {
     "fold": ("^", "#009e73"),
     "grazing": ("x", "#cc79a7"),
     "torus": ("D", "#7f3fbf"),
+    "corner": ("+", "#56b4e9"),
 }
 """Marker and colour of each kind of bifurcation."""
 NAMED = 12

@@ -431,7 +431,7 @@ def largest_amplitudes(
     model's clearance and own frequency; a moving ground's force follows the drive frequency."""
     system = model.second_order()
     largest = []
-    for channel in range(len(system.drive_shapes)):
+    for channel in range(len(system.drive_shapes(system.own_frequency))):
         own = system.drive_force(system.own_frequency, channel)
         ratios = [
             model.b / r.b * system.drive_force(r.omega, channel)[own != 0.0] / own[own != 0.0]

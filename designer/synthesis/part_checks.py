@@ -24,7 +24,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.clearance import Clearance
-from designer.model.mechanics import ROUNDING, MechanicalModel, SecondOrderSystem
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem, reaches_ground
 
 _SECTION = re.compile("[A-OQ-Z]")
 """Names that sections may have: U1P is the supply of U1."""
@@ -103,16 +103,15 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "preload_over beside it for a circuit, the depth over which it rises: a force that "
                 "jumps at the contact has no stage; a negative gap is a stop in contact at rest",
             )
-        row = system.displacement(clearance)
-        moves = abs(row.sum()) > ROUNDING * np.abs(row).sum()
-        if system.fixed_stops and system.ground_moves and moves:
+        follows = system.fixed_stops and system.ground_moves
+        if follows and reaches_ground(system.displacement(clearance).tolist()):
+            laws = [law.name for law in system.laws if reaches_ground(law.row)]
             raise InputError(
                 None,
                 "base.stops",
-                "fixed",
-                '"base" for a circuit: a threshold cannot follow the ground, whose displacement is '
-                "no voltage; or no [base] and its forces on the masses: k Y sin ωt of a spring and "
-                "d ω Y a quarter turn ahead of a damper",
+                f'"fixed", beside {laws[0]}, which moves with the ground',
+                '"base" for a circuit, or laws between masses alone: the displacement of the '
+                "ground is no voltage, so that only stops or only laws can follow it",
             )
     zones = system.dead_zones
     for zone in zones:

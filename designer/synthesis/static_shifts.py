@@ -128,7 +128,7 @@ def least_drive(model: MechanicalModel, responses: Sequence[ModelResponse]) -> f
     the wanted response that is driven least."""
     system = model.second_order()
     drives = [(r.omega, model.b / r.b) for r in responses] or [(system.own_frequency, 1.0)]
-    channels = range(len(system.drive_shapes))
+    channels = range(len(system.drive_shapes(system.own_frequency)))
     return min(
         sum(float(np.abs(system.drive_force(omega, k)).sum()) for k in channels) * share
         for omega, share in drives

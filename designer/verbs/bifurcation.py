@@ -210,6 +210,8 @@ def show(result: BifurcationResult) -> None:
 
 
 def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
+    from designer.check.curved_laws import misfits_in
+
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     windows = answer["windows"]
     in_si = "si_unit" in answer and any(_in_si_unit(end, answer["si_unit"]) for end in ends)
@@ -237,6 +239,10 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
     )
     if families:
         say("windows of one family show one motion that goes on from each to the next")
+    for w in widest:
+        for misfit in misfits_in(w):
+            place = " to ".join(_ends(w, answer["unit"], si, in_si=in_si).values())
+            say(f"{place}: {misfit.text(w['response'], in_si=bool(unit))}")
     left_out = {end["reason"] for w in widest for end in _not_sought(w)}
     if left_out:
         say(f"-: the ends of a window are not looked for where {' or '.join(sorted(left_out))}")

@@ -31,6 +31,7 @@ from reports.makers import (
     backbone,
     bilinear,
     chain_modes,
+    den_hartog,
     grazing_map,
     persistence,
     rattle,
@@ -53,6 +54,7 @@ EXAMPLES: Mapping[str, Example] = {
     "backlash": rattle.EXAMPLE,
     "three-masses": chain_modes.EXAMPLE,
     "hammer-base": weight.EXAMPLE,
+    "dry-friction": den_hartog.EXAMPLE,
 }
 """What is shown of each model file, by its name."""
 OTHER = Example(lambda _: [], "", "")

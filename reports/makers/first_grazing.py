@@ -106,7 +106,8 @@ def _linear_response(system: SecondOrderSystem, omega: float) -> tuple[Complex, 
         - omega**2 * np.diag(system.mass)
         + 1j * omega * system.damping.astype(complex)
     )
-    wave = np.linalg.solve(dynamic, system.drive_force(omega).astype(complex))
+    first = system.drive_waves(omega)[0]
+    wave = np.linalg.solve(dynamic, first.sine + 1j * first.cosine)
     rest = np.linalg.solve(system.stiffness, system.constant)
     return np.asarray(wave, dtype=complex), np.asarray(rest, dtype=float)
 
@@ -114,9 +115,9 @@ def _linear_response(system: SecondOrderSystem, omega: float) -> tuple[Complex, 
 def _in_clearance(
     system: SecondOrderSystem, clearance: Clearance, wave: Complex, ground: float = 0.0
 ) -> complex:
-    """The displacement in a clearance. ground : its displacement, which stops that stay where they
-    are see."""
+    """The displacement in a clearance. ground : its displacement, which stops that stay see beside
+    displacements from it."""
     out = complex(system.displacement(clearance) @ wave)
-    if system.fixed_stops and clearance.other is None:
+    if system.fixed_stops and system.ground_moves and clearance.other is None:
         out += ground
     return out

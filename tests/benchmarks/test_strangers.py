@@ -95,7 +95,7 @@ def test_thirty_in_a_row_are_driven_in_every_way() -> None:
     for number in range(30):
         stranger = draw(5, number, "driven")
         system = parse_model_file(stranger.text).model.second_order()
-        shapes = system.drive_shapes
+        shapes = system.drive_shapes(system.own_frequency)
         assert shapes != (((1, 1.0, 0.0),),) or "phase" in stranger.text
         kinds.update(kind for kind in stranger.kinds if kind in dict(stranger_systems.DRIVES))
         channels[len(shapes)] += 1

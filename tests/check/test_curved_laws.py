@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from designer import simulate, synthesise
+from designer import bifurcation, simulate, synthesise
 from designer.base.arrays import Array
+from designer.explorer.place import read_place
+from designer.explorer.response_view import facts, reached as reached_at
 from designer.folders import design_files
 from designer.model.cubic_law import cubic_points
 from designer.model.model_file import ModelFile, parse_model_file
+from designer.verbs.bifurcation import show
 from designer.verbs.simulate import tables
 from tests.shared.system_text import table
 
@@ -49,6 +52,22 @@ def test_the_reach_is_that_of_the_linear_motion(between: tuple[str, str]) -> Non
     assert spring["range"] == pytest.approx(0.9 * LINEAR)
     assert spring["reached"] == pytest.approx(LINEAR, rel=1e-3)
     assert not beyond(parse_model_file(text(1e-9, 1.01 * LINEAR, between)))
+
+
+def test_a_sweep_and_the_page_with_sliders_say_so_too(capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a window the step that goes furthest beyond the range."""
+    modelfile = parse_model_file(text(1e-9, 0.9 * LINEAR))
+    made = bifurcation(modelfile, from_=1.3, to=OMEGA, steps=3, points=False, jobs=1)
+    (window,) = made.answer["windows"]
+    (spring,) = window["beyond_range"]
+    reached = FORCE / math.hypot(1.0 - 1.3**2, DAMPING * 1.3)
+    assert spring["reached"] == pytest.approx(reached, rel=1e-3)
+    show(made)
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"1.3 to 1.4: 1-0-0 draws the cubic spring between m and ground to {reached:.4g}" in told
+    place = read_place(modelfile, {"omega": str(OMEGA)})
+    (said,) = (value for name, value in facts(reached_at(place)[1], place) if name == "curved law")
+    assert said.startswith(f"1-0-0 draws the cubic spring between m and ground to {LINEAR:.4g}")
 
 
 def peak_of(k3: float) -> float:
@@ -116,6 +135,13 @@ def test_a_circuit_of_it_says_so_too(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert warning.startswith("At ω = 1.4 the response 1-0-0 draws the cubic spring")
     (row,) = simulate(tmp_path / "made", engine="circuit", starts=8).answer["responses"]
     assert row["beyond_range"][0]["range"] == pytest.approx(0.9)
+    swept = bifurcation(
+        tmp_path / "made", circuit=True, over="omega", from_=1.4, to=1.41, steps=2, points=False
+    )
+    (window,) = swept.answer["windows"]
+    assert window["beyond_range"][0]["reached"] == pytest.approx(
+        row["beyond_range"][0]["reached"], rel=1e-3
+    )
 
 
 STOP = 0.3

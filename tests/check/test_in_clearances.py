@@ -40,7 +40,7 @@ def followed(system: Mechanism, row: dict[str, Any], periods: int) -> list[tuple
     """(displacements, speeds at entries by side) in each clearance, from the start of a response.
     The stops have no dampers, so that the force is the same on both sides of an entry."""
     n, start = len(system.masses), np.array(row["start"])
-    at, rate = system.ground(0.0)
+    at, rate = (0.0, 0.0) if system.fixed_stops else system.ground(0.0)
     y0 = np.concatenate([start[0::2] + at, start[1::2] + rate])
     span = periods * 2.0 * math.pi / system.omega
 

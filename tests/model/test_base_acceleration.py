@@ -96,8 +96,6 @@ def test_a_circuit_has_it_beside_a_force_since_their_ratio_stays() -> None:
     # Else it takes a channel of its own.
     own = model(STOP, force, base('"0.5 mm"')).second_order()
     assert [own.drive_force(30.0, k) for k in (0, 1)] == pytest.approx([3.0, MASS * 0.45])
-    with pytest.raises(InputError, match="fixed"):
-        check_system(model(STOP, base('"0.5 g"', "fixed")), spec)
 
 
 def test_it_is_swept_and_saved_in_its_unit() -> None:

@@ -245,9 +245,11 @@ WRONG: list[tuple[str, str, str]] = [
         'of the law "hertz"',
     ),
     (
-        HAMMER.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\ndamping = 3.0') + BASE,
+        HAMMER.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\ndamping = 3.0')
+        + BASE
+        + '[[friction]]\nbetween = ["hammer", "ground"]\nforce = "1 N"\nvelocity = "1 mm/s"\n',
         "clearance A.damping",
-        'stops = "fixed"',
+        "which moves with the ground",
     ),
     (HAMMER.replace("[[clearance]]", "[[clearence]]"), "clearence", 'did you mean "clearance"?'),
     ("format = 2\n", "mass", "at least one table"),

@@ -19,6 +19,7 @@ from reports.makers import example_report, frequency_sweep, grazing_map, persist
 from reports.makers.backbone import backbone
 from reports.makers.bilinear import bilinear_frequency
 from reports.makers.chain_modes import chain_frequencies
+from reports.makers.den_hartog import ideal_amplitude
 from reports.makers.first_grazing import first_grazings
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -141,3 +142,19 @@ def test_bad_input_ends_in_a_message(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert example_report.main([str(tmp_path / "none.toml"), str(tmp_path / "out")]) == 2
     assert "none.toml" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.8, 1.5])
+def test_den_hartog_s_mass_slides_half_a_period_and_stops(ratio: float) -> None:
+    """From its furthest place against the friction, x″ + x + f = sin(ωt + φ), it comes to the
+    mirror image of that place half a period later, at rest at both: two equations for x₀ and φ."""
+    friction, half = 0.2, math.pi / ratio
+    drive = 1.0 / (1.0 - ratio**2)
+    # x = f + drive sin(ωt + φ) + a cos t + b sin t while it falls; x′(0) = x′(π/ω) = 0.
+    # x(π/ω) = -x(0) gives a (1 + cos half) + b sin half = -2 f, the rates -a sin half + b cos half
+    # = -b; with x′(0): b = -ω drive cos φ.
+    matrix = [[1.0 + math.cos(half), math.sin(half)], [-math.sin(half), 1.0 + math.cos(half)]]
+    a, b = np.linalg.solve(matrix, [-2.0 * friction, 0.0])
+    cosine = -b / (ratio * drive)
+    reach = friction + a + drive * math.copysign(math.sqrt(1.0 - cosine**2), drive)
+    assert ideal_amplitude(system("dry-friction"), ratio) == pytest.approx(reach, rel=1e-12)

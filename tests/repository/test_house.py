@@ -54,6 +54,7 @@ LAZY = {
         ("jobs.trade_job", "fidelity.trade_files"),
     },
     STARTS: {
+        ("folders.json_answers", "check.curved_laws"),
         ("folders.json_answers", "circuit.design"),
         ("folders.json_answers", "model.mechanics"),
         ("folders.json_answers", "model.si_units"),
@@ -70,18 +71,18 @@ LAZY = {
 REACH = {
     "catalog": 6_150,
     "new": 11_650,
-    "simulate": 27_750,
-    "bifurcation": 34_050,
-    "reproduce": 56_400,
+    "simulate": 27_800,
+    "bifurcation": 34_500,
+    "reproduce": 56_450,
     "rules": 59_700,
-    "explore": 57_950,
-    "bench": 61_900,
-    "trade": 64_350,
-    "export": 65_650,
+    "explore": 58_400,
+    "bench": 61_950,
+    "trade": 64_400,
+    "export": 65_700,
     "synthesise": 64_500,
     "run": 67_750,
     "tolerance": 67_850,
-    "search": 72_500,
+    "search": 72_700,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 

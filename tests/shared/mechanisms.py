@@ -50,8 +50,10 @@ def _clearance(number: int, gap: Gap) -> Clearance:
 
 
 def absolute(system: Mechanism, x: Array) -> Array:
-    """(2n,) displacements, then velocities, of a state of the flow at a strobe."""
-    return np.concatenate([x[0::2], x[1::2] + system.base * system.omega])
+    """(2n,) displacements, then velocities, of a state of the flow at a strobe. States are counted
+    from a ground that moves, but not where the stops stay."""
+    rate = 0.0 if system.fixed_stops else system.base * system.omega
+    return np.concatenate([x[0::2], x[1::2] + rate])
 
 
 CHAIN = Mechanism(

@@ -121,8 +121,9 @@ def test_the_generator_is_within_its_range_where_the_base_force_grows_with_frequ
         (("upper_stiffness = 5.0", "damping = 0.1\nupper_stiffness = 5.0"), "clearance A.damping",
          "for each"),
         (("stiffness = 4.0", "stiffness = 4.0\npreload = 0.1"), "clearance B.preload", "jumps"),
-        (("[[response]]", '[base]\namplitude = 0.1\nstops = "fixed"\n[[response]]'), "base.stops",
-         "quarter turn ahead of a damper"),
+        (("[[response]]", '[base]\namplitude = 0.1\nstops = "fixed"\n[[friction]]\nforce = 0.1\n'
+          'between = ["one", "ground"]\nvelocity = 0.1\n[[response]]'), "base.stops",
+         "the displacement of the ground is no voltage"),
         (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
         (("[[response]]", '[[cubic_spring]]\nbetween = ["one", "ground"]\nk1 = 0.1\nk3 = 1.0\n'
           "range = 1.0\n[[response]]"), "circuit", "12 for one-ground.cubic"),
@@ -134,12 +135,3 @@ def test_what_no_circuit_can_do_is_refused(change: tuple[str, str], field: str, 
         check_choices(file.model, file.circuit, load_catalog())
     assert caught.value.field == field
     assert text in str(caught.value)
-
-
-def test_stops_that_stay_while_the_base_moves_are_refused() -> None:
-    base = '[base]\namplitude = 0.1\nstops = "fixed"\n[[response]]'
-    text = TWO.replace("amplitude = 1.0\nconstant", "constant").replace("[[response]]", base)
-    file = parse_model_file(text)
-    with pytest.raises(InputError, match="fixed") as caught:
-        check_choices(file.model, file.circuit, load_catalog())
-    assert caught.value.field == "base.stops"

@@ -91,8 +91,17 @@ TEXTS = {
         ),
         RESPONSE,
     ),
+    "stops that stay": one('[base]\namplitude = 0.8\nstops = "fixed"\n', RESPONSE),
+    "two masses, stops that stay": system_text(
+        {"ball": 1.0, "table": 1.5},
+        {GROUND: 1.0, PAIR: 0.7, ("table", "ground"): 0.5},
+        {GROUND: 0.05, ("table", "ground"): 0.4},
+        clearance("A", *GROUND, upper=0.4, stiffness=9.0, damping=0.1),
+        '[base]\namplitude = 0.8\nphase = 0.3\nstops = "fixed"\n',
+        RESPONSE,
+    ),
 }
-SECOND = ("two phases", "force beside base", "three phases")
+SECOND = ("two phases", "force beside base", "three phases", "two masses, stops that stay")
 """Those that take two channels."""
 
 
@@ -364,6 +373,12 @@ def test_the_ground_s_channel_follows_the_frequency() -> None:
     ratios = amplitudes("force beside base", 2.0) / amplitudes("force beside base", 1.0)
     assert ratios == pytest.approx([1.0, 4.0])
     assert amplitudes("two phases", 2.0) == pytest.approx(amplitudes("two phases", 1.0))
+    # Where the stops stay, springs give k Y and dampers d ω Y, a quarter turn ahead.
+    ratio = amplitudes("stops that stay", 2.0) / amplitudes("stops that stay", 1.0)
+    assert ratio == pytest.approx(abs(1.0 + 0.2j) / abs(1.0 + 0.1j))
+    two_masses = "two masses, stops that stay"
+    ratios = amplitudes(two_masses, 2.0) / amplitudes(two_masses, 1.0)
+    assert sorted(ratios) == pytest.approx([1.0, 2.0])
 
 
 def test_the_first_channel_is_where_an_offset_moves_the_clearance() -> None:
@@ -378,7 +393,7 @@ def test_the_first_channel_is_where_an_offset_moves_the_clearance() -> None:
     )  # fmt: skip
     system = parse_model_file(text).model.second_order()
     assert [c.force.nonzero()[0].tolist() for c in system.channels(1.3) or ()] == [[1], [0]]
-    assert system.drive_shapes[1] == SINE
+    assert system.drive_shapes(1.3)[1] == SINE
 
 
 def test_twelve_masses_have_a_name_for_every_part() -> None:

@@ -1,0 +1,101 @@
+"""Corners of laws that an orbit comes to touch, against the closed form of the linear motion that
+never passes them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from designer.bifurcations.branch_survey import survey
+from designer.bifurcations.plane_curves import PlaneWindow, continued
+from designer.bifurcations.points import Bifurcation, PointKind
+from designer.bifurcations.windows import all_windows
+from designer.dynamics.attractors import settle
+from designer.model.model_file import parse_model_file
+from designer.model.swept_model import ModelSubject
+from designer.plots.point_captions import caption
+from tests.shared.system_text import system_text, table
+
+JOINT = ("a", "ground")
+STIFFENING = table(
+    "law",
+    name="F",
+    between=list(JOINT),
+    points=[[-2.0, -3.0], [-1.0, -1.0], [1.0, 1.0], [2.0, 3.0]],
+)
+"""A spring of 1 up to ± 1, of 2 beyond."""
+DRAG = 'quantity = "velocity"\n'
+
+
+def subject(law: str, spring: float, omega: float, amplitude: float) -> ModelSubject:
+    """One mass on it and on a spring, with a damper of 0.2."""
+    springs = {JOINT: spring} if spring else {}
+    force = table("force", on="a", amplitude=amplitude)
+    text = system_text({"a": 1.0}, springs, {JOINT: 0.2}, law, force)
+    return ModelSubject(parse_model_file(text).model, omega)
+
+
+def amplitude_at_corner(omega: float, spring: float = 1.0, damper: float = 0.2) -> float:
+    """Of the force that moves the mass by 1."""
+    return math.hypot(spring - omega**2, damper * omega)
+
+
+def corners(points: tuple[Bifurcation, ...]) -> list[Bifurcation]:
+    return [point for point in points if point.kind is PointKind.CORNER]
+
+
+def test_the_corner_is_where_the_linear_motion_comes_to_it() -> None:
+    """It ends no window, since the counts and the stability stay."""
+    over = subject(STIFFENING, 0.0, 1.6, 1.0)
+    family = over.family("omega")
+    orbit = settle(family.flow(1.6), np.zeros(2))
+    found = survey(family, [(1.6, orbit)], 1.45, 1.7, depth=0)
+    assert corners(found.points) == []
+    found = survey(family, [(1.6, orbit)], 1.36, 1.7, depth=0)
+    (point,) = corners(found.points)
+    assert point.value == pytest.approx(1.4, abs=1e-8)
+    assert amplitude_at_corner(1.4) == pytest.approx(1.0, rel=1e-12)
+    assert point.error < 1e-8
+    assert point.stops == "F at 1 and F at -1"
+    assert point.stable == (True, True)
+    text = "corner of a law, F at 1 and F at -1, touched by 1-0-0 symmetric at ω = 1.4"
+    assert caption(point, "ω").startswith(text)
+    (window,) = all_windows(found)
+    assert (window.low.value, window.high.value) == (1.36, 1.7)
+
+
+def test_a_corner_of_a_law_of_velocity() -> None:
+    """At the resonance of the spring all of the force is that of the dampers."""
+    points = [[-1.0, -0.3], [-0.5, -0.3], [0.5, 0.3], [1.0, 0.3]]
+    law = table("law", name="drag", between=list(JOINT), points=points) + DRAG
+    over = subject(law, 1.0, 1.0, 0.3)
+    family = over.family("a.amplitude")
+    orbit = settle(family.flow(0.3), np.zeros(2))
+    found = survey(family, [(0.3, orbit)], 0.3, 0.5, depth=0)
+    (point,) = corners(found.points)
+    assert point.value == pytest.approx(0.3 + 0.2 * 0.5, abs=1e-8)
+    assert point.stops == "drag at 0.5 and drag at -0.5"
+
+
+def test_the_curve_of_a_corner_over_two_parameters() -> None:
+    over = subject(STIFFENING, 0.0, 1.6, 1.0)
+    family = over.family("omega")
+    orbit = settle(family.flow(1.6), np.zeros(2))
+    (point,) = corners(survey(family, [(1.6, orbit)], 1.36, 1.7, depth=0).points)
+    window = PlaneWindow((1.2, 1.7), (0.6, 1.8))
+    curve = continued(over.plane("omega", "a.amplitude"), point, 1.0, window)
+    assert curve is not None
+    assert curve.kind is PointKind.CORNER
+    assert set(curve.ends) == {"edge of a.amplitude"}
+    assert len(curve.points) > 10
+    for omega, amplitude in curve.values:
+        assert amplitude == pytest.approx(amplitude_at_corner(omega), rel=1e-7)
+    assert curve.codimension_two == ()
+
+
+def test_pieces_of_a_curve_have_no_corners() -> None:
+    """Where they lie says nothing of the curve."""
+    cubic = table("cubic_spring", between=list(JOINT), k1=1.0, k3=0.5, range=2.0, points=8)
+    assert subject(cubic, 0.0, 1.6, 1.0).family("omega").flow(1.6).system.corners == ()
