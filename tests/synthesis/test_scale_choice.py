@@ -15,6 +15,7 @@ from designer.base.errors import Unreachable
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
+from designer.circuit.netlist import Circuit
 from designer.circuit.noise_gains import stages
 from designer.linear_network.linear_search import lower_bound
 from designer.linear_network.linear_terms import Bounds, LinearQuestion, Targets
@@ -211,6 +212,46 @@ def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -
             assert room(made, frozenset(), {conflict.limit: given - near}) > -near
 
 
+@pytest.mark.parametrize(("least", "needed"), [(False, np.inf), (True, 0.0)])
+def test_a_limit_that_no_number_helps_says_so(least: bool, needed: float) -> None:
+    """It is missed by e^100, further than any scale goes."""
+    made = flat(np.array([[0.0, 0.0, 100.0]]))
+    limit = StatedLimit("level", "bound", 1.0, least=least)
+    made = replace(made, bounds=(replace(made.bounds[0], limit=limit),))
+    (conflict,) = ScaleBox(made).conflicts()
+    assert (conflict.limit, conflict.needed, conflict.frees) == (limit, needed, True)
+
+
+def test_points_are_corners_as_many_as_asked_for_and_the_best() -> None:
+    """Of a pentagon, whose corners are where neighbouring sides meet."""
+    angles = 2.0 * np.pi * np.arange(5) / 5.0
+    sides = np.column_stack([np.cos(angles), np.sin(angles)])
+    made = replace(flat(np.column_stack([sides, -np.ones(5)])), sums=())
+    corners = np.array([np.linalg.solve(sides[[k, k - 1]], np.ones(2)) for k in range(5)])
+    box = ScaleBox(made)
+    points = np.array(box.points(8, 10.0, seed=3))
+    apart = np.linalg.norm(points[:, None] - corners, axis=2)
+    assert len(points) == 1 + 8
+    assert apart.min(axis=1) == pytest.approx(np.zeros(9), abs=1e-9)
+    assert len(set(apart.argmin(axis=1).tolist())) > 2
+    assert points[0, 0] == pytest.approx(corners[:, 0].max())  # the level is the first number
+    near = box.points(8, 0.02, seed=3)
+    assert len(near) == 1 + 8
+    assert min(box.worth(z) for z in near) >= box.worth(near[0]) - 0.02 - 1e-9
+
+
+def test_scales_that_were_good_are_good_again_without_another_start() -> None:
+    order, within, _ = program("unequal")
+    first = next(ScaleChoice(order, within).circuits())
+    assert isinstance(first, ScaleAttempt)
+    choice = ScaleChoice(order, within)
+    again = next(choice.circuits(first.z))
+    assert isinstance(again, ScaleAttempt)
+    assert again.made.errors.max_error <= choice.goal
+    assert len(choice.candidates) <= 4
+    assert min(np.abs(own.z - first.z).max() for own in choice.candidates) < 0.1
+
+
 def design(text: str, jobs: int = 1, **changes: object) -> Design:
     file = parse_model_file(text)
     responses = find(file.model, file.responses)
@@ -337,14 +378,19 @@ def test_scales_keep_offsets_small_beside_the_drive() -> None:
     conditions = spec.active_conditions
     within = limits(spec, conditions, order.opamp, order.output.limit, held.fastest, unit=unit)
 
+    def of(circuit: Circuit, volts: Array) -> float:
+        (at,) = forces(circuit, file.model.second_order(), volts, drive)
+        return float(np.linalg.norm([10e-3 * share for share in at.offset.values()]))
+
     def offsets(choice: ScaleChoice) -> float:
         first = next(choice.circuits())
         assert isinstance(first, ScaleAttempt)
-        made = first.made
-        system, volts = file.model.second_order(), made.errors.scales.volts
-        (at,) = forces(made.circuit, system, volts, drive)
-        return float(np.linalg.norm([10e-3 * share for share in at.offset.values()]))
+        return of(first.made.circuit, first.made.errors.scales.volts)
 
-    assert offsets(ScaleChoice(order, within)) <= 0.05
+    choice = ScaleChoice(order, within)
+    assert offsets(choice) <= 0.05
+    best = choice.box.best()  # the scales with the highest threshold keep the rule too
+    assert best is not None
+    assert of(order.build(unrounded(choice.program, best)), choice.program.volts(best)) <= 0.05
     free = replace(order, drive_force=1e6)  # so strong a drive hides the rule from the choice
     assert offsets(ScaleChoice(free, within)) > 0.05
