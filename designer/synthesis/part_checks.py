@@ -18,7 +18,12 @@ from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, stage_kind
+from designer.circuit.dead_zone_parts import (
+    DeadZoneStage,
+    dead_zone_stage,
+    rectifies,
+    stage_kind,
+)
 from designer.circuit.dead_zone_place import MOST_MASSES
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
@@ -47,10 +52,10 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
     system = model.second_order()
     zones = system.dead_zones
-    rectifies = stage_kind(spec, zones) == "rectifier" and bool(zones)
-    if rectifies:
+    by_diodes = bool(zones) and rectifies(stage_kind(spec, zones))
+    if by_diodes:
         diode_of(spec.diode, catalog)
-    if rectifies or system.wired.constant.any():
+    if by_diodes or system.wired.constant.any():
         _reference_of(spec, catalog)
     if spec.objective == "yield":
         raise InputError(
@@ -163,7 +168,7 @@ def stage_refusal(clearances: Sequence[Clearance], kind: DeadZone) -> Refusal:
         refusal = stage.refused(clearance)
         if refusal is not None:
             return refusal
-    if len(clearances) > 1 and kind == "saturation":
+    if len(clearances) > 1 and not stage.rectifies:
         return InputError(
             None,
             "circuit.dead_zone",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.shared.system_text import system_text, table
+from designer.catalog.parts_catalog import load_catalog
+from designer.spice.opamp_check import checks
+from tests.shared.system_text import clearance, system_text, table
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
@@ -52,7 +55,7 @@ def run(place: Path, *words: str | Path) -> str:
     done = subprocess.run(
         [sys.executable, "-P", *map(str, words)],
         cwd=place,
-        env={**os.environ, "PYTHONPATH": str(place)},
+        env={**os.environ, "PYTHONPATH": f"{place}{os.pathsep}{ROOT}"},
         capture_output=True,
         text=True,
         check=False,
@@ -222,3 +225,193 @@ assert np.isclose(record.time[-1], 499e-4)
 
 def test_a_format_of_records_touches_one_file(tmp_path: Path) -> None:
     run(grown(tmp_path / "copy", SCOPE), "-c", RECORD, tmp_path / "record.mat")
+
+
+STAGE: Mapping[str, Texts] = {
+    "model/circuit_table.py": [
+        (
+            'DeadZone = Literal["saturation", "rectifier"]\n',
+            'DeadZone = Literal["saturation", "rectifier", "apart"]\n',
+        )
+    ],
+    "circuit/dead_zone_parts.py": [
+        (
+            "            if zone.damping or part_of(index, FEEDBACK) in parts\n",
+            '            if kind == "apart" or zone.damping or part_of(index, FEEDBACK) in parts\n',
+        )
+    ],
+}
+APART = system_text(
+    {"m": 1.0},
+    {GROUNDED: 1.0},
+    {GROUNDED: 0.1},
+    table("force", on="m", amplitude=1.0),
+    clearance("A", *GROUNDED, upper=0.5, lower=0.5, stiffness=9.0),
+    table("response", omega=1.3),
+    '[circuit]\ndead_zone = "apart"\n',
+)
+MADE = """
+import json, sys
+from designer.check.synthesis_result import synthesise
+from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.model.model_file import read_model_file
+made = synthesise(read_model_file(sys.argv[1]))
+design, (wanted,) = made.design, made.model_responses
+shown = on_circuit(nominal_reduction(design).system(), design, wanted)
+volts = design.errors.scales.volts[0]
+print(json.dumps({
+    "driven": sorted(net for d in design.circuit.diodes for net in d.nets if net.startswith("f")),
+    "responses": [wanted.orbit.response, shown.response],
+    "peaks": [float(wanted.orbit.extremes.max()), float(shown.extremes.max() / volts)],
+}))
+"""
+
+
+def test_a_dead_zone_stage_touches_two_files(tmp_path: Path) -> None:
+    """Its name, and what is built: here a rectifier each half of which has an output of its own,
+    whether its halves are equal or not. It is chosen, and shows what the model does."""
+    place = grown(tmp_path, STAGE)
+    model = tmp_path / "model.toml"
+    model.write_text(APART, encoding="utf-8")
+    told = json.loads(run(place, "-c", MADE, model))
+    assert told["driven"] == ["fl", "fu"]
+    assert told["responses"] == ["1-1-1", "1-1-1"]
+    assert told["peaks"][1] == pytest.approx(told["peaks"][0], rel=0.02)
+
+
+FIDELITY: Mapping[str, Texts] = {
+    "base/defaults.py": [
+        (
+            'Fidelity = Literal["ideal", "dynamic", "full"]\n',
+            'Fidelity = Literal["ideal", "dynamic", "full", "pole"]\n',
+        )
+    ],
+    "spice/opamp_model.py": [
+        (
+            "MODELS: Mapping[Fidelity, OpAmpModel] = {\n",
+            '''def _one_pole(opamp: OpAmp, gain: float) -> list[str]:
+    """A pole that may be charged at any rate, then the output limit."""
+    figures = f"gain={literal(gain)} gbw={literal(opamp.gbw.nominal)}"
+    return [
+        f".subckt opamp {PINS} {_EACH} start=0 {figures}",
+        *_INPUT,
+        f".param gm={{gbw*{literal(2.0 * math.pi * _POLE)}}}",
+        "Gpole 0 x inside inn {gm}",
+        "Rpole x 0 {gain/gm}",
+        f"Cpole x 0 {literal(_POLE)} IC={{start}}",
+        "Ez z 0 x 0 1",
+        "Ey out 0 y 0 1",
+        *_output_limit("{low}", "{high}"),
+        ".ends opamp",
+    ]
+
+
+MODELS: Mapping[Fidelity, OpAmpModel] = {
+    "pole": OpAmpModel("one pole alone", _one_pole, frozenset({"start", "gbw"})),
+''',
+        )
+    ],
+}
+CHECKED = """
+import json, sys
+from designer.catalog.parts_catalog import load_catalog
+from designer.fidelity.trade_files import TITLES
+from designer.spice.opamp_check import checks
+found = checks(load_catalog().opamp("TL074C"), "pole")
+print(json.dumps([[c.name, c.agrees] for c in found]))
+assert TITLES["pole"] == "ngspice, one pole alone"
+"""
+
+
+def test_a_fidelity_of_the_op_amps_touches_two_files(tmp_path: Path) -> None:
+    """Its name, and its model. ngspice measures those figures of the data sheet that it has."""
+    place = grown(tmp_path, FIDELITY)
+    assert "pole" in run(place, "-m", "designer", "simulate", "--help")
+    told = json.loads(run(place, "-c", CHECKED))
+    names = [name for name, _ in told]
+    assert {"gain", "offset", "gain-bandwidth", "swing into 10 kΩ, high"} <= set(names)
+    assert not any("slew" in name for name in names)
+    assert all(agrees for _, agrees in told), told
+
+
+SIMULATOR: Mapping[str, Texts] = {
+    "base/defaults.py": [
+        (
+            'Dialect = Literal["ltspice", "portable"]\n',
+            'Dialect = Literal["ltspice", "portable", "xyce"]\n',
+        )
+    ],
+    "spice/simulator_decks.py": [
+        (
+            "SIMULATORS: Mapping[Dialect, SimulatorDeck] = {\n",
+            '''def _formulas(circuit: Circuit, board: Board) -> Iterator[str]:
+    """A source with a formula for each section: offsets, no bias currents."""
+    gain = literal(deck.open_loop_gain(board))
+    for s in circuit.sections:
+        low, high = map(literal, board.rails[s.name])
+        across = f"V({s.noninverting})-V({s.inverting})+{literal(board.offset.get(s.name, 0.0))}"
+        yield f"B{s.name} {s.output} 0 V=max({low},min({high},{gain}*({across})))"
+
+
+SIMULATORS: Mapping[Dialect, SimulatorDeck] = {
+    "xyce": SimulatorDeck("For Xyce: sources with formulas", _formulas, ".print tran"),
+''',
+        )
+    ],
+}
+RUN = """
+import json
+import numpy as np
+from designer.base.manifest import DeckStage, of_design
+from designer.circuit.board_values import nominal_board
+from designer.circuit.netlist import Excitation
+from designer.circuit.reduction import Reduction
+from designer.dynamics.flow import Flow
+from designer.spice import simulator_decks
+from designer.spice.deck import SolverSettings
+from designer.spice.simulator_decks import ResponseRun
+from designer.spice.worker import open_simulator
+from tests.circuit.test_reduction import EXACT, circuit_of
+circuit, excitation = circuit_of(EXACT), Excitation(250.0, 2.0)
+stop = 3.0 / excitation.frequency
+asked = ResponseRun(1.0, None, excitation, SolverSettings("trap", stop / 3000, 1e-5), stop, None)
+text = simulator_decks.write("xyce", circuit, [asked], title="chain")
+assert "* designer deck for xyce" in text
+assert of_design(DeckStage.of("xyce"))
+nets = circuit.state_nets
+found = open_simulator("batch").run(text.replace(".print tran ", ".save "), nets, stop)
+system = Reduction(circuit, nominal_board(circuit)).system()
+points = Flow(system, excitation.drive).run(np.zeros(4), 3, points=64).strobes
+grid = np.arange(1, 3 * 64) / (64 * excitation.frequency)
+off = [
+    np.abs(np.interp(grid, found.axis, found.signals[net]) - points[1:-1, k]).max()
+    for k, net in enumerate(nets)
+]
+print(json.dumps([off, np.abs(points).max(axis=0).tolist()]))
+"""
+
+
+def test_a_simulator_touches_two_files(tmp_path: Path) -> None:
+    """Its name, and what differs in its deck: here op-amps as formulas, which ngspice reads too.
+    Three periods from rest are those of the exact circuit."""
+    place = grown(tmp_path, SIMULATOR)
+    assert "xyce" in run(place, "-m", "designer", "export", "--help")
+    off, peaks = json.loads(run(place, "-c", RUN))
+    assert max(peaks) > 1.0
+    assert max(np.divide(off, peaks)) < 2e-3
+
+
+def test_an_op_amp_touches_a_file_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A table as in the catalogue's own file, in a folder of one's own: its model in ngspice has
+    the figures that were written."""
+    shipped = (ROOT / "catalogs" / "opamps.toml").read_text("utf-8")
+    (entry,) = re.findall(r'(?ms)^\[\[opamp\]\]\nname = "TL074C"$.*?(?=^\[\[opamp)', shipped)
+    mine = re.sub(r"(?m)^gbw = .*$", 'gbw = { typ = "8 MHz", source = "mine" }', entry)
+    mine = mine.replace('name = "TL074C"', 'name = "Mine"')
+    (tmp_path / "mine.toml").write_text(f"format = 1\n\n{mine}", encoding="utf-8")
+    monkeypatch.setenv("DESIGNER_CATALOGS", str(tmp_path))
+    found = {check.name: check for check in checks(load_catalog().opamp("Mine"), "dynamic")}
+    assert found["gain-bandwidth"].measured == pytest.approx(8e6, rel=0.02)
+    assert all(check.agrees for check in found.values())

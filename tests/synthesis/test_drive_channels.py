@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from designer.base.arrays import Array
+from designer.base.defaults import DIALECTS
 from designer.base.errors import InputError
 from designer.board.board_parts import board_circuit, fault_current, protection_offset
 from designer.board.kicad_sim import models
@@ -182,7 +183,7 @@ def test_decks_for_other_simulators_have_the_same_generator(name: str) -> None:
             nets,
             period,
         )
-        for dialect in simulator_decks.DIALECTS
+        for dialect in DIALECTS
     ]
     for waves in both:
         angle = excitation.drive.omega * waves.axis
