@@ -215,9 +215,9 @@ def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -
 @pytest.mark.parametrize(("least", "needed"), [(False, np.inf), (True, 0.0)])
 def test_a_limit_that_no_number_helps_says_so(least: bool, needed: float) -> None:
     """It is missed by e^100, further than any scale goes."""
-    made = flat(np.array([[0.0, 0.0, 100.0]]))
+    made = flat(np.array([[0.0, 0.0, 100.0], [1.0, 0.0, -50.0]]))
     limit = StatedLimit("level", "bound", 1.0, least=least)
-    made = replace(made, bounds=(replace(made.bounds[0], limit=limit),))
+    made = replace(made, bounds=(replace(made.bounds[0], limit=limit), made.bounds[1]))
     (conflict,) = ScaleBox(made).conflicts()
     assert (conflict.limit, conflict.needed, conflict.frees) == (limit, needed, True)
 
