@@ -237,7 +237,9 @@ STAGE: Mapping[str, Texts] = {
     "circuit/dead_zone_parts.py": [
         (
             "            if zone.damping or part_of(index, FEEDBACK) in parts\n",
-            '            if kind == "apart" or zone.damping or part_of(index, FEEDBACK) in parts\n',
+            '            if (kind == "apart" and not zone.limits)\n'
+            "            or zone.damping\n"
+            "            or part_of(index, FEEDBACK) in parts\n",
         )
     ],
 }
