@@ -201,6 +201,8 @@ def test_what_was_left_is_taken_up_again(
         shutil.rmtree(out.parent)
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", WORK)
 def test_a_read_only_folder_is_told_of(
     name: str, made: Path, record: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
