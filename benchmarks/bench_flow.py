@@ -391,7 +391,7 @@ def main() -> Figures:
     with mpl.rc_context({"svg.hashsalt": "flow", "svg.fonttype": "none"}):
         figure.savefig(REPORT / "flow.svg", metadata={"Date": None})
     figure.savefig(REPORT / "flow.png", dpi=130)
-    parts, found = [], {}
+    parts, found = [], dict[str, float]()
     for name, _, values in ratios(rows):
         pairs = zip(FREQUENCIES, values, strict=True)
         found |= {f"ω = {omega}, over {name}": v for omega, v in pairs if v is not None}

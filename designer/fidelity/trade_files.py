@@ -40,7 +40,7 @@ UNITS = (
     "where that rung is what the others are measured against: it is no error against anything else."
 )
 """What the columns of ``cheapest_table`` say."""
-TITLES = {
+TITLES: Mapping[str, str] = {
     "rk4": "model, Runge-Kutta",
     "model": "model, exact",
     "circuit": "circuit, exact",

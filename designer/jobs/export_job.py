@@ -163,17 +163,20 @@ def export_decks(
     """Write decks into a design folder, which is made where there is none."""
     runner, synthesis, reused = _design(modelfile, out, options, progress)
     folder, inputs = runner.folder, _inputs(runner)
-    names = {DeckStage.of(dialect): (dialect, file_name(dialect)) for dialect in dialects}
-    stages: Stages = {stage: (dict(inputs), [name]) for stage, (_, name) in names.items()}
+    names = {dialect: file_name(dialect) for dialect in dialects}
+    stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("decks")
-        texts = {name: deck_text(synthesis, dialect) for dialect, name in names.values()}
+        texts = {
+            name: deck_text(synthesis, dialect)
+            for dialect, name in names.items()
+            if DeckStage.of(dialect) in todo
+        }
         with folder.working({stage: stages[stage] for stage in todo}, design_provenance(synthesis)):
-            for stage in todo:
-                _, name = names[stage]
-                folder.write(name, texts[name])
-    return _result(runner, [name for _, name in names.values()], reused and not todo)
+            for name, text in texts.items():
+                folder.write(name, text)
+    return _result(runner, list(names.values()), reused and not todo)
 
 
 def export_orders(

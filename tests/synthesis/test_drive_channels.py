@@ -262,9 +262,9 @@ def test_no_current_is_lost_at_a_summing_node() -> None:
                 other = part.b if part.a == node else part.a
                 brought.append((volts.get(other, 0.0) - volts[node]) / part.value)
         for name, rate in zip(circuit.states, rates, strict=True):
-            part = next(c for c in circuit.capacitors if c.name == name)
-            if node in (part.plus, part.minus):
-                brought.append(part.value * rate * (1.0 if node == part.minus else -1.0))
+            own = next(c for c in circuit.capacitors if c.name == name)
+            if node in (own.plus, own.minus):
+                brought.append(own.value * rate * (1.0 if node == own.minus else -1.0))
                 moved += 1
         assert sum(brought) == pytest.approx(0.0, abs=1e-9 * max(map(abs, brought)))
     assert moved == len(circuit.states)
