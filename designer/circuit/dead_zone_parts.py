@@ -25,11 +25,6 @@ from designer.model.mechanics import MechanicalModel
 _RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a file says nothing)'
 
 
-def rectifies(kind: DeadZone) -> bool:
-    """Whether diodes make the dead zones of such a stage, each stop by a half of its own."""
-    return kind != "saturation"
-
-
 @dataclass(frozen=True)
 class DeadZoneStage:
     """Which stage makes the dead zones."""
@@ -45,8 +40,8 @@ class DeadZoneStage:
 
     @property
     def rectifies(self) -> bool:
-        """Whether its kind does."""
-        return rectifies(self.kind)
+        """Whether diodes make its dead zones, each stop by a half of its own."""
+        return self.kind != "saturation"
 
     @property
     def feeds(self) -> Mapping[int, str]:
@@ -139,7 +134,7 @@ def dead_zone_stage(
     """
     system = model.second_order()
     kind = stage_kind(spec, system.dead_zones)
-    if rectifies(kind):
+    if DeadZoneStage(kind).rectifies:
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
         apart = frozenset(
             index

@@ -14,7 +14,7 @@ from scipy.optimize import linprog
 
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.output_stage import OutputStage
-from designer.circuit.dead_zone_parts import DeadZoneStage, rectifies
+from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_terms import Targets
@@ -128,7 +128,7 @@ def outside(value: float, interval: tuple[float, float]) -> float:
 
 def parts_of(kind: circuit_table.DeadZone, sides: str) -> tuple[str, ...]:
     """Names of the resistors that the stage has, R50 included."""
-    if rectifies(kind):
+    if DeadZoneStage(kind).rectifies:
         halves = {
             "both": range(200, 208),
             "upper": (200, 201, 202, 206),

@@ -18,12 +18,7 @@ from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import (
-    DeadZoneStage,
-    dead_zone_stage,
-    rectifies,
-    stage_kind,
-)
+from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage, stage_kind
 from designer.circuit.dead_zone_place import MOST_MASSES
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
@@ -52,7 +47,7 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
     system = model.second_order()
     zones = system.dead_zones
-    by_diodes = bool(zones) and rectifies(stage_kind(spec, zones))
+    by_diodes = bool(zones) and DeadZoneStage(stage_kind(spec, zones)).rectifies
     if by_diodes:
         diode_of(spec.diode, catalog)
     if by_diodes or system.wired.constant.any():
