@@ -63,7 +63,7 @@ $(VENV)/.bench: $(VENV)/.installed requirements/bench.txt
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt
 	@touch $@
 
-bench: $(VENV)/.bench ngspice ## run the benchmarks
+bench: $(VENV)/.bench ngspice ## run the benchmarks; which ratios have fallen?
 	@$(VENV)/bin/python -m benchmarks
 
 mutate: env ## change the program in one place, again and again: do the tests notice?

@@ -1,4 +1,5 @@
-"""Run each ``benchmarks/bench_*.py`` that has a ``main()`` and print how long it took.
+"""Run each ``benchmarks/bench_*.py`` that has a ``main()`` and print how long it took. Ratios go to
+reports/bench-history/ with their commit, and those that have fallen by a tenth are named.
 
 With names as arguments (``python -m benchmarks ngspice``), only those; what follows one name and
 begins with ``-`` are that benchmark's own options (``python -m benchmarks strangers --count 30``).
@@ -17,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 import benchmarks
+from benchmarks.history import noted
 
 PREFIX = "benchmarks.bench_"
 
@@ -30,7 +32,7 @@ def main(words: Sequence[str] = ()) -> int:
         return 2
     console = Console()
     table = Table("benchmark", "seconds", "result")
-    failed = False
+    failed, fallen = False, list[str]()
     modules = sorted(m.name for m in pkgutil.iter_modules(benchmarks.__path__, "benchmarks."))
     names = [name for name in modules if name.startswith(PREFIX)]
     unknown = {f"{PREFIX}{name}" for name in wanted} - set(names)
@@ -54,9 +56,12 @@ def main(words: Sequence[str] = ()) -> int:
             console.print_exception()
             failed, result = True, f"failed: {error!r}"
         seconds = time.perf_counter() - start
+        fallen += noted(name.removeprefix(PREFIX), result)
         shown = "" if result is None else str(result)
         table.add_row(name.removeprefix(PREFIX), f"{seconds:.2f}", shown)
     console.print(table)
+    for line in fallen:
+        console.print(line, markup=False)
     return int(failed)
 
 

@@ -24,6 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.chain_race import Race, races
+from benchmarks.figures import Figures
 from benchmarks.references import Heyoka, Problem, Stops, rk4, scipy_with_events, truth
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
@@ -376,8 +377,8 @@ def plot(rows: list[Row]) -> Figure:
     return figure
 
 
-def main() -> str:
-    """Measure, print, write reports/speed/flow.md and its plot; returns a line of ratios."""
+def main() -> Figures:
+    """Measure, print, write reports/speed/flow.md and its plot; returns the ratios."""
     begin = time.perf_counter()
     rows = [row for omega in FREQUENCIES for row in measure(omega)]
     chains = races()
@@ -390,12 +391,15 @@ def main() -> str:
     with mpl.rc_context({"svg.hashsalt": "flow", "svg.fonttype": "none"}):
         figure.savefig(REPORT / "flow.svg", metadata={"Date": None})
     figure.savefig(REPORT / "flow.png", dpi=130)
-    parts = []
+    parts, found = [], dict[str, float]()
     for name, _, values in ratios(rows):
+        pairs = zip(FREQUENCIES, values, strict=True)
+        found |= {f"ω = {omega}, over {name}": v for omega, v in pairs if v is not None}
         shown = "/".join("-" if v is None else f"{v:.0f}" for v in values)
         parts.append(f"{shown} x {name}")
     parts += [f"{min(r.ratio for r in chains):.1f} x heyoka on chains"] if chains else []
-    return "fast path " + ", ".join(parts)
+    found |= {f"chain of {r.masses}, {r.clearances}, ω = {r.omega}": r.ratio for r in chains}
+    return Figures("fast path " + ", ".join(parts), found)
 
 
 if __name__ == "__main__":

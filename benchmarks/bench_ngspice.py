@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
+from benchmarks.figures import Figures
 from benchmarks.ngspice_figures import (
     NAIVE_PERIODS,
     SETTLED,
@@ -425,8 +426,9 @@ def write(m: Measured, folder: Path) -> str:
     return text
 
 
-def main() -> str:
+def main() -> Figures:
     """Measure, print, write reports/ngspice/; returns a line of figures."""
     m = measure()
     print(write(m, REPORT))
-    return ", ".join(f"p = {s.p}: {s.ratio:.0f} times the naive flow" for s in m.speeds)
+    line = ", ".join(f"p = {s.p}: {s.ratio:.0f} times the naive flow" for s in m.speeds)
+    return Figures(line, {f"p = {s.p}, over the naive flow": s.ratio for s in m.speeds})

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bench_flow import commit, machine, table
+from benchmarks.figures import Figures
 from designer.base.defaults import cores
 from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.parameter_map import MapPlan
@@ -193,7 +194,9 @@ def report(timed: list[Timing], cost: list[Cost]) -> str:
     return "\n".join(lines)
 
 
-def main(folder: Path = REPORT, rounds: int = ROUNDS, steps: int = 1801, side: int = 200) -> str:
+def main(
+    folder: Path = REPORT, rounds: int = ROUNDS, steps: int = 1801, side: int = 200
+) -> Figures:
     """Write sweeps.md and sweeps.json."""
     timed, cost = timings(rounds, steps, side), costs()
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,4 +209,5 @@ def main(folder: Path = REPORT, rounds: int = ROUNDS, steps: int = 1801, side: i
         "costs": [asdict(c) for c in cost],
     }
     (folder / "sweeps.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-    return "; ".join(f"{t.name}: {min(t.wall):.2f} s" for t in timed)
+    line = "; ".join(f"{t.name}: {min(t.wall):.2f} s" for t in timed)
+    return Figures(line, {f"ω = {c.omega}, over the general flow": c.slow / c.show for c in cost})

@@ -244,12 +244,10 @@ def limits(
     chosen: Mapping[str, Sequence[str]], target: Target, covers: Mapping[str, Cover]
 ) -> dict[str, float]:
     """The seconds that each test may take, in their order."""
-    second_drive = START + (COMPILE if target.compiled else 0.0)
+    least = START + (COMPILE if target.compiled else 0.0)
     slowest = {file: max(covers[file].seconds.values()) for file in chosen}
     return {
-        test: second_drive + PATIENCE * slowest[file]
-        for file, tests in chosen.items()
-        for test in tests
+        test: least + PATIENCE * slowest[file] for file, tests in chosen.items() for test in tests
     }
 
 

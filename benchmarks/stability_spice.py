@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from designer.base.defaults import Fidelity
 from designer.base.errors import InputError
 from designer.check import checked_design, trust
 from designer.check.synthesis_result import Synthesis, synthesise
@@ -20,7 +21,6 @@ from designer.circuit.nominal import circuit_flow, on_circuit
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import parse_model_file
 from designer.spice import convergence_aids, equation_check, numerics_gate
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_circuit

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Literal
+from typing import Literal, get_args
 
 from designer.base.errors import InputError
 
@@ -11,6 +11,11 @@ StudyEngine = Literal["exact", "bandwidth", "auto", "ngspice"]
 """Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample;
 "bandwidth": the same with op-amps that lag, in both."""
 STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "bandwidth", "auto", "ngspice")
+Fidelity = Literal["ideal", "dynamic", "full"]
+"""How much of an op-amp ngspice is told (``spice.opamp_model``)."""
+Dialect = Literal["ltspice", "portable"]
+DIALECTS: tuple[Dialect, ...] = get_args(Dialect)
+"""What a deck for another simulator is written in (``spice.simulator_decks``)."""
 Over = Literal["omega", "b", "grade", "omega-grade", "temperature"]
 OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade", "temperature")
 """What a yield map is made over."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
+from designer.base.defaults import DIALECTS, Dialect
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes
 from designer.base.seal import sha256
@@ -26,12 +27,18 @@ class OrderStage(str):
         return cls(f"{ORDERS}/{fab}")
 
 
+class DeckStage(str):
+    """The stage of a deck for another simulator: ``deck-ltspice``."""
+
+    @classmethod
+    def of(cls, dialect: Dialect) -> DeckStage:
+        return cls(f"deck-{dialect}")
+
+
 ORDERS = "fabrication"
 """Folder of what fabs are sent, one folder in it for each."""
 _OfDesign = Literal[
     "kicad",
-    "deck-ltspice",
-    "deck-portable",
     "study",
     "measured",
     "comparison",
@@ -40,12 +47,12 @@ _OfDesign = Literal[
     "cure",
     "rules",
 ]
-_Fixed = Literal["search", "design", _OfDesign, "sweep", "map", "basins"]
-StageName = _Fixed | OrderStage
-STAGES: tuple[StageName, ...] = get_args(_Fixed)
+StageName = _Fixed | OrderStage | DeckStage
+_DECKS = tuple(map(DeckStage.of, DIALECTS))
+STAGES: tuple[StageName, ...] = (*get_args(_Fixed), *_DECKS)
 Stages = dict[StageName, tuple[dict[str, Any], list[str]]]
 """Stages as a folder is asked for them: inputs, and names of files, by name."""
-OF_DESIGN: tuple[StageName, ...] = get_args(_OfDesign)
+OF_DESIGN: tuple[StageName, ...] = (*get_args(_OfDesign), *_DECKS)
 """Stages that depend on the design, and on it alone."""
 
 

@@ -15,11 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from designer.base.defaults import Fidelity
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.scaled_sigma import OperatingOrbit, ScaledBoards
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.verdicts.cross_check import survives
 from designer.verdicts.ngspice_runs import Query, run_queries, way_to_fidelity

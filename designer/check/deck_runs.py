@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from designer.base.arrays import Array
+from designer.base.defaults import DIALECTS, Dialect
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Circuit, Excitation
@@ -15,18 +16,13 @@ from designer.model.find_responses import ModelResponse, find
 from designer.model.response_table import Response
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.simulator_decks import Dialect, ResponseRun
+from designer.spice.simulator_decks import SIMULATORS, ResponseRun, file_name
 
 PERIODS = 20
 """Drive periods that a run takes."""
 FINER = 8
 """How much smaller the step for another simulator is than the first that the numerics gate
 tries."""
-OTHERS: dict[Dialect, str] = {
-    "ltspice": "For LTspice. The op-amps are one subcircuit, opamp, at the end of the elements",
-    "portable": "For simulators after SPICE 2: R, C, D, V, I, E and G alone",
-}
-"""First line of a deck for another simulator."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,7 @@ def circuit_notes(synthesis: Synthesis, run: FirstRun) -> tuple[str, ...]:
         *_other_responses(drive),
         "The start voltages (IC=) belong to this response alone, and .tran to its frequency",
         "Every response with its own start, and other simulators: designer export DIR --deck NAME,",
-        "with ltspice or portable, writes circuit-ltspice.cir or circuit-portable.cir",
+        f"with {' or '.join(DIALECTS)}, writes {' or '.join(map(file_name, DIALECTS))}",
     )
 
 
@@ -131,7 +127,7 @@ def simulator_notes(
 ) -> tuple[str, ...]:
     """The notes at the top of a deck for another simulator."""
     return (
-        OTHERS[dialect],
+        SIMULATORS[dialect].about,
         *_circuit(synthesis),
         "An op-amp is a current into 1 kohm, clamped by diodes at its output limits, and a source.",
         "Finite gain and bias current are the nominal ones, as in circuit.cir",

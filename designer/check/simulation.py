@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import DRAWN_STARTS, SEED, cores
+from designer.base.defaults import DRAWN_STARTS, SEED, Fidelity, cores
 from designer.base.errors import InputError
 from designer.base.frames import table_html
 from designer.base.progress import Progress
@@ -55,7 +55,6 @@ from designer.model.relative_motion import (
 )
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit, twin_runs
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool, require_ngspice
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from designer.base.errors import InputError
 from designer.catalog.diode_curve import DiodeModel, diode_model
@@ -19,11 +18,10 @@ from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode,
 from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
 from designer.circuit.resistors import Resistors
 from designer.circuit.stop import Contact, Stop
-from designer.model.circuit_table import CircuitSpec
+from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.clearance import Clearance, Side
 from designer.model.mechanics import MechanicalModel
 
-Kind = Literal["saturation", "rectifier"]
 _RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a file says nothing)'
 
 
@@ -31,7 +29,7 @@ _RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a 
 class DeadZoneStage:
     """Which stage makes the dead zones."""
 
-    kind: Kind = "saturation"
+    kind: DeadZone = "saturation"
     """"saturation", the paper's stage that clips, or "rectifier", whose dead zone is flat."""
     diode: DiodeEntry | None = None
     """The rectifier's diode; None for the other kind."""
@@ -41,9 +39,14 @@ class DeadZoneStage:
     """Clearances, by their place in the order, whose halves have an output each."""
 
     @property
+    def rectifies(self) -> bool:
+        """Whether diodes make its dead zones, each stop by a half of its own."""
+        return self.kind != "saturation"
+
+    @property
     def feeds(self) -> Mapping[int, str]:
         """Names of the resistors that feed the references, by the reference's sign."""
-        return RECTIFIER_FEEDS if self.kind == "rectifier" else FEEDS
+        return RECTIFIER_FEEDS if self.rectifies else FEEDS
 
     def places(self, clearances: tuple[Clearance, ...]) -> tuple[DeadZonePlace, ...]:
         """Where the stage of each clearance stands."""
@@ -53,7 +56,7 @@ class DeadZoneStage:
                 clearance,
                 index,
                 alone,
-                inverts=(self.kind == "rectifier" and index not in self.apart) != clearance.falls,
+                inverts=(self.rectifies and index not in self.apart) != clearance.falls,
                 apart=index in self.apart,
             )
             for index, clearance in enumerate(clearances)
@@ -72,7 +75,7 @@ class DeadZoneStage:
         refusal = self.refused(place.clearance)
         if refusal is not None:
             raise refusal
-        if self.kind == "saturation":
+        if not self.rectifies:
             return _saturation(place, resistors)
         if self.diode is None:
             raise InputError(None, "dead zone", "no diode", "a diode, for a rectifier")
@@ -83,7 +86,7 @@ class DeadZoneStage:
     def refused(self, clearance: Clearance) -> InputError | None:
         """Why the stage cannot make this clearance; None if it can."""
         name, stops = clearance.name, [stop for _, stop in clearance.sides]
-        if self.kind == "rectifier":
+        if self.rectifies:
             return None
         if clearance.bend_of:
             found = f'"saturation", with bends of {clearance.bend_of}'
@@ -109,7 +112,7 @@ class DeadZoneStage:
         return InputError(None, "circuit.dead_zone", found, expected)
 
 
-def stage_kind(spec: CircuitSpec, clearances: Sequence[Clearance]) -> Kind:
+def stage_kind(spec: CircuitSpec, clearances: Sequence[Clearance]) -> DeadZone:
     """Kind of the stage: as stated; else the saturating one where it makes these clearances."""
     if spec.dead_zone is not None:
         return spec.dead_zone
@@ -131,7 +134,7 @@ def dead_zone_stage(
     """
     system = model.second_order()
     kind = stage_kind(spec, system.dead_zones)
-    if kind == "rectifier":
+    if DeadZoneStage(kind).rectifies:
         diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
         apart = frozenset(
             index

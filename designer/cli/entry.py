@@ -12,7 +12,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from designer.base.errors import DesignerError
+from designer.base.errors import DesignerError, EnvironmentMissing
 from designer.base.printed import tell
 
 INTERRUPTED = 130
@@ -60,6 +60,13 @@ def _status(arguments: list[str]) -> int:
         return error.exit_status
     except BrokenPipeError:
         raise
+    except ImportError as error:
+        library = (error.name or "").partition(".")[0]
+        if library in ("", "designer"):
+            return _unexpected(error, arguments)
+        why = f"the library {library} is missing or broken ({print_line(str(error))})"
+        _say(f"error: {why}; install this tool anew, with its libraries")
+        return EnvironmentMissing.exit_status
     except Exception as error:
         return _unexpected(error, arguments)
 

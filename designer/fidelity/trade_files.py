@@ -30,6 +30,7 @@ from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
 from designer.model.model import SiScales
 from designer.model.si_units import hertz_json
+from designer.spice.opamp_model import MODELS
 
 NONE = "–"
 UNITS = (
@@ -39,14 +40,12 @@ UNITS = (
     "where that rung is what the others are measured against: it is no error against anything else."
 )
 """What the columns of ``cheapest_table`` say."""
-TITLES = {
+TITLES: Mapping[str, str] = {
     "rk4": "model, Runge-Kutta",
     "model": "model, exact",
     "circuit": "circuit, exact",
     "bandwidth": "circuit, exact, with bandwidth",
-    "ideal": "ngspice, ideal op-amps",
-    "dynamic": "ngspice, bandwidth and slew",
-    "full": "ngspice, full op-amps",
+    **{name: f"ngspice, {model.words}" for name, model in MODELS.items()},
     "vendor": "ngspice, the vendor's op-amps",
 }
 _LOOKS = {
@@ -59,6 +58,7 @@ _LOOKS = {
     "full": ("#8c1c13", "v"),
     "vendor": ("#5b3a8c", "P"),
 }
+_OTHER = ("#555555", "X")
 
 
 def trade_json(
@@ -366,7 +366,7 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
             axes.set_xlabel("CPU seconds of a drive period")
             axes.tick_params(labelbottom=True)  # also where the row below is not full
     used = [r for r in FIDELITIES if any(row["rung"] == r for row in shown)]
-    handles = [_mark(*_LOOKS[r], TITLES[r]) for r in used]
+    handles = [_mark(*_LOOKS.get(r, _OTHER), TITLES[r]) for r in used]
     if any(not row["right"][BOARD] for row in shown):
         handles.append(_mark(MUTED, "o", "hollow: another n-p-q", mfc="white"))
     if any(row["gate"] is False for row in shown):
@@ -385,7 +385,7 @@ def _mark(colour: str, marker: str, label: str, **look: Any) -> Line2D:
 def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
     points = []
     for row in rows:
-        colour, marker = _LOOKS[row["rung"]]
+        colour, marker = _LOOKS.get(row["rung"], _OTHER)
         right, passed = row["right"][BOARD], row["gate"] is not False
         at = row["seconds_per_period"], row[key]
         face, alpha = colour if right else "white", None if passed else _PALE

@@ -7,15 +7,16 @@ later and another stays.
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from designer.base.defaults import Dialect
 from designer.base.design_folder import DESIGN
 from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
-from designer.base.manifest import ORDERS, OrderStage, StageName, Stages
+from designer.base.manifest import ORDERS, DeckStage, OrderStage, Stages
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
@@ -46,12 +47,7 @@ from designer.jobs.rules_job import checked
 from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
 from designer.spice import simulator_decks
-from designer.spice.simulator_decks import Dialect, file_name
-
-DECK_STAGES: Mapping[Dialect, StageName] = {
-    "ltspice": "deck-ltspice",
-    "portable": "deck-portable",
-}
+from designer.spice.simulator_decks import file_name
 
 
 @dataclass(frozen=True)
@@ -166,17 +162,20 @@ def export_decks(
     """Write decks into a design folder, which is made where there is none."""
     runner, synthesis, reused = _design(modelfile, out, options, progress)
     folder, inputs = runner.folder, _inputs(runner)
-    names = {DECK_STAGES[dialect]: (dialect, file_name(dialect)) for dialect in dialects}
-    stages: Stages = {stage: (dict(inputs), [name]) for stage, (_, name) in names.items()}
+    names = {dialect: file_name(dialect) for dialect in dialects}
+    stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("decks")
-        texts = {name: deck_text(synthesis, dialect) for dialect, name in names.values()}
+        texts = {
+            name: deck_text(synthesis, dialect)
+            for dialect, name in names.items()
+            if DeckStage.of(dialect) in todo
+        }
         with folder.working({stage: stages[stage] for stage in todo}, design_provenance(synthesis)):
-            for stage in todo:
-                _, name = names[stage]
-                folder.write(name, texts[name])
-    return _result(runner, [name for _, name in names.values()], reused and not todo)
+            for name, text in texts.items():
+                folder.write(name, text)
+    return _result(runner, list(names.values()), reused and not todo)
 
 
 def export_orders(

@@ -7,7 +7,7 @@ known once its terms are (``synthesis.part_checks``).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from designer.base.eseries import SERIES
 from designer.base.json_schema import either, listed
@@ -28,6 +28,7 @@ from designer.base.units import parse_quantity
 from designer.catalog.entries import FORBIDDEN
 
 DeadZone = Literal["saturation", "rectifier"]
+DEAD_ZONES: tuple[DeadZone, ...] = get_args(DeadZone)
 Objective = Literal["margin", "match", "yield"]
 Names = bool | tuple[str, ...]
 """All of them, none, or those named."""
@@ -135,7 +136,7 @@ class CircuitSpec(FileTable):
     """Least and largest capacitance [F]."""
     frequency: Annotated[tuple[float, float], physical_span("Hz")] = (50.0, 1000.0)
     """Band for the frequency of ω = 1 [Hz]."""
-    dead_zone: Annotated[DeadZone | None, choice("saturation", "rectifier")] = None
+    dead_zone: Annotated[DeadZone | None, choice(*DEAD_ZONES)] = None
     """Kind of the stage that makes the dead zone."""
     diode: Annotated[str, line("the name of a diode of the catalogue")] = "1N4148"
     """The rectifying dead zone's diode, by its name in the catalogue."""

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from designer.base.schema import Accepts, FileTable, choice, line, number, several, span
-from designer.model.circuit_table import DeadZone
+from designer.model.circuit_table import DEAD_ZONES, DeadZone
 from designer.model.mechanics import MechanicalModel, check_omega
-
-DEAD_ZONES: tuple[DeadZone, ...] = ("saturation", "rectifier")
-
 
 BAND = (0.15, 2.0)
 """Band in which a frequency is sought, over the model's own."""
@@ -45,7 +42,7 @@ class SearchSpec(FileTable):
     """Names of op-amps in the catalogue that may be tried; the file's own if empty."""
     dead_zones: Annotated[
         tuple[DeadZone, ...],
-        several("a list of saturation, rectifier", choice(*DEAD_ZONES), least=1),
+        several("a list of " + ", ".join(DEAD_ZONES), choice(*DEAD_ZONES), least=1),
     ] = DEAD_ZONES
     """Kinds of dead-zone stage that may be tried."""
 

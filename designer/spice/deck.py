@@ -14,13 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.defaults import Fidelity
 from designer.catalog.diode_curve import card
 from designer.circuit.board_values import Board
 from designer.circuit.netlist import Circuit, Excitation, Generator, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.drive_shape import Shape
 from designer.spice import opamp_model
-from designer.spice.opamp_model import Fidelity, literal
+from designer.spice.opamp_model import literal
 
 FORMAT = 1
 IDEAL_GAIN = 1e9
@@ -123,11 +124,11 @@ def _opamps(
         return _instances(circuit, board, fidelity, outputs, {}) + opamp_model.ideal(gain)
     if circuit.figures is None:
         raise ValueError(f"rung {fidelity!r}: the circuit has no figures of its op-amp")
-    figures = circuit.figures
+    figures, takes = circuit.figures, opamp_model.MODELS[fidelity].takes
     vendor = fidelity == "full" and figures.spice is not None
     gbw_of = {} if vendor else board.gain_bandwidth
     slew_of = {} if vendor else board.slew
-    loads = {} if vendor or fidelity != "full" else circuit.output_loads(board.values)
+    loads = {} if vendor or "load" not in takes else circuit.output_loads(board.values)
     more = {
         s.name: {
             **(opamp_model.load(fidelity, loads[s.name]) if s.name in loads else {}),

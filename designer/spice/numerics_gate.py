@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
+from designer.base.defaults import Fidelity
 from designer.base.progress import doing
 from designer.base.reason import Reason
 from designer.circuit.board_values import Board
@@ -33,7 +34,6 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import (
     BRIEF,

@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from designer.base.defaults import Fidelity
 from designer.base.guarded_reading import UNREADABLE, reason
 from designer.catalog.entries import OpAmp
 from designer.catalog.fields import Figure
 from designer.catalog.output_stage import HEAVY_LOAD, RATED_LOAD
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
+    MODELS,
     NOISE_FREQUENCY,
-    Fidelity,
     headroom,
     instance,
     recovery,
@@ -247,15 +248,17 @@ def _measured(opamp: OpAmp, fidelity: Fidelity) -> list[FigureCheck]:
     light = bench.swing(RATED_LOAD)
     add("swing into 10 kΩ, low", "V", opamp.saturation, -light[0], 0.01)
     add("swing into 10 kΩ, high", "V", opamp.saturation, light[1], 0.01)
-    if fidelity == "ideal":
+    takes = MODELS[fidelity].takes
+    if "gbw" not in takes:
         return out
     at = opamp.gbw.nominal / 10.0
     frequency, gain = bench.response(at, 2.0 * at)
     add("gain-bandwidth", "Hz", opamp.gbw, float(abs(gain[0]) * frequency[0]), 0.02)
-    for edge, slope in zip(("rising", "falling"), bench.slew(), strict=True):
-        add(f"slew, {edge}", "V/s", opamp.slew, slope, 0.02)
-    add("recovery", "s", opamp.recovery, bench.recovery(), 0.1)
-    if fidelity == "dynamic":
+    if "slew" in takes:
+        for edge, slope in zip(("rising", "falling"), bench.slew(), strict=True):
+            add(f"slew, {edge}", "V/s", opamp.slew, slope, 0.02)
+        add("recovery", "s", opamp.recovery, bench.recovery(), 0.1)
+    if "load" not in takes:
         return out
     heavy = bench.swing(HEAVY_LOAD)
     add("swing into 2 kΩ, low", "V", opamp.swing_2k, -heavy[0], 0.01)

@@ -21,14 +21,12 @@ offsets ever starts. The output resistance acts before the limit (``Hout``), so 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Literal, get_args
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
+from designer.base.defaults import Fidelity
 from designer.catalog.entries import OpAmp
 from designer.catalog.output_stage import RATED_LOAD, saturation_resistance
-
-Fidelity = Literal["ideal", "dynamic", "full"]
-FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 
 PINS = "inp inn out vcc vee"
 LIMIT_RANGE = 1e-3
@@ -106,11 +104,11 @@ def instance(
 
     nets : noninverting input, inverting input, output. rails : output limits [V]. start : output
     voltage at the start of a transient [V]. more : `bandwidth` and `load` of this one; the model's
-    own where None. ``ideal`` has neither memory nor bandwidth, and takes none of it.
+    own where None. Of both stands here what the fidelity takes: ``ideal`` has neither memory nor
+    bandwidth.
     """
     parameters = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
-    if fidelity != "ideal":
-        parameters |= {"start": start, **(more or {})}
+    parameters |= _taken(fidelity, {"start": start, **(more or {})})
     words = " ".join(f"{key}={literal(value)}" for key, value in parameters.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
@@ -120,23 +118,24 @@ def bandwidth(fidelity: Fidelity, opamp: OpAmp, gbw: float) -> dict[str, float]:
 
     The second pole of ``full`` moves along, so that the phase margin stays the data sheet's.
     """
-    if fidelity == "ideal":
-        return {}
-    parameters = {"gbw": gbw}
-    if fidelity == "full":
-        parameters["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
-    return parameters
+    pole = second_pole(opamp) * gbw / opamp.gbw.nominal
+    return _taken(fidelity, {"gbw": gbw, "pole2": pole})
 
 
 def slew_rate(fidelity: Fidelity, slew: float) -> dict[str, float]:
     """Parameter of one op-amp with a slew rate [V/s] of its own."""
-    return {} if fidelity == "ideal" else {"slew": slew}
+    return _taken(fidelity, {"slew": slew})
 
 
 def load(fidelity: Fidelity, ohms: float) -> dict[str, float]:
     """Parameter of one op-amp whose limits are those into this load [ohm]: on ``full``, where they
     move with the current."""
-    return {"load": min(ohms, NO_LOAD)} if fidelity == "full" else {}
+    return _taken(fidelity, {"load": min(ohms, NO_LOAD)})
+
+
+def _taken(fidelity: Fidelity, parameters: Mapping[str, float]) -> dict[str, float]:
+    takes = MODELS[fidelity].takes
+    return {key: value for key, value in parameters.items() if key in takes}
 
 
 def subcircuit(fidelity: Fidelity, opamp: OpAmp, gain: float | None = None) -> list[str]:
@@ -144,12 +143,7 @@ def subcircuit(fidelity: Fidelity, opamp: OpAmp, gain: float | None = None) -> l
 
     gain : in the place of the catalogue's. On ``full`` a vendor's model goes first.
     """
-    gain = opamp.gain.nominal if gain is None else gain
-    if fidelity == "ideal":
-        return ideal(gain)
-    if fidelity == "dynamic":
-        return _dynamic(opamp, gain)
-    return _full(opamp, gain) if opamp.spice is None else opamp.spice.wrapped()
+    return MODELS[fidelity].lines(opamp, opamp.gain.nominal if gain is None else gain)
 
 
 def ideal(gain: float) -> list[str]:
@@ -178,7 +172,10 @@ def _dynamic(opamp: OpAmp, gain: float) -> list[str]:
 
 
 def _full(opamp: OpAmp, gain: float) -> list[str]:
-    """Common-mode range, pole, second pole, output limit, output current limit, supply pins."""
+    """Common-mode range, pole, second pole, output limit, output current limit, supply pins; or
+    the vendor's model."""
+    if opamp.spice is not None:
+        return opamp.spice.wrapped()
     return [
         f".subckt opamp {PINS} {_EACH} start=0 load={RATED_LOAD!r} {_dynamics(opamp, gain)} "
         f"pole2={literal(second_pole(opamp))} rsat={literal(saturation_resistance(opamp))} "
@@ -288,3 +285,23 @@ def _dynamics(opamp: OpAmp, gain: float) -> str:
         f"gain={literal(gain)} gbw={literal(opamp.gbw.nominal)} slew={literal(opamp.slew.nominal)} "
         f"rout={literal(opamp.output_resistance.nominal)} recovery={literal(recovery(opamp))}"
     )
+
+
+@dataclass(frozen=True)
+class OpAmpModel:
+    """The op-amps of a fidelity."""
+
+    words: str
+    """What they are called in tables."""
+    lines: Callable[[OpAmp, float], list[str]]
+    """The subcircuit with a gain, every other figure typical."""
+    takes: frozenset[str] = frozenset()
+    """What an instance may have of its own, beside offset, bias current and limits."""
+
+
+MODELS: Mapping[Fidelity, OpAmpModel] = {
+    "ideal": OpAmpModel("ideal op-amps", lambda _, gain: ideal(gain)),
+    "dynamic": OpAmpModel("bandwidth and slew", _dynamic, frozenset({"start", "gbw", "slew"})),
+    "full": OpAmpModel("full op-amps", _full, frozenset({"start", "gbw", "pole2", "slew", "load"})),
+}
+FIDELITIES: tuple[Fidelity, ...] = tuple(MODELS)

@@ -17,11 +17,11 @@ from a model file enters only through ``title_line``.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 from designer.base.arrays import Array
+from designer.base.defaults import Dialect
 from designer.catalog.diode_curve import THERMAL
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import GROUND, Circuit, Excitation
@@ -29,8 +29,6 @@ from designer.spice import deck, opamp_model
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import literal
 
-Dialect = Literal["ltspice", "portable"]
-DIALECTS: tuple[Dialect, ...] = get_args(Dialect)
 FORMAT = 1
 INNER = 1e3
 """Resistance [ohm] inside an op-amp, whose voltage the clamps limit."""
@@ -78,7 +76,7 @@ def write(
 
     notes : lines of a comment at the top.
     """
-    board = nominal_board(circuit)
+    board, own = nominal_board(circuit), SIMULATORS[dialect]
     lines = [
         deck.title_line(title),
         f"* designer deck for {dialect}, format {FORMAT}",
@@ -86,10 +84,9 @@ def write(
         *_supplies(circuit),
         *deck.resistors(circuit, board),
         *deck.diodes(circuit, charge=False),
-        *(_instances(circuit, board) if dialect == "ltspice" else _elements(circuit, board)),
-        # LTspice thins out the waves that it writes unless told not to.
-        deck.options(runs[0].settings) + (" plotwinsize=0" if dialect == "ltspice" else ""),
-        f"{'.save' if dialect == 'ltspice' else '.print tran'} {deck.voltages(circuit)}",
+        *own.opamps(circuit, board),
+        deck.options(runs[0].settings) + own.options,
+        f"{own.saves} {deck.voltages(circuit)}",
     ]
     for number, run in enumerate(runs, start=1):
         lines += _block(circuit, board, run, number, len(runs))
@@ -179,3 +176,30 @@ def _drop(circuit: Circuit) -> float:
     """Voltage [V] of a clamp that carries as much current as the resistor at the limit."""
     current = circuit.saturation / INNER
     return EMISSION * THERMAL * math.log1p(current / SATURATION_CURRENT)
+
+
+@dataclass(frozen=True)
+class SimulatorDeck:
+    """What differs from one simulator's deck to another's."""
+
+    about: str
+    """What it is for, and what its op-amps are: the first line of its notes."""
+    opamps: Callable[[Circuit, Board], Iterator[str]]
+    """The lines of the op-amps."""
+    saves: str
+    """The words before the voltages that are kept."""
+    options: str = ""
+    """Options beside those of the solver."""
+
+
+SIMULATORS: Mapping[Dialect, SimulatorDeck] = {
+    "ltspice": SimulatorDeck(
+        "For LTspice. The op-amps are one subcircuit, opamp, at the end of the elements",
+        _instances,
+        ".save",
+        " plotwinsize=0",  # without it LTspice thins out the waves that it writes
+    ),
+    "portable": SimulatorDeck(
+        "For simulators after SPICE 2: R, C, D, V, I, E and G alone", _elements, ".print tran"
+    ),
+}

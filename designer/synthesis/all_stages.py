@@ -317,7 +317,7 @@ class _Sizing:
             (reference_sign(place, side, stop), half_parts(place.index, side).threshold)
             for place in self.places
             for side, stop in place.clearance.sides
-            if self.question.stage.kind == "rectifier"
+            if self.question.stage.rectifies
         ]
         ends += [
             (-1 if force > 0.0 else 1, constant_resistor(mass))

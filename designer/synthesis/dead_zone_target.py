@@ -14,10 +14,11 @@ from scipy.optimize import linprog
 
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.output_stage import OutputStage
-from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
+from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.circuit.scale_fit import minimax
 from designer.linear_network.linear_block import errors_of
 from designer.linear_network.linear_terms import Targets
+from designer.model import circuit_table
 from designer.model.clearance import Sides
 from designer.model.find_responses import Peaks, Reach
 from designer.model.mechanics import MechanicalModel
@@ -57,7 +58,7 @@ class DeadZoneTarget:
     """Largest noise gain of an amplifier of the stage."""
     strict: bool = True
     """Whether these limits are conditions; otherwise they only say where the search begins."""
-    kind: Kind = "saturation"
+    kind: circuit_table.DeadZone = "saturation"
     """Kind of the stage."""
     sides: Sides = "both"
     """The stops that exist."""
@@ -125,9 +126,9 @@ def outside(value: float, interval: tuple[float, float]) -> float:
     return float(max(over, 0.0) + min(under, 0.0))
 
 
-def parts_of(kind: str, sides: str) -> tuple[str, ...]:
+def parts_of(kind: circuit_table.DeadZone, sides: str) -> tuple[str, ...]:
     """Names of the resistors that the stage has, R50 included."""
-    if kind == "rectifier":
+    if DeadZoneStage(kind).rectifies:
         halves = {
             "both": range(200, 208),
             "upper": (200, 201, 202, 206),

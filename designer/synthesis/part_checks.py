@@ -47,10 +47,10 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
     system = model.second_order()
     zones = system.dead_zones
-    rectifies = stage_kind(spec, zones) == "rectifier" and bool(zones)
-    if rectifies:
+    by_diodes = bool(zones) and DeadZoneStage(stage_kind(spec, zones)).rectifies
+    if by_diodes:
         diode_of(spec.diode, catalog)
-    if rectifies or system.wired.constant.any():
+    if by_diodes or system.wired.constant.any():
         _reference_of(spec, catalog)
     if spec.objective == "yield":
         raise InputError(
@@ -162,7 +162,7 @@ def stage_refusal(clearances: Sequence[Clearance], kind: DeadZone) -> Refusal:
         refusal = stage.refused(clearance)
         if refusal is not None:
             return refusal
-    if len(clearances) > 1 and kind == "saturation":
+    if len(clearances) > 1 and not stage.rectifies:
         return InputError(
             None,
             "circuit.dead_zone",

@@ -386,7 +386,7 @@ class _Search:
         for place in self.order.stage.places(self.order.model.second_order().dead_zones):
             shares = idle_shares(place.clearance, self.order.peaks.reach(place.index))
             least = min(shares.values(), default=1.0)
-            if self.order.stage.kind == "rectifier" and place.shared and least < LEAST_IDLE:
+            if self.order.stage.rectifies and place.shared and least < LEAST_IDLE:
                 return _apart(place.index)
         within = stated = self._limits(conditions)
         names: tuple[str, ...] = ()
@@ -450,7 +450,7 @@ class _Search:
         """The linear block with what a tree of choices, or joins, prove of any within these
         limits."""
         question = linear_question(self.order, within)
-        if self.order.stage.kind == "rectifier":  # the stop's resistor is one of the program's
+        if self.order.stage.rectifies:  # the stop's resistor is one of the program's
             question = replace(question, bounds=replace(question.bounds, stop=0.0))
         doing("least error of any integrators")
         bound, proof = linear_search.lower_bound(question, made.errors.max_error, BOUND_STEPS)

@@ -353,7 +353,7 @@ class ScaleChoice:
         if self.program.lead < 0:  # nothing but the swing sets the amplitude
             top = max(log.at(candidate.z) for log in self.program.levels)
             within = replace(within, swing=float(np.exp(top)))
-        if self.order.stage.kind != "rectifier":
+        if not self.order.stage.rectifies:
             return attempt(self.order, self.within, linear)
         own = {name: v for name, v in values.items() if name not in linear.values}
         stages = None

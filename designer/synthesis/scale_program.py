@@ -236,7 +236,7 @@ class _Maker:
         self.system: SecondOrderSystem = order.model.second_order()
         self.targets = Targets.of(order.model)
         self.states = 2 * self.system.size
-        rectifies = order.stage.kind == "rectifier"
+        rectifies = order.stage.rectifies
         every = order.stage.places(self.system.dead_zones)
         self.places: tuple[DeadZonePlace, ...] = every if rectifies else ()
         self.constants = np.flatnonzero(self.system.wired.constant).tolist() if rectifies else []

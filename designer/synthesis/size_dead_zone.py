@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from designer.base.arrays import Array
 from designer.circuit.coefficients import EXACT
+from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.linear_network.linear_terms import ANY
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis import rectifier_stage, saturating_search
@@ -42,7 +43,7 @@ def size(
         if most < 0:
             return "distinct values"
     ranking = Ranking(used | preferred, price or {}, EXACT, spec.slack, most)
-    rectifier = target.kind == "rectifier"
+    rectifier = DeadZoneStage(target.kind).rectifies
     groups = (*(rectifier_stage.EQUAL if rectifier else ()), *spec.matched)
     equal = equal_parts(parts_of(target.kind, target.sides), groups, fixed or {})
     if equal is None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
+from designer.base.defaults import Dialect
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.verbs.console import say
@@ -48,12 +49,12 @@ def export(
         option("--dsn", "FILE", "Instead: write the board for another router, a .dsn.", Path),
     ] = None,
     deck: Annotated[
-        Sequence[Literal["ltspice", "portable"]],
+        Sequence[Dialect],
         option(
             "--deck",
             None,
             "Instead: a deck for another simulator, with every response. May come twice.",
-            reads=list[Literal["ltspice", "portable"]],
+            reads=list[Dialect],
         ),
     ] = (),
     fab: Annotated[

@@ -11,7 +11,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from designer.base.defaults import DRAWN_STARTS, SEED
+from designer.base.defaults import DRAWN_STARTS, SEED, Fidelity
 from designer.base.errors import InputError
 from designer.base.frames import frame
 from designer.base.progress import Progress
@@ -96,7 +96,7 @@ def simulate(
         Literal["model", "circuit", "ngspice"], option("--engine", None, "What simulates.")
     ] = "model",
     rung: Annotated[
-        Literal["ideal", "dynamic", "full"],
+        Fidelity,
         option("--rung", None, "Fidelity of the op-amps' model, with --engine ngspice."),
     ] = "ideal",
     starts: Annotated[

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from designer.base.defaults import Fidelity
 from designer.circuit.ensemble import Ensemble
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import LEVELS, GateResult, GateSubject
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.verdicts.verdict import StudyPlan
 

@@ -18,6 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.defaults import Fidelity
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.flow_result import FlowStatus
@@ -26,7 +27,6 @@ from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.convergence_aids import RunQueue, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, name_in_ngspice
 from designer.spice.simulator import SimulationFailed

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from designer.base.defaults import Fidelity
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Circuit, Excitation
 from designer.dynamics.orbit import SETTLED, Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Fidelity
 from designer.spread.spread import Spread, draw_many
 
 BLOCK = 250

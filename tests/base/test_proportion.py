@@ -53,6 +53,7 @@ def test_mid_p_limits_leave_a_fortieth_beyond_each(of: int, data: st.DataObject)
 def test_mid_p_is_tight_where_nothing_was_seen_and_still_covers(of: int) -> None:
     assert mid_p(0, of)[1] == pytest.approx(1.0 - 0.05 ** (1.0 / of))
     assert mid_p(0, of)[1] < 0.9 * wilson(0, of)[1]
+    assert str(mid_p(0, of)[0]) == "0.0"  # nobody reads of -0 per cent
     rates = np.linspace(0.001, 0.5, 300)
     limits = [mid_p(k, of) for k in range(of + 1)]
     covered = [

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.circuit.board_arrays import Boards
-from designer.circuit.board_modes import BoardModes, at_rest
+from designer.circuit.board_modes import BoardModes, at_rest, resting_voltages
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
@@ -433,6 +433,32 @@ def test_a_preloaded_board_rests_against_its_stop() -> None:
     assert rest[0] == pytest.approx(x1 * SCALE.volts[0], rel=1e-5)
     assert ends[1][0] == pytest.approx(-0.1 * SCALE.volts[0], rel=1e-5)
     assert ends[-1][0] == pytest.approx(-0.4 * SCALE.volts[0], rel=1e-5)
+
+
+def test_a_board_without_clearances_rests_where_its_springs_do() -> None:
+    system = two(clearances=(), constant=np.array([-0.1, -0.02]))
+    circuit = exact_circuit(system, SCALE)
+    ideal = replace(nominal_board(circuit), inverse_gain=1e-9, bias={})
+    rest, ends = at_rest(Boards.of(circuit, [ideal]))
+    x1 = float(np.linalg.solve(system.stiffness, system.constant)[0])
+    assert rest[0] == pytest.approx(x1 * SCALE.volts[0], rel=1e-5)
+    assert ends == {}
+
+
+def test_of_boards_together_some_rest_open_and_some_against_a_stop() -> None:
+    """The constant force of one is four times as large, by its resistor: the stop carries it."""
+    stops = Clearance("A", 0, None, Side(0.3, 5.0), None)
+    system = two(clearances=(stops,), constant=np.array([0.1, 0.0]))
+    circuit = exact_circuit(system, SCALE)
+    ideal = replace(nominal_board(circuit), inverse_gain=1e-9, bias={})
+    pushed = replace(ideal, values={**ideal.values, "R160": circuit.values["R160"] / 4.0})
+    boards = Boards.of(circuit, [pushed, ideal, pushed, ideal])
+    free = np.linalg.solve(system.stiffness, system.constant)
+    stiffer = system.stiffness + np.diag([5.0, 0.0])
+    held = np.linalg.solve(stiffer, [0.4 + 5.0 * 0.3, 0.0])
+    assert free[0] < 0.3 < held[0]
+    wanted = np.array([held[0], free[0], held[0], free[0]]) * SCALE.volts[0]
+    assert np.abs(resting_voltages(boards, ["v1"])[:, 0]) == pytest.approx(wanted, rel=1e-5)
 
 
 @settings(max_examples=10)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from designer.base.defaults import Fidelity
 from designer.board.board_parts import fitted
 from designer.board.component import components
 from designer.catalog.entries import OpAmp, SectionPins as PinTable
@@ -22,7 +23,6 @@ from designer.folders.design_source import read_design
 from designer.model.board_table import BoardChoice
 from designer.spice import deck
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_model import Fidelity
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT

@@ -100,6 +100,19 @@ def test_the_output_crosses_between_its_diodes_as_the_nodes_say(capacitance: flo
         assert mine > 3e-6
 
 
+def test_a_diode_that_is_off_is_charged_through_the_resistors() -> None:
+    """Kirchhoff's law at the summing node of a contact: what its resistors bring charges D201, over
+    which w, which is -2 x but for D200's drop, moves twice as fast as x."""
+    capacitance = DIODE.capacitance_at(2.0)
+    circuit = half(DIODE)
+    reduction = Reduction(circuit, nominal_board(circuit, ideal=True), bandwidth=True)
+    volts = reduction.solution(tuple(int(s == "D200") for s in circuit.switches)).voltage
+    brought = (volts["x"] - volts["d"]) / 50e3 + (volts["fv"] - volts["d"]) / 100e3
+    rate = np.array([-(1.0 / 1e3 + 1.0 / 50e3), 0.0, 1.0 / 1e3, 0.0]) / 100e-9
+    wanted = 2.0 * capacitance * rate  # over x, w, the generator and 1
+    np.testing.assert_allclose(brought, wanted, rtol=0.02, atol=0.02 * np.abs(wanted).max())
+
+
 def test_op_amps_of_finite_bandwidth_in_ngspice_show_the_waveform() -> None:
     """``dynamic`` at ω = 1.55 from the orbit with bandwidth: five times nearer than without."""
     circuit = replace(stage("rectifier", "both", SCALED), figures=OPAMP)

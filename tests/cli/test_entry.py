@@ -677,6 +677,37 @@ def _wait_for(path: Path, process: subprocess.Popen[str]) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.parametrize("library", ["typer", "numpy", "numba"])
+def test_a_library_that_is_missing_is_exit_3(library: str, tmp_path: Path) -> None:
+    """As after an installation that broke off."""
+    code = (
+        f"import sys; sys.modules[{library!r}] = None\n"
+        "from designer.cli.entry import main\nmain(sys.argv[1:])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "simulate", str(_model(tmp_path)), "--starts", "0"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 3, done.stderr
+    assert f"the library {library} is missing or broken" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_defect_of_the_tool_s_own_is_no_missing_library(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def broken(_: list[str]) -> int:
+        raise ImportError("cannot import name 'x' from 'designer.model'", name="designer.model")
+
+    monkeypatch.setattr("designer.cli.command_line.dispatch", broken)
+    assert entry.status(["new"]) == 1
+    assert "internal error: ImportError" in capfd.readouterr().err
+
+
 @pytest.mark.slow
 def test_killed_study_goes_on_and_ends_the_same(
     finished: tuple[Path, subprocess.CompletedProcess[str]],

@@ -14,13 +14,13 @@ from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override,
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
 from designer.circuit.board_values import nominal_board
-from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.nodal import NodalEquations
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.circuit_table import DeadZone
 from designer.model.clearance import Sides
 from designer.synthesis import output_loads
 from designer.synthesis.operating_point import _into, operating, stuck
@@ -104,7 +104,9 @@ UNTRIMMED = '[board]\ndc_trim = "none"\n'
         ("rectifier", "both", 0.3),
     ],
 )
-def test_every_rule_can_look_at_every_kind_of_design(kind: Kind, sides: Sides, f20: float) -> None:
+def test_every_rule_can_look_at_every_kind_of_design(
+    kind: DeadZone, sides: Sides, f20: float
+) -> None:
     values = rectifier() if kind == "rectifier" else EXACT if sides == "both" else one_sided()
     circuit = stage(kind, sides, bought({"R12": values["R6"], **values}), f20=f20)
     subject = subject_of(circuit, model(sides, f20), ANY + UNTRIMMED)

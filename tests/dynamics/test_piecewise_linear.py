@@ -21,7 +21,7 @@ from designer.dynamics.piecewise_linear import (
     PiecewiseLinearSystem,
     SecondDrive,
 )
-from designer.dynamics.working_modes import TabulatedModes
+from designer.dynamics.working_modes import TabulatedModes, anchors
 
 
 def complementarity(M: Array, q: Array, weight: float = 1.0) -> PiecewiseLinearSystem:
@@ -119,6 +119,12 @@ def test_a_mode_keeps_the_number_that_it_gets() -> None:
     assert [tables.number(key) for key in keys] == [0, 1, 2]
     assert [tables.number(key) for key in keys] == [0, 1, 2]
     assert tables.targets.keys == keys
+
+
+def test_the_drive_begins_each_stretch_where_its_share_of_a_turn_is() -> None:
+    """Quarters of a turn: sine and cosine of the drive, then of its third harmonic."""
+    wanted = [[0, 1, 0, 1], [1, 0, -1, 0], [0, -1, 0, -1], [-1, 0, 1, 0]]
+    assert anchors(4, (3,)) == pytest.approx(np.array(wanted), abs=1e-15)
 
 
 def test_a_guard_may_look_at_the_second_drive() -> None:

@@ -13,12 +13,12 @@ from designer.base.plain_json import dumps
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit
 from designer.folders import design_files
 from designer.folders.json_answers import synthesis_json
 from designer.folders.origin import provenance
+from designer.model.circuit_table import DeadZone
 from designer.model.clearance import Sides
 from designer.model.find_responses import find
 from designer.model.model_file import ModelFile, read_model_file
@@ -36,7 +36,7 @@ from tests.spice.test_rectifier_ngspice import LOW, SCALED
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "paper.toml"
-CASES: dict[str, tuple[Kind, Sides, dict[str, float], tuple[float, ...]]] = {
+CASES: dict[str, tuple[DeadZone, Sides, dict[str, float], tuple[float, ...]]] = {
     "rectifier": ("rectifier", "both", SCALED, (1.55,)),
     "upper half": ("rectifier", "upper", LOW, (1.2,)),
     "lower half": ("rectifier", "lower", LOW, (0.41,)),

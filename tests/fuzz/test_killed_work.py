@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
@@ -111,6 +111,42 @@ def ending(folder: Path, at: int, how: Callable[[], NoReturn]) -> Iterator[list[
         yield count
 
 
+@contextmanager
+def read_only(folder: Path) -> Iterator[None]:
+    """Inside, nothing in this folder can be made, changed or removed."""
+
+    def refused(names: list[object]) -> None:
+        if any(Path(str(name)).is_relative_to(folder) for name in names):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(names[0]))
+
+    opened, made, removed, moved = Path.open, Path.mkdir, Path.unlink, os.replace
+
+    def open_(path: Path, mode: str = "r", *args: Any, **more: Any) -> Any:
+        if mode not in ("r", "rb"):
+            refused([path])
+        return opened(path, mode, *args, **more)
+
+    def mkdir(path: Path, *args: Any, **more: Any) -> None:
+        if not path.exists():
+            refused([path])
+        made(path, *args, **more)
+
+    def unlink(path: Path, missing_ok: bool = False) -> None:
+        refused([path])
+        removed(path, missing_ok)
+
+    def replace(source: Any, place: Any) -> None:
+        refused([source, place])
+        moved(source, place)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Path, "open", open_)
+        patched.setattr(Path, "mkdir", mkdir)
+        patched.setattr(Path, "unlink", unlink)
+        patched.setattr(os, "replace", replace)
+        yield
+
+
 def kill() -> NoReturn:
     raise Killed
 
@@ -163,6 +199,24 @@ def test_what_was_left_is_taken_up_again(
         assert entry.status(words(out, work.again)) == status, (at, capfd.readouterr().err)
         assert not differing(out, whole), at
         shutil.rmtree(out.parent)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", WORK)
+def test_a_read_only_folder_is_told_of(
+    name: str, made: Path, record: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever runs these tests may write anywhere, so the file system's refusal is put in its
+    place."""
+    out = Path(shutil.copytree(made, tmp_path / "design"))
+    with read_only(out):
+        status = entry.status(WORK[name].words.format(out=out, record=record).split())
+    said = capfd.readouterr().err
+    assert status == 2, said
+    assert "Read-only file system" in said
+    assert "Traceback" not in said
+    assert not differing(out, made)
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ from designer.linear_network.linear_terms import (
     Shortfall,
     Targets,
 )
+from designer.linear_network.term_conditions import TermConditions
 from designer.linear_network.term_dives import LOWER, TermDives
 from designer.linear_network.term_search import TermSearch
 from designer.model.circuit_table import CircuitSpec
@@ -165,6 +166,29 @@ def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], s
     limits = Limits(matched=matched)
     truth = everything(A, resistors, capacitors).keeping(limits)
     compare(solve(A, resistors, capacitors, limits, matched=matched), truth)
+
+
+def test_conditions_at_scales_that_leave_no_error_are_those_of_the_bounds() -> None:
+    """Errors that such scales take away are -(T + p_b - p_a) of the term from state b to the rate
+    of a: then those are the nominal scales, and ratios of peak voltages are known."""
+    rng = np.random.default_rng(4)
+    targets = Targets.from_state_matrix(NO_COUPLING_DAMPER * np.exp(rng.normal(size=(4, 4))))
+    peaks = np.exp(rng.normal(0.0, 0.4, 4))
+    conditions = TermConditions(targets, Bounds((0.7, 1.6), 2.5, 1.8, 0.0, peaks, mass=1))
+    held = 0
+    for _ in range(400):
+        seconds, logs = rng.normal(0.0, 0.3), np.append(0.0, rng.normal(0.0, 0.5, 3))
+        offsets = -np.array([seconds + logs[b] - logs[a] for a, b in targets.entries])
+        volts = np.exp(logs) * peaks
+        together = [volts[:2], volts[2:], volts[1::2]]  # of one mass, of one mass, velocities
+        wanted = (
+            0.7 <= np.exp(seconds) <= 1.6
+            and all(pair.max() <= 2.5 * pair.min() for pair in together)
+            and volts.max() <= 1.8 * volts[2]
+        )
+        assert conditions.hold(offsets) is bool(wanted)
+        held += bool(wanted)
+    assert 20 < held < 380
 
 
 @pytest.mark.parametrize("most", [2, 3, 4])

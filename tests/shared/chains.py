@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
+from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Circuit
-from designer.model.circuit_table import CircuitSpec
+from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file
 from tests.shared.stages import CATALOG, SATURATION, SUPPLY
@@ -45,7 +45,7 @@ def chain(masses: int, *more: str) -> MechanicalModel:
 
 def chain_circuit(
     model: MechanicalModel,
-    kind: Kind = "saturation",
+    kind: DeadZone = "saturation",
     opamp: str = "TL074C",
     values: Mapping[str, float] | None = None,
 ) -> Circuit:

@@ -8,10 +8,10 @@ import numpy as np
 
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
+from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
-from designer.model.circuit_table import CircuitSpec
+from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.clearance import Sides
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT
@@ -58,7 +58,7 @@ def bought(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def stage(
-    kind: Kind,
+    kind: DeadZone,
     sides: Sides,
     values: Mapping[str, float],
     composites: Mapping[str, Composite] | None = None,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from designer.base.defaults import Fidelity
 from designer.catalog.netlist_guard import check_netlist
 from designer.catalog.parts_catalog import load_catalog
 from designer.check.synthesis_result import synthesise
@@ -33,7 +34,6 @@ from designer.spice.numerics_gate import (
     job,
     shortest_contact,
 )
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.worker import open_simulator

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from designer.base.defaults import Fidelity
 from designer.catalog.fields import Figure
 from designer.catalog.netlist_guard import check_netlist
 from designer.catalog.parts_catalog import load_catalog
@@ -20,7 +21,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
-from designer.spice.opamp_model import FIDELITIES, Fidelity, recovery, second_pole
+from designer.spice.opamp_model import FIDELITIES, recovery, second_pole
 from designer.spice.worker import open_simulator
 from tests.circuit.test_reduction import EXACT, circuit_of
 

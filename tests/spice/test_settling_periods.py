@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.ngspice_figures import SETTLED, memory, warm, warm_job
+from designer.base.defaults import Fidelity
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import MOST_DISCARDED
-from designer.spice.opamp_model import Fidelity
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
 from designer.spice.settling_periods import PROBE, periods

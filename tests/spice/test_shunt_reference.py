@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from designer.base.defaults import Fidelity
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import Excitation, Reference
 from designer.spice import deck
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.deck import SHUNT_REFERENCE, SolverSettings, shunt_reference
-from designer.spice.opamp_model import Fidelity
 from tests.shared.stages import rectifier, stage
 
 ENTRY = load_catalog().reference("LM4040C50")

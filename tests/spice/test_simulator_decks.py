@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from designer.base.defaults import DIALECTS, Dialect
 from designer.check.deck_runs import response_runs
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_values import nominal_board
@@ -24,7 +25,6 @@ from designer.model.response_table import Response
 from designer.spice import numerics_gate, simulator_decks
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import Waveforms
-from designer.spice.simulator_decks import DIALECTS, Dialect
 from designer.spice.worker import open_simulator
 from tests.folders.test_stage_files import made
 from tests.jobs.test_kicad_export import MODEL, designer, snapshot

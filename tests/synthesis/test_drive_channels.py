@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from designer.base.arrays import Array
+from designer.base.defaults import DIALECTS
 from designer.base.errors import InputError
 from designer.board.board_parts import board_circuit, fault_current, protection_offset
 from designer.board.kicad_sim import models
@@ -19,9 +20,11 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.check.deck_runs import FirstRun
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.board_parts_only import Connector
+from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
+from designer.circuit.reduction import Reduction
 from designer.dynamics.drive_shape import SINE, wave
 from designer.dynamics.orbit import OrbitStatus
 from designer.folders.bench_tables import scales_csv, setup_csv, waveform_csv
@@ -189,7 +192,7 @@ def test_decks_for_other_simulators_have_the_same_generator(name: str) -> None:
             nets,
             period,
         )
-        for dialect in simulator_decks.DIALECTS
+        for dialect in DIALECTS
     ]
     for waves in both:
         angle = excitation.drive.omega * waves.axis
@@ -249,6 +252,31 @@ def test_boards_answer_as_one_by_one(name: str) -> None:
         assert a.start == pytest.approx(b.start, rel=1e-9, abs=1e-9)
         assert guess is not None
         assert guess.counts == b.counts
+
+
+def test_no_current_is_lost_at_a_summing_node() -> None:
+    """Kirchhoff's law with both channels on: what resistors bring, capacitors take."""
+    circuit = made("two phases").design.circuit
+    reduction = Reduction(circuit, nominal_board(circuit, ideal=True))
+    x, channels = np.array([0.3, -0.8, 0.5, 0.2]), (0.7, -1.1)
+    volts = reduction.voltages(circuit.open, x, channels)
+    mode = reduction.system().mode(circuit.open)
+    assert mode.second is not None
+    rates = mode.A @ x + mode.B * channels[0] + mode.second * channels[1] + mode.d
+    moved = 0
+    for section in circuit.sections:
+        node, brought = section.inverting, [0.0]
+        for part in circuit.resistors:
+            if node in (part.a, part.b):
+                other = part.b if part.a == node else part.a
+                brought.append((volts.get(other, 0.0) - volts[node]) / part.value)
+        for name, rate in zip(circuit.states, rates, strict=True):
+            own = next(c for c in circuit.capacitors if c.name == name)
+            if node in (own.plus, own.minus):
+                brought.append(own.value * rate * (1.0 if node == own.minus else -1.0))
+                moved += 1
+        assert sum(brought) == pytest.approx(0.0, abs=1e-9 * max(map(abs, brought)))
+    assert moved == len(circuit.states)
 
 
 def test_loads_know_both_channels() -> None:

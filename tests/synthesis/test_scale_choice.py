@@ -211,6 +211,54 @@ def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -
             assert room(made, frozenset(), {conflict.limit: given - near}) > -near
 
 
+@pytest.mark.parametrize(("least", "needed"), [(False, np.inf), (True, 0.0)])
+def test_a_limit_that_no_number_helps_says_so(least: bool, needed: float) -> None:
+    """It is missed by e^100, further than any scale goes."""
+    made = flat(np.array([[0.0, 0.0, 100.0], [1.0, 0.0, -50.0]]))
+    limit = StatedLimit("level", "bound", 1.0, least=least)
+    made = replace(made, bounds=(replace(made.bounds[0], limit=limit), made.bounds[1]))
+    (conflict,) = ScaleBox(made).conflicts()
+    assert (conflict.limit, conflict.needed, conflict.frees) == (limit, needed, True)
+
+
+def test_points_are_corners_as_many_as_asked_for_and_the_best() -> None:
+    """Of a pentagon, whose corners are where neighbouring sides meet."""
+    angles = 2.0 * np.pi * np.arange(5) / 5.0
+    sides = np.column_stack([np.cos(angles), np.sin(angles)])
+    made = replace(flat(np.column_stack([sides, -np.ones(5)])), sums=())
+    corners = np.array([np.linalg.solve(sides[[k, k - 1]], np.ones(2)) for k in range(5)])
+    box = ScaleBox(made)
+    points = np.array(box.points(8, 10.0, seed=3))
+    apart = np.linalg.norm(points[:, None] - corners, axis=2)
+    assert len(points) == 1 + 8
+    assert apart.min(axis=1) == pytest.approx(np.zeros(9), abs=1e-9)
+    assert len(set(apart.argmin(axis=1).tolist())) > 2
+    assert points[0, 0] == pytest.approx(corners[:, 0].max())  # the level is the first number
+    near = box.points(8, 0.02, seed=3)
+    assert len(near) == 1 + 8
+    assert min(box.worth(z) for z in near) >= box.worth(near[0]) - 0.02 - 1e-9
+
+
+def test_scales_that_were_good_are_good_again_without_another_start() -> None:
+    order, within, _ = program("unequal")
+    first = next(ScaleChoice(order, within).circuits())
+    assert isinstance(first, ScaleAttempt)
+    choice = ScaleChoice(order, within)
+    again = next(choice.circuits(first.z))
+    assert isinstance(again, ScaleAttempt)
+    assert again.made.errors.max_error <= choice.goal
+    assert len(choice.candidates) <= 4
+    assert min(np.abs(own.z - first.z).max() for own in choice.candidates) < 0.1
+
+
+def test_where_no_scales_keep_the_offsets_small_the_choice_is_that_without_the_rule() -> None:
+    order, within, _ = program("unequal")
+    weak, strong = (ScaleChoice(replace(order, drive_force=force), within) for force in (1e-6, 1e6))
+    for choice in (weak, strong):
+        assert isinstance(next(choice.circuits()), ScaleAttempt)
+    assert [c.error for c in weak.candidates] == [c.error for c in strong.candidates]
+
+
 def design(text: str, jobs: int = 1, **changes: object) -> Design:
     file = parse_model_file(text)
     responses = find(file.model, file.responses)

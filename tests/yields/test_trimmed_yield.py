@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from designer.base.arrays import Array
 from designer.base.toml_writer import toml_text
 from designer.board.board_parts import drive_resistance, driven_nodes
 from designer.centering.repair_upgrade import with_same_parts
@@ -181,9 +182,20 @@ def test_a_constant_force_is_trimmed_away() -> None:
     assert there.penetration == pytest.approx(known.orbit.penetration, rel=0.2)
 
 
-def test_what_is_out_of_reach_stands_at_the_end() -> None:
+def test_what_is_out_of_reach_stands_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is the wiper ever turned past an end of its travel."""
     of = trim(reach=0.01)
-    rows = trimmed_block(of, plan(3, spread=ROUGH), range(8), 1)
+    turned: list[float] = []
+    at = DcTrim.at
+
+    def recorded(self: DcTrim, boards: Boards, position: Array) -> Boards:
+        turned.extend(position.tolist())
+        return at(self, boards, position)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DcTrim, "at", recorded)
+        rows = trimmed_block(of, plan(3, spread=ROUGH), range(8), 1)
+    assert (min(turned), max(turned)) == pytest.approx((END, 1.0 - END), abs=1e-12)
     ends = [r for r in rows if r.at_end]
     assert ends
     assert all(min(r.position, 1.0 - r.position) == pytest.approx(END) for r in ends)

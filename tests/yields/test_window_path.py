@@ -66,6 +66,26 @@ def test_a_path_ends_when_it_has_followed_enough(monkeypatch: pytest.MonkeyPatch
     assert followed == calls
 
 
+def test_a_path_climbs_from_the_best_that_it_has_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over one knob x, an orbit whose one function falls with a slope of 1 from two tops: 0.6 at
+    0.086, and 0.5 at 0.05, where x is below 0.071. Steps of 0.1 meet x = 0 and 0.1 alone, and a
+    step back from the latter is on the lower hill, from which no way leads to the higher top."""
+    nominal, bands = question(1).excitation.drive.amplitude, Bands(0.0, 0.1, 0.0)
+
+    def two_tops(flow: Flow, start: Array, n: int) -> ContinuedOrbit:
+        x = (flow.drive.amplitude / nominal - 1.0) / bands.amplitude
+        value = 0.6 - abs(x - 0.086) if x > 0.071 else 0.5 - abs(x - 0.05)
+        return ContinuedOrbit((), {"fold": value}, 1, start)
+
+    circuit = subject(1).circuit
+    monkeypatch.setattr(window_path, "follow", two_tops)
+    monkeypatch.setattr(window_path, "PROBE", 1e-6)  # no difference quotient reaches over a top
+    spots, _ = find_window(Boards.of(circuit, [nominal_board(circuit)]), question(1), bands)
+    best = max(spots, key=lambda spot: spot.radius)
+    assert 0.6 - window_path.FINEST < best.radius <= 0.6
+    assert best.setting.amplitude == pytest.approx(0.0086, abs=0.1 * window_path.FINEST)
+
+
 def test_the_radius_says_where_the_window_ends() -> None:
     """Half of it away from the spot, in every direction, the board still shows the response; twice
     of it away, in some direction it does not."""
