@@ -47,6 +47,7 @@ _OfDesign = Literal[
     "cure",
     "rules",
 ]
+_Fixed = Literal["search", "design", _OfDesign, "sweep", "map", "basins"]
 StageName = _Fixed | OrderStage | DeckStage
 _DECKS = tuple(map(DeckStage.of, DIALECTS))
 STAGES: tuple[StageName, ...] = (*get_args(_Fixed), *_DECKS)

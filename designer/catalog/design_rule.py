@@ -63,6 +63,8 @@ class Finding:
     """The limit that holds here; None takes the rule's own."""
     more: str = ""
     """What else a reader should know."""
+    do: str = ""
+    """What helps here; "" where that is the rule's own."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ class RuleOutcome:
     """The model file's limit, where that held."""
     usual: float = field(default=float("nan"))
     """The limit that ``override`` replaces; nan where there is none."""
+    own_do: str = ""
+    """``Finding.do`` of the worst."""
 
     def as_dict(self) -> dict[str, Any]:
         """The outcome by the keys of docs/contract.md, and more."""
@@ -106,7 +110,7 @@ class RuleOutcome:
             "found": self.found,
             "limit": limit,
             "source": "the model file" if changed else self.rule.source,
-            "do": self.rule.do,
+            "do": self.do,
             "scope": self.rule.scope,
             "title": self.rule.title,
             "where": self.where,
@@ -116,6 +120,11 @@ class RuleOutcome:
             "reason": self.override.reason if self.override is not None else None,
             "usual_bound": self.usual if changed else None,
         }
+
+    @property
+    def do(self) -> str:
+        """What helps where the rule fails."""
+        return self.own_do or self.rule.do
 
     @property
     def open(self) -> bool:
@@ -159,7 +168,8 @@ def judged(
     text += f" at {worst.where}" if worst.where else ""
     text += f"; {worst.more}" if worst.more else ""
     status = PASS if rule.keeps(worst.value, limit) else FAIL
-    return RuleOutcome(rule, status, text, worst.value, limit, worst.where, override, usual)
+    found = worst.value, limit, worst.where
+    return RuleOutcome(rule, status, text, *found, override, usual, worst.do)
 
 
 def usual_limit(rule: DesignRule, finding: Finding) -> float:

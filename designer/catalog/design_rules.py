@@ -195,8 +195,7 @@ RULES: tuple[DesignRule, ...] = (
         "Offsets of all sections as a constant force at the clearance, over the drive",
         0.05, "",
         f"largest offsets of the data sheet, root of the sum of squares; {OWN}",
-        "scale the voltages up, take an op-amp with less offset (TL074H, OPA4192), or use the "
-        "DC trim",
+        "raise circuit.supply as far as the op-amp takes it, or use the DC trim",
     ),
     _rule(
         "bias-force",

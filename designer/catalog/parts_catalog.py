@@ -234,6 +234,10 @@ class Catalog:
         others = [other for other in self.opamps if other.takes(rails)]
         return self._cased(named, f"op-amps for ± {rails:g} V", others)
 
+    def opamps_at(self, supply: float) -> tuple[OpAmp, ...]:
+        """Those for rails of ± ``supply`` [V] that are sold in a case which the board takes."""
+        return tuple(each for each in self.opamps if each.takes(supply) and self._takes(each))
+
     def diode(self, name: str) -> DiodeEntry:
         """The diode of this name; InputError as for ``opamp``."""
         return self._cased(_named(self.diodes, name, "circuit.diode"), "diodes", self.diodes)
@@ -303,13 +307,14 @@ class Catalog:
                     return moved
                 return replace(moved, pins=case.pins)
         sold = mounting_of(entry.footprint)
-        cased = [
-            other.name
-            for other in others
-            if other != entry and any(mounting_of(f) == self.mounting for f in _footprints(other))
-        ]
+        cased = [other.name for other in others if other != entry and self._takes(other)]
         expected = other_case(entry.name, self.mounting, sold, sort, cased)
         raise InputError(None, "board.mounting", self.mounting, expected)
+
+    def _takes(self, entry: _Cased) -> bool:
+        """Whether the board takes it in one of the cases that it is sold in."""
+        footprints = entry.footprint, *(case.footprint for case in entry.cases)
+        return self.mounting in ("mixed", *map(mounting_of, footprints))
 
     def _families(self, kind: Kind, grade: float, use: Use = "signal") -> list[PartFamily]:
         """Those of this grade or a better one that the board takes and the file lets be bought."""
@@ -378,11 +383,6 @@ def _nearest(ascending: Sequence[float], value: float) -> float:
     """The one that is nearest to the value, the smaller of two that are as near."""
     above = bisect_left(ascending, value)
     return min(ascending[max(above - 1, 0) : above + 1], key=lambda each: abs(each - value))
-
-
-def _footprints(entry: _Cased) -> tuple[str, ...]:
-    """The footprints of every case that an entry is sold in."""
-    return entry.footprint, *(case.footprint for case in entry.cases)
 
 
 def _preference(family: PartFamily, grade: float) -> tuple[bool, int, float]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
+from designer.catalog.design_rules import BY_ID
 from designer.circuit.netlist import Diode
 from designer.design_rules.rule_subject import Look, RuleSubject
 from designer.synthesis.static_shifts import (
@@ -41,7 +42,28 @@ def offset(s: RuleSubject) -> Iterator[Finding]:
         share = offset_forces(at, limit)
         total = float(np.hypot.reduce(list(share.values())))
         more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections{s.warm}"
-        yield Finding(total, _most(share), more=_with_clearance(s, at, more))
+        yield Finding(
+            total, _most(share), more=_with_clearance(s, at, more), do=_quieter(s, total / limit)
+        )
+
+
+def _quieter(s: RuleSubject, per_volt: float) -> str:
+    """What helps against offsets, with the op-amps on which the same parts keep the rule.
+
+    per_volt : the force that offsets make, over the largest of them.
+    """
+    rule, own = BY_ID["offset-force"], s.synthesis.modelfile.rules.get("offset-force")
+    limit = rule.limit if own is None else own.limit
+    assert limit is not None
+    forces = {
+        each.name: per_volt * largest_offset(each.over(s.catalog.temperatures))
+        for each in s.catalog.opamps_at(s.circuit.supply)
+        if each.sections == s.opamp.sections
+    }
+    keep = [f"{name} ({force:.2g})" for name, force in forces.items() if rule.keeps(force, limit)]
+    if not keep:
+        return f"no op-amp of the catalogue has so little offset; {rule.do}"
+    return f"take circuit.opamp {' or '.join(keep)}; or {rule.do}"
 
 
 def bias(s: RuleSubject) -> Iterator[Finding]:

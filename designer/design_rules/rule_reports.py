@@ -35,7 +35,7 @@ def junit(title: str, outcomes: Sequence[RuleOutcome]) -> str:
             text += f" (the model file's limit: {each.override.reason})"
         if each.status == FAIL:
             failure = ElementTree.SubElement(case, "failure", message=_clean(text), type="rule")
-            failure.text = _clean(f"{each.rule.title}\n{each.rule.do}")
+            failure.text = _clean(f"{each.rule.title}\n{each.do}")
         else:
             ElementTree.SubElement(case, "system-out").text = _clean(text)
     suites = ElementTree.Element("testsuites")

@@ -33,7 +33,7 @@ def refusals(outcomes: Sequence[RuleOutcome], accepted: Sequence[str] = ()) -> t
     accepted : rules that may fail.
     """
     return tuple(
-        f"{one.rule.id}: {one.found}; {one.rule.do}"
+        f"{one.rule.id}: {one.found}; {one.do}"
         for one in outcomes
         if (one.status == FAIL and one.rule.id not in accepted)
         or (one.rule.id in WANTED and one.status != PASS)

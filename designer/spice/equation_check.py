@@ -497,9 +497,15 @@ def _line(
 
 
 def _seen(design: Design) -> tuple[int, ...]:
-    """Indices of the dead zones that a constant force moves: those of displacements."""
-    zones = design.model.second_order().dead_zones
-    return tuple(k for k, zone in enumerate(zones) if zone.quantity == "displacement")
+    """Indices of the dead zones whose displacement a constant force of the drive moves."""
+    model = design.model.second_order()
+    by_force = np.linalg.solve(model.stiffness, drive_of(model))
+    least = STILL * float(np.abs(by_force).max())
+    return tuple(
+        k
+        for k, zone in enumerate(model.dead_zones)
+        if zone.quantity == "displacement" and abs(model.displacement(zone) @ by_force) > least
+    )
 
 
 def _moving(design: Design, stop: Stop) -> str:

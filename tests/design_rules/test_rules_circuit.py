@@ -41,6 +41,7 @@ from tests.shared.rule_cases import (
     subject_of,
     warm,
     with_circuit,
+    with_figure,
     with_part,
 )
 from tests.shared.stages import bought, model, one_sided, rectifier, stage
@@ -337,6 +338,23 @@ def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> 
         # A bias current leaves the node.
         biased = shift(subject, bias={section.name: 1e-12}) - rest
         assert -shifts.current[section.inverting] * 1e-12 == pytest.approx(biased, abs=1e-14)
+
+
+def test_offsets_that_are_too_large_name_the_op_amps_that_keep_the_rule() -> None:
+    """TL074C has 10 mV, TL074H 4 mV, OPA4192 25 µV; TL072H has two sections."""
+    fails, _ = PAIRS["offset-force"]
+    advice = fails().do
+    for name, offset in (("TL074C", 10e-3), ("TL074H", 4e-3), ("OPA4192", 25e-6)):
+        force = run_rules.look("offset-force", with_figure("offset", max=offset)).value
+        assert f"{name} ({force:.2g})" in advice
+    assert "TL072H" not in advice
+    made = base().synthesis
+    strict = Override(1e-6, "a test")
+    file = replace(made.modelfile, rules={"offset-force": strict})
+    subject = RuleSubject(replace(made, modelfile=file), base().circuit, base().components)
+    found = run_rules.look("offset-force", subject, strict)
+    assert found.status == FAIL
+    assert found.do.startswith("no op-amp of the catalogue has so little offset")
 
 
 def test_each_clearance_has_shifts_of_its_own() -> None:

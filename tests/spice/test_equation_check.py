@@ -36,6 +36,7 @@ from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
+from tests.shared.system_text import clearance, system_text, table
 
 COARSE = (
     "format = 1\n"
@@ -197,6 +198,25 @@ def test_a_stage_between_two_masses_is_read_by_what_moves_in_it(pool: SpicePool)
     result = check(around(exact_circuit(system, scale), model), (), pool)
     assert set(by_name(result)) == ALL
     assert all(f.deviation < FLOOR / 10.0 for f in result.findings)
+
+
+def test_a_clearance_that_no_constant_force_moves_has_no_curve(pool: SpicePool) -> None:
+    """m2 hangs on m1 alone: what pushes m1 moves both as far, and the clearance between them not at
+    all, so no slope can be read in it."""
+    hanging = clearance("B", "m1", "m2", upper=0.5, lower=0.5, stiffness=5.0)
+    force = table("force", on="m1", amplitude=1.0)
+    links = {("m1", "ground"): 1.0, ("m2", "m1"): 1.0}
+    wall = clearance("A", "m1", "ground", upper=0.5, stiffness=5.0)
+    text = system_text(
+        {"m1": 1.0, "m2": 1.0}, links, dict.fromkeys(links, 0.1), force, hanging, wall
+    )
+    model = parse_model_file(text).model
+    circuit = exact_circuit(model.second_order(), Scale(1e-3, np.full(4, 4.0), 1.0))
+    result = check(around(circuit, model), (), pool)
+    assert result.passed, [str(f) for f in result.findings]
+    assert {name for name in by_name(result) if "slope" in name} == {
+        "slope, upper contact A", "leftover slope A",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
