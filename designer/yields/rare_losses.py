@@ -211,9 +211,11 @@ class AnyLost:
 
     @classmethod
     def of(cls, found: Sequence[RareLosses]) -> AnyLost:
-        """From one estimate at least. Of n the ends are those at the level 1 - 0.05/n (C. E.
-        Bonferroni, 1936), and so is what may be unseen."""
-        lost, level = [each.lost for each in found], 1.0 - 0.05 / len(found)
+        """From one estimate at least. Each statement, n intervals and what may be unseen of those
+        that were drawn, is at the level 1 - 0.05 over their number, so that all of them hold at
+        once on 95 % (C. E. Bonferroni, 1936)."""
+        lost = [each.lost for each in found]
+        level = 1.0 - 0.05 / (len(found) + sum(each.unseen > 0.0 for each in found))
         lows, highs = zip(*(each.ends(level) for each in found), strict=True)
         # The quantiles of a Poisson count grow with the level most where nothing was counted.
         unseen = sum(each.unseen for each in found) * math.log(1.0 - level) / math.log(0.05)

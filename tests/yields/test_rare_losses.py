@@ -339,21 +339,21 @@ def test_what_all_responses_lose_lies_between_the_bounds(boards: list[list[bool]
 
 
 def test_ends_of_the_bounds_hold_for_all_responses_at_once() -> None:
-    """Each of three intervals is at 1 - 0.05/3: the even one in the logarithm by the normal's
-    quantile, the counted one by SciPy; what may be unseen of each is above them."""
+    """Three intervals and what may be unseen of two are each at 1 - 0.05/5: the even one in the
+    logarithm by the normal's quantile, the counted one by SciPy."""
     drawn = drawn_share(2e-4, 0.2, unseen=1e-3)
     none = drawn_share(0.0, 0.0, unseen=2e-3)
     counted = share_of(Yield(950, 45, 0, 0))
     bounds = AnyLost.of([drawn, none, counted])
-    level = 1.0 - 0.05 / 3
+    level = 1.0 - 0.05 / 5
     ci = binomtest(45, 995).proportion_ci(level, method="wilson")
     high = 2e-4 * math.exp(norm.ppf(0.5 + 0.5 * level) * 0.2) + ci.high
-    # 3 over the number of boards is ln 20 over it; at the level of each it is ln 60.
-    high += 3e-3 * math.log(60.0) / math.log(20.0)
+    # 3 over the number of boards is ln 20 over it; at the level of each it is ln 100.
+    high += 3e-3 * math.log(100.0) / math.log(20.0)
     assert bounds.low == pytest.approx(ci.low)
     assert bounds.high == pytest.approx(high, rel=1e-5)
-    alone = AnyLost.of([drawn])
-    assert (alone.low, alone.high) == pytest.approx((drawn.low, drawn.high + 1e-3))
+    counts = AnyLost.of([counted])
+    assert (counts.low, counts.high) == pytest.approx((counted.low, counted.high))
 
 
 @pytest.mark.parametrize("lost", [0, 1, 5, 40])
@@ -363,7 +363,7 @@ def test_no_more_is_unseen_than_the_bounds_say(lost: int, responses: int) -> Non
     unseen = rare_losses.unseen_share(lost, 1000)
     bounds = AnyLost.of([drawn_share(0.0, 0.0, unseen=unseen)] * responses)
     each = bounds.high / responses
-    assert poisson.cdf(lost, 1000 * each) <= 0.05 / responses * (1.0 + 1e-6)
+    assert poisson.cdf(lost, 1000 * each) <= 0.05 / (2 * responses) * (1.0 + 1e-6)
 
 
 def drawn_share(lost: float, error: float, *, unseen: float) -> RareLosses:
