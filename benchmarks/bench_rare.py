@@ -38,6 +38,7 @@ from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.rare_losses import rare_losses
 from designer.yields.study import plan_study
+from designer.yields.study_identity import RULES
 from designer.yields.tolerance_study import check
 
 ROOT = Path(__file__).parent.parent
@@ -172,8 +173,9 @@ def missing(rows: Sequence[Row], boards: int, times: int) -> Iterator[tuple[Case
 
 def measured(path: Path, boards: int, times: int, minutes: float) -> list[Row]:
     """All rows of the file, with what is missing of so many boards and repetitions, as far as the
-    time goes."""
-    rows = whole_lines(path)
+    time goes. Estimates of other rules than the present ones are left out."""
+    here = whole_lines(path)
+    rows = [row for row in here if row["kind"] == "plain" or row.get("rules") == RULES["rare"]]
     for case in CASES:
         if any(row["case"] == case.name and row["width"] != case.width for row in rows):
             raise SystemExit(f"{path}: {case.name} of another width; take another --out")
@@ -184,9 +186,8 @@ def measured(path: Path, boards: int, times: int, minutes: float) -> list[Row]:
             if time.monotonic() > end:
                 break
             row = plain_row(case, number) if kind == "plain" else rare_row(case, number)
-            rows.append(
-                {"case": case.name, "width": case.width, "kind": kind, "commit": made, **row}
-            )
+            of = {"case": case.name, "width": case.width, "kind": kind, "commit": made}
+            rows.append(of | ({"rules": RULES["rare"]} if kind == "rare" else {}) | row)
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             print(case.name, kind, number, row["lost"], f"{row['wall']:.1f} s", flush=True)
@@ -308,7 +309,8 @@ def _cells(s: Summary) -> list[str]:
 def report(found: Sequence[Summary], boards: int, times: int) -> str:
     """README.md."""
     f = figures(found)
-    commits = dict.fromkeys(row["commit"] for s in found for row in (*s.plain, *s.rare))
+    plain = dict.fromkeys(row["commit"] for s in found for row in s.plain)
+    rare = dict.fromkeys(row["commit"] for s in found for row in s.rare)
     held = f"In no case were {FEW} plain boards lost, of which a share is known well enough."
     if f["share_held"] is not None:
         held = (
@@ -324,7 +326,9 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
             "away. A run with `--minutes` ends before all is measured, and the next one goes on."
         ),
         "",
-        f"- Commit of the rows: {', '.join(commits)}",
+        f"- Commit of the plain boards: {', '.join(plain) or 'none yet'}",
+        f"- Commit of the estimates: {', '.join(rare) or 'none yet'}; so far "
+        f"{f['of_all_cases']} of the {times * len(CASES)}, all by the same rules",
         f"- Machine: {machine()}",
         "",
         filled(

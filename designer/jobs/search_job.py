@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import StudyEngine
+from designer.base.defaults import SAMPLES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
@@ -21,7 +21,7 @@ from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files
 from designer.folders.design_source import grade_inputs
-from designer.folders.model_source import design_inputs_of
+from designer.folders.model_source import design_inputs_of, source
 from designer.folders.origin import provenance
 from designer.folders.study_stores import FolderStores
 from designer.jobs import fidelity_choice
@@ -77,9 +77,20 @@ def search_into(
     answer["confirmation"] = confirmed
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
-    stands = all(confirms(row) for row in confirmed["responses"])
-    satisfied = study.satisfied and stands
+    satisfied = study.satisfied and all_confirmed(confirmed)
     return replace(study, answer=answer, satisfied=satisfied, shown=False)
+
+
+def confirmed_repair(out: Path, options: Options, progress: Progress) -> dict[str, Any]:
+    """How ngspice judges boards of the repaired design in the folder ``out``, as drawn, and what
+    limits each response. They are of no study of the folder, which has none yet."""
+    modelfile, _ = source(out, None)
+    return _confirmed(modelfile, out, replace(options, samples=SAMPLES), progress, studied=False)
+
+
+def all_confirmed(confirmation: Mapping[str, Any]) -> bool:
+    """Whether ngspice confirms every response."""
+    return all(confirms(row) for row in confirmation["responses"])
 
 
 def confirms(row: Mapping[str, Any]) -> bool:
@@ -91,9 +102,15 @@ def confirms(row: Mapping[str, Any]) -> bool:
 
 
 def _confirmed(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+    modelfile: ModelFile,
+    out: Path,
+    options: Options,
+    progress: Progress,
+    *,
+    studied: bool = True,
 ) -> dict[str, Any]:
-    """How ngspice judges boards of the study, and what limits each response."""
+    """How ngspice judges boards of the study, and what limits each response. studied : whether the
+    folder has that study; its boards are asked here otherwise."""
     folder, catalog = Folder(out), load_catalog()
     inputs = {
         **design_inputs_of(folder),
@@ -106,8 +123,10 @@ def _confirmed(
     stages: Stages = {"confirmation": (inputs, [CONFIRMATION])}
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         began = time.perf_counter()
-        synthesis = design_files.load(folder, modelfile, catalog)
-        document = {"format": 1, **_confirm(synthesis, folder, options, progress)}
+        synthesis, stores = design_files.load(folder, modelfile, catalog), None
+        if studied:
+            stores = FolderStores(out, folder.watch(), progress.note, vouch=folder.vouches)
+        document = {"format": 1, **_confirm(synthesis, options, progress, stores)}
         with folder.working(stages, provenance(modelfile, catalog.hash, seed=options.seed)):
             cost = {"seconds": time.perf_counter() - began}
             folder.write(CONFIRMATION, dumps({**document, "cost": cost}))
@@ -116,9 +135,8 @@ def _confirmed(
 
 
 def _confirm(
-    synthesis: Synthesis, folder: Folder, options: Options, progress: Progress
+    synthesis: Synthesis, options: Options, progress: Progress, stores: FolderStores | None
 ) -> dict[str, Any]:
-    stores = FolderStores(folder.path, folder.watch(), progress.note, vouch=folder.vouches)
     jobs = options.workers
     decides: StudyEngine = "bandwidth" if options.rung == "bandwidth" else "exact"
     study = study_of(

@@ -72,8 +72,8 @@ def search(
 
     A model file is searched, and written into ``out``. With ``yield_`` or ``ppm`` the found design
     is then repaired at least cost: what comes of it is a design folder of its own, ``out``/cured,
-    and whether the yield was reached is the answer. A design folder is repaired, as ``cure`` does
-    it.
+    and the answer is whether it reaches the yield and ngspice confirms its boards. A design folder
+    is repaired, as ``cure`` does it.
 
     Raises
     ------
@@ -132,19 +132,23 @@ def search(
     usual = usual_times.SEARCH if repair is None else {**usual_times.SEARCH, **usual_times.REPAIRED}
     with progress.whole(usual):
         found = search_job.search_into(modelfile, folder, options, progress, command)
+        confirmed = None
         if repair is None:
             cured = None
         else:
             cured = repair(folder, out=folder / CURED, options=options, progress=progress)
+            if cured.reached:
+                confirmed = search_job.confirmed_repair(folder / CURED, options, progress)
     is_another_s = not found.reused if cured is None else not cured.reached
     if is_another_s and (folder / CURED / DESIGN).exists():
         progress.note(f"{folder / CURED} holds an earlier design, which is not of this search")
     if cured is None:
         return found
+    repaired = {**cured.answer, "confirmation": confirmed}
     return replace(
         found,
-        answer={**found.answer, "cure": cured.answer},
-        satisfied=cured.satisfied,
+        answer={**found.answer, "cure": repaired},
+        satisfied=confirmed is not None and search_job.all_confirmed(confirmed),
         reused=found.reused and cured.reused,
     )
 
@@ -242,6 +246,15 @@ def tables(answer: Mapping[str, Any]) -> None:
     if "cure" in answer:
         say("")
         _show_repair(answer["cure"])
+        _show_confirmation(answer["cure"])
+
+
+def _show_confirmation(cure: Mapping[str, Any]) -> None:
+    """What ngspice says of the repaired design's boards, where there is one."""
+    if (confirmation := cure.get("confirmation")) is not None:
+        pairs = zip(cure["responses"], confirmation["responses"], strict=True)
+        each = (f"{r['expected'] or 'any'} {c['agreed']}/{c['asked']}" for r, c in pairs)
+        say(f"ngspice confirms of the cured boards: {', '.join(each)}")
 
 
 def _sigmas(reliability_index: float | None) -> str:

@@ -31,7 +31,7 @@ from designer.base.proportion import wilson
 from designer.base.rare_words import boards_text
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import BRIEF, Ensemble
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
 from designer.verdicts.exact_circuit import Case, settled
@@ -79,6 +79,9 @@ EXPLORED = 512
 """Boards of a width."""
 SCOUTED = 40_000
 """Steps that a board may take which only says where to draw."""
+SURE = 4
+"""Of boards that show no period briefly and were drawn where they are lost, one of so many is asked
+until it is known; the others count as lost, less what these say."""
 TRIED = 64
 """Boards as they are that say whether answers come quickly."""
 FEW_MOVES = 60
@@ -96,11 +99,18 @@ STEPS = 16
 SINGLE = 8
 """Parts that are moved alone."""
 PLENTY = 40
-"""Lost boards of a study: with so many its own count is as good, and nothing is drawn."""
+"""Lost boards of a count: with so many it is as good, and nothing is drawn where it is lost."""
+LOOKED, FREQUENT = 512, 8
+"""Plain boards that are looked at first, and lost ones of them from which plain boards are
+counted: of an estimate half the boards are lost, and to know that of each may take seconds."""
+COUNTED, MOST_COUNTED = 125, 6_000
+"""Boards of a count at a time, and at most."""
 APART = 1.4
 """Spread of lost boards along one way over the most that chance makes, above which they are two."""
 TAG = 0xAA5E
 """Sets these boards apart from those of a study with the same seed."""
+_STREAMS = (), (1,), (2,)
+"""What sets apart the numbers of the estimate, of plain boards, and of who is asked on."""
 QUANTILE = 1.959964
 """The quantile of the normal distribution for 95 %, two-sided."""
 PATH = (0.3, 0.5, 0.65, 0.8, 0.9, 1.0, 1.15, 1.35, 1.7, 2.2, 3.0)
@@ -211,9 +221,11 @@ class AnyLost:
 
     @classmethod
     def of(cls, found: Sequence[RareLosses]) -> AnyLost:
-        """From one estimate at least. Of n the ends are those at the level 1 - 0.05/n (C. E.
-        Bonferroni, 1936), and so is what may be unseen."""
-        lost, level = [each.lost for each in found], 1.0 - 0.05 / len(found)
+        """From one estimate at least. Each statement, n intervals and what may be unseen of those
+        that were drawn, is at the level 1 - 0.05 over their number, so that all of them hold at
+        once on 95 % (C. E. Bonferroni, 1936)."""
+        lost = [each.lost for each in found]
+        level = 1.0 - 0.05 / (len(found) + sum(each.unseen > 0.0 for each in found))
         lows, highs = zip(*(each.ends(level) for each in found), strict=True)
         # The quantiles of a Poisson count grow with the level most where nothing was counted.
         unseen = sum(each.unseen for each in found) * math.log(1.0 - level) / math.log(0.05)
@@ -252,6 +264,9 @@ class _Sample:
     lost: Mask
     unanswered: Mask
     responses: tuple[str, ...]
+    stands: Array
+    """(N,) for how many boards of brief answers each stands, itself one of them; 0 of one that was
+    asked briefly and is taken for lost."""
 
     def joined(self, other: _Sample) -> _Sample:
         """Both samples, one after the other."""
@@ -261,6 +276,7 @@ class _Sample:
             np.concatenate([self.lost, other.lost]),
             np.concatenate([self.unanswered, other.unanswered]),
             (*self.responses, *other.responses),
+            np.concatenate([self.stands, other.stands]),
         )
 
 
@@ -367,16 +383,27 @@ class _Drawing:
         settle is lost here."""
         verdicts = self.asked(points, wide, within=self.within)
         lost = np.array([v is not Verdict.OK for v, _ in verdicts], dtype=bool)
-        responses = tuple(response for _, response in verdicts)
-        return _Sample(points, component, lost, np.zeros_like(lost), responses)
+        responses, alone = tuple(response for _, response in verdicts), np.ones(len(points))
+        return _Sample(points, component, lost, np.zeros_like(lost), responses, alone)
 
-    def sample(self, points: Array, component: Index) -> _Sample:
-        """These boards asked."""
-        verdicts = self.asked(points)
-        failed = np.array([v is Verdict.FAILED for v, _ in verdicts], dtype=bool)
-        fine = np.array([v is Verdict.OK for v, _ in verdicts], dtype=bool)
-        responses = tuple(response for _, response in verdicts)
-        return _Sample(points, component, ~fine & ~failed, failed, responses)
+    def sample(self, points: Array, component: Index, rng: np.random.Generator) -> _Sample:
+        """These boards asked. Where a period is wanted, a board that shows none briefly hardly ever
+        comes to it, and to know that takes long: of those that are no plain ones one of ``SURE`` is
+        asked on (double sampling: J. Neyman, J. Am. Stat. Assoc. 33, 1938, 101)."""
+        brief = self.question.periodic
+        found = self.asked(points, within=self.within if brief else None)
+        open_ = np.array([v is Verdict.FAILED or r in WITHOUT_PERIOD for v, r in found], dtype=bool)
+        open_ &= brief
+        stands = np.where(open_ & (component > 0), float(SURE), 1.0)
+        on = open_ & (rng.random(len(points)) * stands < 1.0)
+        if on.any():
+            for k, answer in zip(np.flatnonzero(on), self.asked(points[on]), strict=True):
+                found[k] = answer
+        stands[open_ & ~on] = 0.0
+        failed = np.array([v is Verdict.FAILED for v, _ in found], dtype=bool) & (stands > 0.0)
+        fine = np.array([v is Verdict.OK for v, _ in found], dtype=bool)
+        responses = tuple(response for _, response in found)
+        return _Sample(points, component, ~fine & ~failed, failed, responses, stands)
 
 
 def rare_losses(
@@ -410,12 +437,18 @@ def rare_losses(
     log = AnswerLog(StoredParts(), "") if log is None else log
     drawing = _Drawing(plan, question, jobs, progress, log)
     stream = crc32(question.stream.encode("utf-8"))
-    rng = np.random.default_rng([plan.seed, stream, TAG])
+    rng, look, double = (np.random.default_rng([plan.seed, stream, TAG, *k]) for k in _STREAMS)
+    doing("plain boards")
+    first = drawing.scouted(*_mixture([], PLAIN, len(drawing.names)).drawn(LOOKED, look))
+    if first.lost.sum() >= FREQUENT:
+        counted = _counted(drawing, number, look)
+        if counted is not None:
+            return replace(counted, seconds=time.perf_counter() - began)
     doing("regions of loss")
     found = _regions(drawing, rng)
     regions = found.regions
     cube = _mixture(regions, PLAIN, len(drawing.names))
-    sample = drawing.sample(*cube.drawn(BLOCK, rng))
+    sample = drawing.sample(*cube.drawn(BLOCK, rng), double)
     while True:
         result = _estimate(cube, sample)
         count = len(sample.points)
@@ -425,16 +458,15 @@ def rare_losses(
         decided = bound is not None and _is_decided(result, bound)
         if count >= most or ((narrow or decided) and count >= LEAST_BOARDS):
             break
-        sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng)))
-    spent = found.boards + count
-    plain = sample.component == 0
-    strays = np.concatenate([found.strays, sample.points[plain & sample.lost]])
-    elsewhere = int((cube.densities(strays).argmax(axis=1) == 0).sum())
-    outside = unseen_share(elsewhere, found.plain + int(plain.sum()))
+        sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng), double))
+    pilots, plain = LOOKED + found.boards, sample.component == 0
+    strays = [first.points[first.lost], found.strays, sample.points[plain & sample.lost]]
+    elsewhere = int((cube.densities(np.concatenate(strays)).argmax(axis=1) == 0).sum())
+    outside = unseen_share(elsewhere, LOOKED + found.plain + int(plain.sum()))
     low, high = _interval(result.mean, result.error, outside)
     gain = math.nan
     if result.mean > 0.0 and result.error > 0.0:
-        gain = result.mean * (1.0 - result.mean) / result.error**2 / spent
+        gain = result.mean * (1.0 - result.mean) / result.error**2 / (pilots + count)
     return RareLosses(
         question=number,
         lost=result.mean,
@@ -442,17 +474,34 @@ def rare_losses(
         high=high,
         unanswered=result.unanswered,
         boards=count,
-        pilots=found.boards,
+        pilots=pilots,
         drawn_lost=result.drawn_lost,
         effective=result.effective,
         largest_weight=result.largest,
         gain=gain,
         unseen=outside,
         narrow=narrow,
-        regions=tuple(_named(drawing, cube, regions, sample)),
+        regions=tuple(_named(drawing, cube, regions, sample, cube.weights(sample.points))),
         margins=tuple(_margins(drawing, regions)),
         seconds=time.perf_counter() - began,
     )
+
+
+def _counted(drawing: _Drawing, number: int, rng: np.random.Generator) -> RareLosses | None:
+    """Plain boards, until ``PLENTY`` are lost; None where fewer of the most are."""
+    plain = _mixture([], PLAIN, len(drawing.names))
+    sample = drawing.sample(*plain.drawn(COUNTED, rng), rng)
+    while sample.lost.sum() < PLENTY and len(sample.points) < MOST_COUNTED:
+        sample = sample.joined(drawing.sample(*plain.drawn(COUNTED, rng), rng))
+    lost, failed = int(sample.lost.sum()), int(sample.unanswered.sum())
+    found = counted_losses(number, Yield(len(sample.points) - lost - failed, lost, 0, failed))
+    if found is None:
+        return None
+    even = np.ones(len(sample.points))
+    regions = _plain_regions(sample, even, drawing.names)
+    cube = _mixture(regions, PLAIN, len(drawing.names))
+    named = _named(drawing, cube, regions, sample, even)
+    return replace(found, regions=tuple(named), margins=tuple(_margins(drawing, regions)))
 
 
 def counted_losses(number: int, counted: Yield) -> RareLosses | None:
@@ -517,19 +566,23 @@ class _Estimate:
 
 def _estimate(cube: TiltedCube, sample: _Sample) -> _Estimate:
     """Shares of lost boards and of those without an answer, each board by its weight; the error is
-    that within the components, of which each has as many boards as its share says."""
+    that within the components, of which each has as many boards as their share says, and what those
+    of brief answers may add, as if one more of the boards that stand for them were no loss."""
     counts = np.bincount(sample.component, minlength=len(cube.shares))
     drawn = TiltedCube(cube.tilts, counts / counts.sum())
     weights = drawn.weights(sample.points)
     hits, total = weights * sample.lost, len(sample.points)
-    variance = 0.0
+    # One that is no loss takes from the others for which it stands what they were taken for.
+    shares, variance = hits + weights * np.where(sample.lost, 0.0, 1.0 - sample.stands), 0.0
     for k, count in enumerate(counts.tolist()):
         if count > 1:
-            variance += count * float(hits[sample.component == k].var(ddof=1))
-    none = float((weights * sample.unanswered).sum()) / total
+            variance += count * float(shares[sample.component == k].var(ddof=1))
+    asked_on = int((sample.stands > 1.0).sum())
+    variance += (float(weights[sample.stands == 0.0].sum()) / (asked_on + 1)) ** 2
+    none = float((weights * sample.unanswered * sample.stands).sum()) / total
     answered = max(1.0 - none, 1e-12)
     return _Estimate(
-        float(hits.sum()) / total / answered,
+        max(float(shares.sum()), 0.0) / total / answered,
         math.sqrt(variance) / total / answered,
         none,
         int(sample.lost.sum()),
@@ -598,10 +651,9 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
             continue
         strength = _strength(way, float(middle[j]))
         tilts = np.clip(np.outer(strength * np.array(PATH), way), -STEEPEST, STEEPEST)
-        verdicts = drawing.asked(mean_of(tilts))
-        lost = [k for k, (v, _) in enumerate(verdicts) if v not in (Verdict.OK, Verdict.FAILED)]
-        if lost:
-            yield _Region(tilts[lost[0]], limit.what)
+        lost = drawing.scouted(mean_of(tilts), np.zeros(len(tilts), dtype=int)).lost
+        if lost.any():
+            yield _Region(tilts[lost.argmax()], limit.what)
 
 
 def _strength(way: Array, reliability_index: float) -> float:
@@ -751,20 +803,25 @@ def _moved(
             adds = float(weights[mine].sum())
             out.append(_Region(tilt if tilt.any() else region.tilt, region.found_by, adds))
     outside = replace(sample, lost=sample.lost & (likeliest == 0))
-    out += [
-        _Region(tilt, f"plain boards that show {response}")
-        for response, tilt in _tilts(outside, weights, names)
-    ]
-    return out
+    return out + _plain_regions(outside, weights, names)
+
+
+def _plain_regions(sample: _Sample, weights: Array, names: Sequence[str]) -> list[_Region]:
+    """A region for each kind of loss of enough boards."""
+    each = _tilts(sample, weights, names)
+    return [_Region(tilt, f"plain boards that show {response}") for response, tilt in each]
 
 
 def _named(
-    drawing: _Drawing, cube: TiltedCube, regions: Sequence[_Region], sample: _Sample
+    drawing: _Drawing,
+    cube: TiltedCube,
+    regions: Sequence[_Region],
+    sample: _Sample,
+    weights: Array,
 ) -> list[LossRegion]:
     """The regions with what was lost in them: each lost board is counted to the component that it
     is likeliest of, the plain one's as a region of its own."""
-    densities = cube.densities(sample.points)
-    weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
+    likeliest = cube.densities(sample.points).argmax(axis=1)
     total = float((weights * sample.lost).sum())
     named = []
     for k, region in enumerate([_Region(cube.tilts[0], "elsewhere"), *regions]):
@@ -824,8 +881,7 @@ def _widenings(drawing: _Drawing, points: Array) -> list[float | None]:
     found = np.ones(len(points), dtype=bool)
     for _ in range(2):
         widths = np.geomspace(low, high, STEPS, axis=1)
-        verdicts = drawing.asked(rows, widths.ravel())
-        lost = np.array([v not in (Verdict.OK, Verdict.FAILED) for v, _ in verdicts])
+        lost = drawing.scouted(rows, np.zeros(len(rows), dtype=int), widths.ravel()).lost
         lost = lost.reshape(widths.shape)
         found &= lost.any(axis=1)
         first = lost.argmax(axis=1)

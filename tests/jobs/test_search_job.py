@@ -23,7 +23,7 @@ from designer.centering.levers import DesignChoice
 from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
-from designer.jobs import fidelity_choice
+from designer.jobs import fidelity_choice, search_job
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.repair_job import CureResult
@@ -420,12 +420,22 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     found = nothing | {"search": {"final": nothing, "contributions": []}, "confirmation": nothing}
     monkeypatch.setattr("designer.jobs.search_job.search_into", chosen)
     monkeypatch.setattr("designer.verbs.search.whole_job", lambda answer: None)
+    monkeypatch.setattr(search_job, "LEAST", 3)  # boards in ngspice
+    monkeypatch.setattr(search_job, "SAMPLES", 12)
     without = [word for kind in KINDS for word in ("--without", kind)]
     options = ("--out", out, *target, *without, "--jobs", 1, "-q")
     assert run("search", model, *options, "--json") == (0 if reached else 1)
     answer = json.loads(capsys.readouterr().out)
+    confirmation = answer["cure"].pop("confirmation")
     assert answer["cure"] == read(out / "cure.json")
     assert answer["cure"]["reached"] is reached
+    if reached:
+        (row,) = confirmation["responses"]
+        assert row["gate"]["passed"]
+        assert (row["asked"], row["agreed"]) == (3, 3)
+    else:
+        assert confirmation is None
+    answer["cure"]["confirmation"] = confirmation
     assert (out / "cured" / "design.json").exists() is reached
     assert shlex.join(str(word) for word in target) in commands[0]
 
@@ -438,6 +448,11 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     said = capsys.readouterr().err
     assert (f"designer tolerance {out / 'cured'}" in said) is reached
     assert ("nothing has to change" if reached else "97 % not reached") in said
+    assert ("ngspice confirms of the cured boards: 1-2-2 3/3" in said) is reached
+
+    # What ngspice does not confirm is no cure.
+    monkeypatch.setattr(search_job, "confirms", lambda row: False)
+    assert run("search", model, *options) == 1
 
     # Another repair that does not come to a design: the old one is told of.
     if reached:
