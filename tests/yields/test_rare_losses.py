@@ -433,10 +433,10 @@ def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
 def test_the_verb_writes_it_and_takes_it_over(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 200)
-    monkeypatch.setattr(rare_losses, "BLOCK", 100)
-    monkeypatch.setattr(rare_losses, "PILOT", 100)
-    monkeypatch.setattr(rare_losses, "EXPLORED", 128)
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 60)
+    monkeypatch.setattr(rare_losses, "BLOCK", 30)
+    monkeypatch.setattr(rare_losses, "PILOT", 30)
+    monkeypatch.setattr(rare_losses, "EXPLORED", 64)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
     monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
     monkeypatch.setattr(stored_parts, "EVERY", 0.0)
