@@ -21,7 +21,7 @@ from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
 TEXT = f'format = 1\n{PAPER_TABLE}[[response]]\nomega = 0.54\nexpect = "1-3-3"\n{COARSE_CIRCUIT}'
 PACKAGE = Path(designer.__file__).parent
