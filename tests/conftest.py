@@ -16,6 +16,7 @@ os.environ["MPLBACKEND"] = "Agg"
 import pytest
 from hypothesis import settings
 
+from tests.shared.answer_store import open_store
 from tests.shared.blank_figures import blank_figures
 from tests.shared.this_process import in_this_process
 
@@ -116,6 +117,17 @@ def one_process() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def answers_are_kept(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """In pytest's cache; without one for this run, of which a worker's folder is a part."""
+    cache = getattr(request.config, "cache", None)
+    run = tmp_path_factory.getbasetemp()
+    run = run.parent if hasattr(request.config, "workerinput") else run
+    open_store(run / "answers" if cache is None else cache.mkdir("answers"))
+
+
 @pytest.fixture(scope="module")
 def figures_are_blank() -> Iterator[None]:
     """For modules that ask nothing of pictures; ``tests/plots``, ``tests/report`` and
@@ -127,7 +139,7 @@ def figures_are_blank() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def designs_are_made_once() -> Iterator[None]:
     """For modules that ask nothing of the choice of parts, nor of the way of the tracks."""
-    from tests.shared.made_once import made_once  # imports what most modules of tests do not need
+    from tests.shared.made_once import made_once  # imports what some modules of tests do not need
 
     with made_once():
         yield

@@ -189,4 +189,4 @@ def test_the_other_search_finds_parts_where_there_are_some_and_none_where_there_
     assert 0.0 < float(str(found["max_error"])) < 0.01
     band = 'frequency = ["60 kHz", "70 kHz"]\n'  # too fast for the op-amp's bandwidth
     fast = text.replace("[circuit]\n", f"[circuit]\n{band}")
-    assert not stranger_parts.search(parse_model_file(fast), 3.0)["found"]
+    assert not stranger_parts.search(parse_model_file(fast), 1.0)["found"]

@@ -23,6 +23,7 @@ from designer.verbs.simulate import simulate
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Verdict
 from designer.yields.study import plan_study
+from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.system_text import clearance, system_text, table
 
 CATALOG = load_catalog()
@@ -42,6 +43,7 @@ STIFF = system_text(
     *CHAIN,
     clearance("A", "tip", "ground", upper=1e-3, stiffness=1.5e5),
     table("response", omega=226.2),
+    COARSE_CIRCUIT,
 )
 """A stiff stop on one side: offsets and the leftover slope spoil the saturating stage."""
 
@@ -51,6 +53,7 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
     """Its reason names both, and a study of other boards bears it out."""
     # The catalogue that is given, for the stage that is not stated too: no other is read.
     monkeypatch.setattr(stage_choice, "load_catalog", None)
+    monkeypatch.setattr(stage_choice, "BOARDS", 16)
     modelfile = parse_model_file(STIFF)
     made = stage_choice.synthesise(modelfile, CATALOG, jobs=2)
     assert made.modelfile.circuit.dead_zone == "rectifier"

@@ -27,9 +27,11 @@ from designer.model.model import Dimensionless
 from designer.model.model_file import ModelFile
 from designer.plots import simulate_plots
 from designer.verbs.simulate import tables
-from tests.shared.model_text import PAPER_TABLE
+from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.shared.oracles import Plain
 from tests.shared.system_text import clearance, system_text, table
+
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
 
 BASE = "format = 1\n" + PAPER_TABLE
 REQUIRED = (
@@ -75,7 +77,9 @@ def _flow(omega: float) -> Flow:
 
 @pytest.mark.parametrize("engine", ["model", "circuit"])
 def test_an_asymmetric_orbit(tmp_path: Path, capfd: Captured, engine: str) -> None:
-    answer = _answer(["simulate", _model(tmp_path), "--omega", "1.43", "--engine", engine], capfd)
+    model = _model(tmp_path, BASE + COARSE_RECTIFIER.replace("E12", "E24"))
+    words = ["simulate", model, "--omega", "1.43", "--engine", engine, "--starts", "2"]
+    answer = _answer(words, capfd)
     (r,) = answer["responses"]
     assert set(REQUIRED.split()) | set(ADDED.split()) <= set(r)
     assert (r["response"], r["n"], r["p"], r["q"]) == ("1-1-1", 1, 1, 1)
@@ -126,7 +130,8 @@ def test_a_symmetric_orbit_is_its_own_twin(tmp_path: Path, capfd: Captured) -> N
 
 
 def test_an_orbit_without_a_period(tmp_path: Path, capfd: Captured) -> None:
-    (r,) = _answer(["simulate", _model(tmp_path), "--omega", "0.45"], capfd)["responses"]
+    words = ["simulate", _model(tmp_path), "--omega", "0.45", "--starts", "1"]
+    (r,) = _answer(words, capfd)["responses"]
     assert r["response"] == r["status"] == "aperiodic"
     assert r["lyapunov"] > 0.0
     assert r["twin"] is r["penetration"] is None
@@ -144,7 +149,7 @@ def test_a_motion_on_a_torus(tmp_path: Path, capfd: Captured) -> None:
         free,
         table("force", on="m1", amplitude=1.0),
     )
-    words = ["simulate", _model(tmp_path, text), "--omega", "1.25", "--starts", "2"]
+    words = ["simulate", _model(tmp_path, text), "--omega", "1.25", "--starts", "1"]
     answer = _answer(words, capfd)
     (r,) = answer["responses"]
     assert (r["response"], r["status"], r["n"]) == ("quasi-periodic", "quasi-periodic", 0)
@@ -162,7 +167,8 @@ def test_a_motion_on_a_torus(tmp_path: Path, capfd: Captured) -> None:
 def test_without_stops(tmp_path: Path, capfd: Captured) -> None:
     model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0"))
     out = tmp_path / "p"
-    (r,) = _answer(["simulate", model, "--omega", "1", "--plots", str(out)], capfd)["responses"]
+    words = ["simulate", model, "--omega", "1", "--starts", "1", "--plots", str(out)]
+    (r,) = _answer(words, capfd)["responses"]
     assert (r["response"], r["impacts"], r["miss"]) == ("1-0-0", [], None)
     assert len(list(out.iterdir())) == 10
 
@@ -194,7 +200,8 @@ def test_chattering_ends_with_a_status(
 
 def test_pictures(tmp_path: Path, capfd: Captured) -> None:
     model, out = _model(tmp_path), tmp_path / "far" / "p"
-    arguments = ["simulate", model, "--omega", "1.43", "--omega", "0.85", "--plots", str(out)]
+    arguments = ["simulate", model, "--omega", "1.43", "--omega", "0.85", "--starts", "1"]
+    arguments += ["--plots", str(out)]
     files = _answer(arguments, capfd)["files"]
     wanted = {
         f"omega-{w}-{kind}.{file_format}"

@@ -28,6 +28,8 @@ from tests.shared.model_text import COARSE_RECTIFIER
 from tests.shared.quick_folders import quick_folder
 from tests.shared.system_text import clearance, system_text, table
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
 
 

@@ -31,6 +31,8 @@ from tests.shared.chains import chain_text
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.system_text import clearance, system_text, table
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 TEXT = (Path(__file__).resolve().parents[2] / "examples" / "rectifier.toml").read_text("utf-8")
 
 

@@ -26,6 +26,8 @@ from designer.yields.study_identity import study_hash
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.verdicts.test_verdict import nothing, plan
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 ROOT = Path(__file__).resolve().parents[2]
 LOCAL: Any = distributed.LocalCluster
 
@@ -111,8 +113,11 @@ def test_a_scheduler_that_dies_is_said() -> None:
                 pass
 
 
-def test_nobody_at_the_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_nobody_at_the_address(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Exit 3 and nothing written: neither anew nor over what is there."""
+    monkeypatch.setattr(dask_runner, "PATIENCE", 0.5)
     model, out = tmp_path / "small.toml", tmp_path / "out"
     model.write_text(f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 1.55\n{COARSE_RECTIFIER}")
     words = ["tolerance", str(model), "--out", str(out), "--rung", "exact", "--samples", "5"]

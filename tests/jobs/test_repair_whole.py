@@ -25,6 +25,8 @@ from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
 
+pytestmark = pytest.mark.usefixtures("designs_are_made_once")
+
 FRESH = Options(seed=4242, samples=400, rung="exact")
 """Of the study by which a repair is judged."""
 

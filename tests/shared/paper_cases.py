@@ -22,6 +22,7 @@ from designer.model.model_file import read_model_file
 from designer.spice.numerics_gate import GateSubject
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import circuit_of
+from tests.shared.answer_store import stored
 
 MODEL = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.215}
@@ -39,7 +40,8 @@ PAPER = Path(__file__).resolve().parents[2] / "examples" / "paper.toml"
 @cache
 def synthesised() -> Synthesis:
     """``examples/paper.toml``, synthesised once for all tests."""
-    return synthesise(read_model_file(PAPER))
+    made: Synthesis = stored(synthesise)(read_model_file(PAPER))
+    return made
 
 
 @cache

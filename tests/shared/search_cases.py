@@ -9,6 +9,7 @@ from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread
+from tests.shared.answer_store import stored
 from tests.shared.model_text import PAPER_TABLE
 
 HEAD = (
@@ -56,7 +57,8 @@ def catalog() -> Catalog:
 def made() -> Synthesis:
     """A rectifier design for 1-2-2 at one place."""
     found = file('omega = 0.85\nexpect = "1-2-2"', objective="match")
-    return synthesise(found, catalog())
+    design: Synthesis = stored(synthesise)(found, catalog())
+    return design
 
 
 @cache

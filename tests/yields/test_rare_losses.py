@@ -32,6 +32,7 @@ from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
+from tests.shared.exploring import EXPLORING
 from tests.shared.model_text import COARSE_RECTIFIER, SMALL
 from tests.shared.system_text import clearance, system_text, table
 
@@ -122,7 +123,9 @@ def estimated(
 REPETITIONS = 60
 
 
-@pytest.mark.parametrize(("size", "threshold"), [(12, 9.6), (12, 10.3), (20, 15.6)])
+@pytest.mark.parametrize(
+    ("size", "threshold"), [(12, 10.3), (20, 15.6), *([(12, 9.6)] if EXPLORING else [])]
+)
 def test_the_interval_covers_a_probability_that_is_known(
     monkeypatch: pytest.MonkeyPatch, size: int, threshold: float
 ) -> None:
@@ -495,10 +498,10 @@ def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
 def test_the_verb_writes_it_and_takes_it_over(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 200)
-    monkeypatch.setattr(rare_losses, "BLOCK", 100)
-    monkeypatch.setattr(rare_losses, "PILOT", 100)
-    monkeypatch.setattr(rare_losses, "EXPLORED", 128)
+    monkeypatch.setattr(rare_losses, "MOST_BOARDS", 60)
+    monkeypatch.setattr(rare_losses, "BLOCK", 30)
+    monkeypatch.setattr(rare_losses, "PILOT", 30)
+    monkeypatch.setattr(rare_losses, "EXPLORED", 64)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
     monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
     monkeypatch.setattr(stored_parts, "EVERY", 0.0)

@@ -295,7 +295,7 @@ STRANGE: dict[str, Change] = {
     "no reason": with_value("reason", None),
     "no margin": with_value("miss", None),
     "no periods": with_value("periods", None),
-    "rows without end": lambda rows: rows * 10_000,
+    "rows without end": lambda rows: rows * 1000,
 }
 
 

@@ -412,6 +412,7 @@ def _words(home: Path, out: Path, *more: str) -> list[str]:
     return ["tolerance", model, "--out", str(out), "--samples", "12", "--rung", "exact", *more]
 
 
+@pytest.mark.usefixtures("quick_reports")
 def test_the_exact_circuit_needs_no_ngspice(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -464,6 +465,7 @@ def _refused(*_: Any, **__: Any) -> Any:
     raise AssertionError("this was known")
 
 
+@pytest.mark.usefixtures("quick_reports")
 def test_another_layer_asks_for_no_attribution_again_and_other_boards_do(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
