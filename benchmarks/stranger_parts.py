@@ -57,7 +57,7 @@ def search(modelfile: ModelFile, seconds: float, seed: int = 1) -> dict[str, obj
                 if time.process_time() > end:
                     break
                 attempt = choice.circuit_of(
-                    RoundedChoice(z, rounded, error=0.0, worth=0.0, kinds=0)
+                    RoundedChoice(z, rounded, error=0.0, worth=0.0, kinds=0, quiet=True)
                 )
                 made += 1
                 if isinstance(attempt, Shortfall) or attempt.errors.max_error >= min(

@@ -85,8 +85,8 @@ class RuleSubject:
 
     @cached_property
     def reduction(self) -> Reduction:
-        """The reduction of the nominal board."""
-        return nominal_reduction(replace(self.design, circuit=self.circuit))
+        """The reduction of the nominal board: of the design's own, where what is simulated is."""
+        return nominal_reduction(replace(self.design, circuit=replace(self.circuit, fittings=())))
 
     @cached_property
     def _runs(self) -> tuple[list[Run], dict[str, str]]:

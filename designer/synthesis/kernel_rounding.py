@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.base.jit import callee, compiled, leaf
+from designer.base.jit import compiled, leaf
 
 UNIT = 0.005
 """An error that counts 1 in the sum of sixth powers."""
@@ -23,6 +23,17 @@ WINDOW = 0.45
 """Of a free part: how far from its value others are tried, in its logarithm."""
 STEPS = 24
 """Drawn steps of a scale that are tried."""
+
+
+class Move(NamedTuple):
+    """A direction in z."""
+
+    by: Array
+    """(rows + limits,) change of each row and limit with a step along it."""
+    which: Index
+    """The rows, then the limits whose cost changes."""
+    ends: Index
+    """(2,) where those rows and those limits end in ``which``."""
 
 
 class Rounding(NamedTuple):
@@ -54,14 +65,18 @@ class Rounding(NamedTuple):
 
 @leaf
 def nearest_log(values: Array, low: int, high: int, wanted: float) -> float:
-    """Of values[low:high], ascending, the one nearest to ``wanted``."""
-    a, b = low, high - 1
-    while b - a > 1:
-        middle = (a + b) // 2
-        if values[middle] <= wanted:
-            a = middle
-        else:
-            b = middle
+    """Of values[low:high], ascending, the one nearest to ``wanted``: looked for where it would be
+    if they were evenly spaced, and from there on."""
+    a, last = low, max(high - 2, low)
+    span = values[high - 1] - values[low]
+    if span > 0.0 and wanted > values[low]:
+        a = low + int(min((wanted - values[low]) / span, 1.0) * (high - 1 - low))
+        a = min(a, last)
+    while a > low and values[a] > wanted:
+        a -= 1
+    while a < last and values[a + 1] <= wanted:
+        a += 1
+    b = min(a + 1, high - 1)
     best: float = values[a] if wanted - values[a] <= values[b] - wanted else values[b]
     return best
 
@@ -80,39 +95,50 @@ def limit_cost(over: float) -> float:
 
 
 @leaf
-def changed_cost(rounding: Rounding, logs: Array, overs: Array, move: Array, by: float) -> float:
-    """The whole cost after z has moved by so much along a direction whose change of rows and limits
-    is ``move``."""
-    total = 0.0
-    rows = len(logs)
-    first = 0.0
-    if rounding.lead >= 0:
-        first = row_error(rounding, rounding.lead, logs[rounding.lead] + by * move[rounding.lead])
+def moved(rounding: Rounding, one: int, other: int, ratio: float, move: Move) -> None:
+    """Note the change of every row and limit with entry ``one`` of z, and ``ratio`` of it with
+    another, and which costs change with it."""
+    rows, lead = len(rounding.constants), rounding.lead
     for row in range(rows):
-        error = row_error(rounding, row, logs[row] + by * move[row]) - rounding.held[row] * first
+        move.by[row] = rounding.rows[row, one] + ratio * rounding.rows[row, other]
+    follows, count = lead >= 0 and move.by[lead] != 0.0, 0
+    for row in range(rows):
+        if move.by[row] != 0.0 or (follows and rounding.held[row] != 0.0):
+            move.which[count] = row
+            count += 1
+    move.ends[0] = count
+    for k in range(len(rounding.limit_constants)):
+        change = rounding.limits[k, one] + ratio * rounding.limits[k, other]
+        move.by[rows + k] = change
+        if change != 0.0:
+            move.which[count] = k
+            count += 1
+    move.ends[1] = count
+
+
+@leaf
+def cost_of(rounding: Rounding, logs: Array, overs: Array, move: Move, step: float) -> float:
+    """What of the cost changes with a move, after so large a step of it."""
+    rows, lead, first, total = len(logs), rounding.lead, 0.0, 0.0
+    if lead >= 0:
+        first = row_error(rounding, lead, logs[lead] + step * move.by[lead])
+    for place in range(move.ends[0]):
+        row = move.which[place]
+        error = row_error(rounding, row, logs[row] + step * move.by[row])
+        error -= rounding.held[row] * first
         square = (rounding.sizes[row] * error / UNIT) ** 2
         total += square * square * square
-    for k in range(len(overs)):
-        total += limit_cost(overs[k] + by * move[rows + k])
+    for place in range(move.ends[0], move.ends[1]):
+        k = move.which[place]
+        total += limit_cost(overs[k] + step * move.by[rows + k])
     return total
 
 
-@callee
-def moved(rounding: Rounding, one: int, other: int, ratio: float) -> Array:
-    """Change of every row and limit with entry ``one`` of z, and ``ratio`` of it with another."""
-    return np.concatenate(
-        (
-            rounding.rows[:, one] + ratio * rounding.rows[:, other],
-            rounding.limits[:, one] + ratio * rounding.limits[:, other],
-        )
-    )
-
-
 @compiled
-def descend(rounding: Rounding, start: Array, draws: Array) -> tuple[Array, float]:
-    """z of a choice near ``start``, and its cost. draws : numbers in 0 … 1, used in turn."""
+def descend(rounding: Rounding, start: Array, draws: Array) -> Array:
+    """z of a choice near ``start``. draws : numbers in 0 … 1, used in turn."""
     z = start.copy()
-    size, rows = len(z), len(rounding.constants)
+    size, rows, limits = len(z), len(rounding.constants), len(rounding.limit_constants)
     scales = 0
     for i in range(size):
         if rounding.first[i + 1] == rounding.first[i]:
@@ -121,8 +147,17 @@ def descend(rounding: Rounding, start: Array, draws: Array) -> tuple[Array, floa
             z[i] = nearest_log(rounding.values, rounding.first[i], rounding.first[i + 1], z[i])
     logs = rounding.rows @ z + rounding.constants
     overs = rounding.limits @ z + rounding.limit_constants
-    nothing = np.zeros(rows + len(overs))
-    cost = changed_cost(rounding, logs, overs, nothing, 0.0)
+    nowhere = Move(
+        np.zeros(rows + limits),
+        np.concatenate((np.arange(rows), np.arange(limits))),
+        np.array([rows, rows + limits]),
+    )
+    move = Move(
+        np.zeros(rows + limits),
+        np.zeros(rows + limits, dtype=np.int64),
+        np.zeros(2, dtype=np.int64),
+    )
+    cost = cost_of(rounding, logs, overs, nowhere, 0.0)
     draw, width, still = 0, 0.04, 0
     while still < 3:
         before = cost
@@ -136,29 +171,29 @@ def descend(rounding: Rounding, start: Array, draws: Array) -> tuple[Array, floa
                 draw += 1
                 if other == i:
                     continue
-            move = moved(rounding, i, other, ratio)
-            best, step = cost, 0.0
+            moved(rounding, i, other, ratio, move)
+            best, step = cost_of(rounding, logs, overs, move, 0.0), 0.0
             if rounding.first[i + 1] == rounding.first[i]:
                 for _ in range(STEPS):
                     by = width * (2.0 * draws[draw % len(draws)] - 1.0)
                     draw += 1
-                    now = changed_cost(rounding, logs, overs, move, by)
+                    now = cost_of(rounding, logs, overs, move, by)
                     if now < best:
                         best, step = now, by
             else:
                 for k in range(rounding.first[i], rounding.first[i + 1]):
                     by = rounding.values[k] - z[i]
                     if abs(by) <= WINDOW:
-                        now = changed_cost(rounding, logs, overs, move, by)
+                        now = cost_of(rounding, logs, overs, move, by)
                         if now < best:
                             best, step = now, by
             if step != 0.0:
                 z[i] += step
                 z[other] += ratio * step
-                logs += step * move[:rows]
-                overs += step * move[rows:]
-                cost = best
+                logs += step * move.by[:rows]
+                overs += step * move.by[rows:]
+        cost = cost_of(rounding, logs, overs, nowhere, 0.0)
         if cost > 0.9 * before:
             still += 1
             width *= 0.3
-    return z, cost
+    return z

@@ -171,6 +171,7 @@ class Sampled:
         self.system = reduction.system()
         self.run = run
         self.flow = Flow(self.system, run.drive)
+        self._known_rows: dict[int, Array] = {}
         points = 0
         needed = LEAST_POINTS
         while needed > points:  # a finer look may meet a mode that a coarse one misses
@@ -190,38 +191,60 @@ class Sampled:
             for s in self.reduction.circuit.sections
             for quantity in ("low", "high", "source", "sink")
         ]
-        values = self._outputs(self.x, self.angle, self.at)
+        values = self._outputs()
         which, left, right = _brackets(values)
         best, row = values.max(axis=0), np.arange(len(which))
         for _ in range(ROUNDS):
             time = left[:, None] + (right - left)[:, None] * np.linspace(0.0, 1.0, BRACKET + 1)
             x, angle = self._between(time.ravel())
-            fine = self._outputs(x, angle, modes_at(self.flow, x, angle, self.keys))
-            own = fine.reshape(len(which), BRACKET + 1, -1)[row, :, which]
+            at = modes_at(self.flow, x, angle, self.keys)
+            own = self._each(x, angle, at, np.repeat(which, BRACKET + 1)).reshape(time.shape)
             np.maximum.at(best, which, own.max(axis=1))
             peak = own.argmax(axis=1)
             left = time[row, np.maximum(peak - 1, 0)]
             right = time[row, np.minimum(peak + 1, BRACKET)]
         return {name: float(value) for name, value in zip(names, best, strict=True)}
 
-    def _outputs(self, x: Array, angle: Array, at: Index) -> Array:
-        """(k, 4 sections) -voltage, voltage, current and -current of each section's output at
-        states (k, n), drive phases (k,) and modes (k,)."""
-        drive = self.flow.drive
-        u, second_drive = drive.at(angle), drive.second_at(angle)
-        out = np.empty((len(x), 4 * len(self.reduction.circuit.sections)))
-        for i, key in enumerate(self.keys):
-            here = at == i
+    def _outputs(self) -> Array:
+        """(k, 4 sections) -voltage, voltage, current and -current of each section's output on the
+        strobes."""
+        inputs, out = self._inputs(self.x, self.angle), np.zeros(0)
+        for i in range(len(self.keys)):
+            here = self.at == i
             if here.any():
-                rows = self._output_rows(self.reduction.solution(key))
-                out[here] = x[here] @ rows[:, :-2].T + np.outer(u[here], rows[:, -2]) + rows[:, -1]
-                if drive.second is not None:
-                    rows = self._output_rows(self.reduction.by_second(key))
-                    out[here] += np.outer(second_drive[here], rows[:, -2])
+                rows = self._rows(i)
+                out = out if out.size else np.empty((len(inputs), len(rows)))
+                out[here] = inputs[here] @ rows.T
         return out
 
+    def _each(self, x: Array, angle: Array, at: Index, which: Index) -> Array:
+        """(k,) the outputs of these columns (k,) of ``_outputs`` at states (k, n), drive phases
+        (k,) and modes (k,)."""
+        inputs, out = self._inputs(x, angle), np.empty(len(x))
+        for i in distinct_indices(at):
+            here = at == i
+            out[here] = np.einsum("ki,ki->k", inputs[here], self._rows(int(i))[which[here]])
+        return out
+
+    def _inputs(self, x: Array, angle: Array) -> Array:
+        """(k, n + 3) states, generator, 1 and the generator's second channel."""
+        drive = self.flow.drive
+        return np.column_stack([x, drive.at(angle), np.ones(len(x)), drive.second_at(angle)])
+
+    def _rows(self, mode: int) -> Array:
+        """(4 sections, n + 3) what the outputs are by ``_inputs`` in a mode, by its place."""
+        known = self._known_rows.get(mode)
+        if known is None:
+            key = self.keys[mode]
+            first = self._output_rows(self.reduction.solution(key))
+            second = np.zeros(len(first))
+            if self.flow.drive.second is not None:
+                second = self._output_rows(self.reduction.by_second(key))[:, -2]
+            known = self._known_rows[mode] = np.column_stack([first, second])
+        return known
+
     def _output_rows(self, solved: Solution) -> Array:
-        """(4 sections, n + 2) what ``_outputs`` are by states, generator and 1."""
+        """(4 sections, n + 2) what they are by states, a channel of the generator, and 1."""
         sections = self.reduction.circuit.sections
         pairs = [(solved.voltage[s.output], solved.output[s.name]) for s in sections]
         return np.array([row for v, c in pairs for row in (-1.0 * v, v, c, -1.0 * c)])
@@ -330,4 +353,5 @@ def modes_at(flow: Flow, x: Array, angle: Array, keys: list[ModeKey]) -> Index:
 
 def _guards(mode: Mode, x: Array, u: Array, second_drive: Array) -> Array:
     C, D, e = mode.guard_rows
-    return np.asarray(x @ C.T + np.outer(u, D) + e + np.outer(second_drive, mode.second_guards))
+    rows = np.column_stack([C, D, e, mode.second_guards])
+    return np.asarray(np.column_stack([x, u, np.ones(len(x)), second_drive]) @ rows.T)

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from designer.base.arrays import Array
+from designer.circuit.linear_program import LinearProgram
 from designer.synthesis.scale_program import LinearBound, ScaleProgram, StatedLimit
 
 FAR = 60.0
@@ -70,33 +71,34 @@ class ScaleBox:
             return []
         weights, constant = self._worth()
         top = self.worth(best)
-        # -worth + top - loss <= 0, the lowest threshold being a variable of its own.
-        near = -weights, top - loss - constant
+        # The lowest threshold is a variable of its own.
+        rows, most = self._limits(self._bounds())
+        far = np.full(self._size + 1, FAR)
+        program = LinearProgram(np.vstack([rows, -weights]), -far, far)
+        ends = np.append(most, constant + loss - top)
         random = np.random.default_rng(seed)
         out = [best]
         for _ in range(count):
-            direction = random.standard_normal(self._size)
-            z = self.point(np.append(direction, 0.0), near=near, cutting=False)
-            if z is not None:
-                out.append(z)
+            direction = np.append(random.standard_normal(self._size), 0.0)
+            x = program.solve(-direction, ends)
+            if x is not None:
+                out.append(x[:-1])
         return out
 
     def point(
         self,
         worth: Array,
         *,
-        near: tuple[Array, float] | None = None,
-        cutting: bool = True,
         without: Collection[StatedLimit] = (),
     ) -> Array | None:
         """The point of the box with the largest worth @ (z, lowest threshold); None where there is
-        none, by a proof. near : a further bound on the same. without : limits that are left out."""
+        none, by a proof. without : limits that are left out."""
         for _ in range(TANGENTS):
             bounds = [b for b in self._bounds() if b.limit not in without]
-            z = self._solve(worth, bounds, near)
-            if z is None or not cutting:
+            z = self._solve(worth, bounds)
+            if z is None:
                 return z
-            over = [s for s in self.program.sums if s.limit not in without and s.at(z) > TINY]
+            over = [s for s in self.program.broken(z, TINY) if s.limit not in without]
             if not over:
                 return z
             self.cuts += [s.tangent(z) for s in over]
@@ -167,21 +169,22 @@ class ScaleBox:
                 constant += share / len(logs) * log.constant
         return np.append(weights, 1.0 if program.thresholds else 0.0), constant
 
-    def _solve(
-        self, worth: Array, bounds: Sequence[LinearBound], near: tuple[Array, float] | None
-    ) -> Array | None:
-        """z of one linear program; the last variable is the lowest threshold."""
+    def _limits(self, bounds: Sequence[LinearBound]) -> tuple[Array, Array]:
+        """(limits, z + 1) and (limits,): the rows, which may not exceed these ends. The last
+        variable is the lowest threshold."""
         low = [np.append(-log.weights, 1.0) for log in self.program.thresholds]
         weights = [np.append(b.log.weights, 0.0) for b in bounds] + low
         ends = [-b.log.constant for b in bounds]
         ends += [log.constant for log in self.program.thresholds]
-        if near is not None:
-            weights.append(near[0])
-            ends.append(-near[1])
+        return np.array(weights), np.array(ends)
+
+    def _solve(self, worth: Array, bounds: Sequence[LinearBound]) -> Array | None:
+        """z of one linear program."""
+        rows, ends = self._limits(bounds)
         solved = linprog(
             -worth,
-            A_ub=np.array(weights),
-            b_ub=np.array(ends),
+            A_ub=rows,
+            b_ub=ends,
             bounds=[(-FAR, FAR)] * (self._size + 1),
             method="highs",
         )

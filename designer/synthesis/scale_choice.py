@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from designer.base.arrays import Array
 from designer.base.progress import best_so_far, doing
 from designer.base.threads import parallel
 from designer.catalog.design_rules import BY_ID
+from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Circuit
-from designer.circuit.scale_fit import minimax
+from designer.circuit.scale_fit import LargestFit
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.attempt import BASE, Attempt, Order, attempt, completed
 from designer.synthesis.dead_zone_target import DeadZone
@@ -79,6 +81,8 @@ class RoundedChoice:
     """``ScaleBox.worth`` of it."""
     kinds: int
     """Distinct values."""
+    quiet: bool
+    """Whether its offsets keep the rule ``offset-force``, or no scales do."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +110,6 @@ class ScaleChoice:
     """Choices that keep all limits which are known before the circuit is made."""
     _noisy: bool = False
     """Whether no scales were found that keep the rule ``offset-force``."""
-    _known_quiet: dict[int, bool] = field(default_factory=dict)
-    """``_quiet`` by the candidate's identity."""
 
     @cached_property
     def program(self) -> ScaleProgram:
@@ -164,7 +166,7 @@ class ScaleChoice:
             z = self.box.best()
             if z is None:  # no scales keep the rule, which judges the finished circuit
                 self.box.cuts, self._noisy = before, True
-            if z is None or self._over(z) <= 0.0:
+            if z is None or self._over(z[None])[0] <= 0.0:
                 return
             doing("scales at which offsets matter less")
             self.box.cuts.append(self._offset_cut(z))
@@ -172,7 +174,8 @@ class ScaleChoice:
     def _corners(self, loss: float, seed: int) -> list[Array]:
         """Corners of the box; cut once more where offsets of the worst are too large."""
         corners = self.box.points(CORNERS, loss, seed=seed)
-        over = sorted(((self._over(z), k) for k, z in enumerate(corners)), reverse=True)
+        logs = self._over(np.array(corners)).tolist()
+        over = sorted(((log, k) for k, log in enumerate(logs)), reverse=True)
         worst = [corners[k] for log, k in over[:CUTS] if log > 0.0]
         if worst:
             before = list(self.box.cuts)
@@ -185,24 +188,33 @@ class ScaleChoice:
 
     def _offset_cut(self, z: Array) -> LinearBound:
         """The tangent of the offsets at these scales."""
-        log, rule = self._over(z), BY_ID["offset-force"]
+        rule = BY_ID["offset-force"]
         assert rule.limit is not None
-        slope = np.array([(self._over(z + s) - log) / STEP for s in STEP * np.eye(len(z))])
+        log, *beside = self._over(np.vstack([z, z + STEP * np.eye(len(z))])).tolist()
+        slope = (np.array(beside) - log) / STEP
         limit = StatedLimit(rule.id, "offsets over the drive", rule.limit)
         return LinearBound(Affine(slope, log - float(slope @ z)), limit)
 
-    def _over(self, z: Array) -> float:
-        """``_over_limit`` at these scales, with what they are to leave beside the limit; parts that
-        are sized afterwards have some value. -inf where no scales keep it."""
-        order, program = self.order, self.program
+    def _over(self, z: Array) -> Array:
+        """(k,) ``_over_limit`` at these scales (k, z), with what they are to leave beside the
+        limit; parts that are sized afterwards have some value. -inf where no scales keep it."""
+        program, circuit = self.program, self._unsized
         if self._noisy or not program.outputs:
-            return -np.inf
-        values: dict[str, float] = defaultdict(lambda: BASE)
-        values |= program.values(z, program.follows(z)) | self._drive(z)
-        return self._over_limit(order.build(values), program.volts(z)) - float(np.log(ROOM))
+            return np.full(len(z), -np.inf)
+        values = program.values(z, program.follows(z)) | self._drive(z)
+        nominal = nominal_board(circuit)
+        own: dict[str, Any] = {name: values.get(name, v) for name, v in nominal.values.items()}
+        gain: Any = np.full(len(z), nominal.inverse_gain)
+        board = replace(nominal, values=own, inverse_gain=gain)
+        return np.asarray(self._over_limit(circuit, program.volts(z), board) - np.log(ROOM))
 
-    def _drive(self, z: Array) -> dict[str, float]:
-        """The drive's resistors at half of the generator's largest amplitude [ohm]."""
+    @cached_property
+    def _unsized(self) -> Circuit:
+        """The circuit with some value of each part."""
+        return self.order.build(defaultdict(lambda: BASE))
+
+    def _drive(self, z: Array) -> dict[str, Array]:
+        """(k,) the drive's resistors at half of the generator's largest amplitude [ohm]."""
         order, program = self.order, self.program
         system, volts = order.model.second_order(), program.volts(z)
         out = {}
@@ -210,21 +222,21 @@ class ScaleChoice:
             force = system.drive_force(system.own_frequency, channel)
             for name, mass in zip(names, np.flatnonzero(force).tolist(), strict=True):
                 state = 2 * mass + 1
-                rate = volts[state] * abs(force[mass]) / system.mass[mass] / np.exp(z[0])
-                amperes = rate * np.exp(z[program.shared[f"C{state + 1}"]])
+                rate = volts[:, state] * abs(force[mass]) / system.mass[mass] / np.exp(z[:, 0])
+                amperes = rate * np.exp(z[:, program.shared[f"C{state + 1}"]])
                 ohms = 0.5 * GENERATOR_PEAK / (largest * amperes)
-                out[name] = float(np.clip(ohms, order.resistors[0], order.resistors[-1]))
+                out[name] = np.clip(ohms, order.resistors[0], order.resistors[-1])
         return out
 
-    def _over_limit(self, circuit: Circuit, volts: Array) -> float:
-        """Logarithm of the largest offsets as a force at a clearance over the limit of the rule:
-        above 0 they are too large."""
+    def _over_limit(self, circuit: Circuit, volts: Array, board: Board | None = None) -> Array:
+        """(...,) logarithm of the largest offsets as a force at a clearance over the limit of the
+        rule: above 0 they are too large. board : as of ``forces``."""
         order, rule = self.order, BY_ID["offset-force"]
         assert rule.limit is not None
         limit = largest_offset(order.bounds)
-        at = forces(circuit, order.model.second_order(), volts, order.drive_force)
+        at = forces(circuit, order.model.second_order(), volts, order.drive_force, board)
         each = [np.hypot.reduce(list(offset_forces(shifts, limit).values())) for shifts in at]
-        return float(np.log(max(each) / rule.limit))
+        return np.asarray(np.log(np.max(each, axis=0) / rule.limit))
 
     def _circuits(self) -> Iterator[ScaleAttempt | Shortfall]:
         """A circuit of each of the best candidates, as they are ranked; one whose error is not that
@@ -233,6 +245,7 @@ class ScaleChoice:
         worse: list[tuple[bool, float, ScaleAttempt]] = []
         there = False
         tried = 0
+        best = self.box.best()
         for candidate in list(self._ranked())[:MOST_TRIED]:
             if tried == TRIED:
                 break
@@ -240,8 +253,8 @@ class ScaleChoice:
             if isinstance(made, Shortfall):
                 why, tried = made, tried + 1
                 continue
-            own = ScaleAttempt(made, candidate.z, self._words(candidate))
-            noisy = self._over_limit(made.circuit, made.errors.scales.volts) > 0.0
+            own = ScaleAttempt(made, candidate.z, self._words(candidate, best))
+            noisy = bool(self._over_limit(made.circuit, made.errors.scales.volts) > 0.0)
             error = made.errors.max_error
             as_meant = error <= max(self.goal, CLOSE * candidate.error)
             tried += not noisy
@@ -263,11 +276,11 @@ class ScaleChoice:
         draws = [random.random(DRAWS) for _ in starts]
 
         def choice(own: tuple[Array, Array]) -> Array:
-            return descend(rounding, *own)[0]
+            return descend(rounding, *own)
 
         for z in parallel(choice, zip(starts, draws, strict=True), self.jobs):
             over = (rounding.limits @ z + rounding.limit_constants).max()
-            sums = [s for s in self.program.sums if s.at(z) > KEPT]
+            sums = self.program.broken(z, KEPT)
             broken += [s.tangent(z) for s in sums]
             if over <= KEPT and not sums:
                 logs = rounding.rows @ z + rounding.constants
@@ -276,48 +289,37 @@ class ScaleChoice:
                 found.append((float(np.abs(errors).max()), z, rounded, errors))
         self.box.cuts += broken[: len(self.program.sums)]
         best = sorted(found, key=lambda own: own[0])[:LOOKED_AT]
+        quiet = self._over(np.array([z for _, z, _, _ in best])) <= -np.log(ROOM) if best else []
+        fit = self._fit(rounding)
+        for (error, z, rounded, errors), is_quiet in zip(best, quiet, strict=True):
+            least = error if error <= self.goal else fit.largest(errors)
+            self.candidates.append(self._candidate(z, rounded, least, bool(is_quiet)))
 
-        def least(own: tuple[float, Array, Array, Array]) -> float:
-            return own[0] if own[0] <= self.goal else self._fitted(rounding, own[3])
-
-        for own, error in zip(best, parallel(least, best, self.jobs), strict=True):
-            self.candidates.append(self._candidate(own[1], own[2], error))
-
-    def _fitted(self, rounding: Rounding, errors: Array) -> float:
-        """The largest error at the scales that make that of the coefficients least; constant forces
-        are read at these."""
+    def _fit(self, rounding: Rounding) -> LargestFit:
+        """At the scales that make the error of the coefficients least; constant forces are read at
+        these."""
         scales = [k for k, values in enumerate(self.program.lists) if not len(values)]
-        columns = _held(rounding, -rounding.rows[:, scales])
         own = np.array([not row.constant for row in self.program.rows])
-        fitted = errors + columns @ minimax(errors[own], columns[own])
-        return float(np.abs(fitted).max())
+        return LargestFit(_held(rounding, -rounding.rows[:, scales]), own)
 
     @property
     def _least(self) -> float:
         ranked = sorted(self.candidates, key=lambda c: c.error)
-        return next((c.error for c in ranked if self._quiet(c)), np.inf)
+        return next((c.error for c in ranked if c.quiet), np.inf)
 
     def _rounded(self, logs: Array) -> Array:
         """(rows,) the values nearest to these logarithms."""
         pairs = zip(self.program.rows, logs.tolist(), strict=True)
         return np.array([row.values[np.argmin(np.abs(row.values - log))] for row, log in pairs])
 
-    def _candidate(self, z: Array, rounded: Array, error: float) -> RoundedChoice:
+    def _candidate(self, z: Array, rounded: Array, error: float, quiet: bool) -> RoundedChoice:
         own = z[[k for k, values in enumerate(self.program.lists) if len(values)]]
         kinds = len(np.unique(np.round(np.concatenate([rounded, own]), 9)))
-        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds)
-
-    def _quiet(self, candidate: RoundedChoice) -> bool:
-        """Whether its offsets keep the rule ``offset-force``, or no scales do."""
-        known = self._known_quiet.get(id(candidate))
-        if known is None:
-            known = self._over(candidate.z) <= -float(np.log(ROOM))
-            self._known_quiet[id(candidate)] = known
-        return known
+        return RoundedChoice(z, rounded, error, self.box.worth(z), kinds, quiet)
 
     def _ranked(self) -> Iterator[RoundedChoice]:
         """The candidates, the best one first."""
-        good = [c for c in self.candidates if c.error <= self.goal and self._quiet(c)]
+        good = [c for c in self.candidates if c.error <= self.goal and c.quiet]
         own = {id(c) for c in good}
         if good:
             top = max(c.worth for c in good)
@@ -346,7 +348,8 @@ class ScaleChoice:
 
     def circuit_of(self, candidate: RoundedChoice) -> Attempt | Shortfall:
         """The circuit of a choice, with what is sized afterwards."""
-        values = self.program.values(candidate.z, candidate.rounded)
+        found = self.program.values(candidate.z, candidate.rounded)
+        values = {name: float(value) for name, value in found.items()}
         targets = Targets.of(self.order.model)
         linear = self._linear(targets, values)
         within = self.within
@@ -374,10 +377,9 @@ class ScaleChoice:
         own = {name: values[name] for name in targets.parts}
         return LinearBlock(own, np.nan, np.nan, 0.0, False, "", "descents from points of the box")
 
-    def _words(self, candidate: RoundedChoice) -> str:
-        """What is proved of the thresholds."""
+    def _words(self, candidate: RoundedChoice, best: Array | None) -> str:
+        """What is proved of the thresholds. best : ``ScaleBox.best``."""
         lows = self.program.thresholds
-        best = self.box.best()
         if not lows or best is None:
             return ""
         low, high = (float(np.exp(min(log.at(z) for log in lows))) for z in (candidate.z, best))

@@ -14,11 +14,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.base.eseries import series_values
 from designer.base.units import format_quantity
 from designer.catalog.diode_curve import diode_model
@@ -200,18 +202,37 @@ class ScaleProgram:
         return places[0] if places else -1
 
     def volts(self, z: Array) -> Array:
-        """(states,) volts per model unit."""
-        return np.exp(z[1 : 1 + len(self.levels)])
+        """(..., states) volts per model unit."""
+        return np.exp(z[..., 1 : 1 + len(self.levels)])
 
     def follows(self, z: Array) -> Array:
-        """(rows,) logarithms of the resistors that follow, before they are rounded."""
-        return np.array([row.log.at(z) for row in self.rows])
+        """(..., rows) logarithms of the resistors that follow, before they are rounded."""
+        weights = np.array([row.log.weights for row in self.rows])
+        return np.asarray(z @ weights.T + [row.log.constant for row in self.rows])
 
-    def values(self, z: Array, rounded: Array) -> dict[str, float]:
-        """The values [ohm, F] by part. rounded : (rows,) logarithms of the rows' values."""
-        out = {name: float(np.exp(z[k])) for name, k in self.shared.items()}
-        for row, log in zip(self.rows, rounded.tolist(), strict=True):
-            out |= dict.fromkeys(row.names, float(np.exp(log)))
+    def broken(self, z: Array, kept: float) -> list[ExponentialSum]:
+        """The sums whose logarithm is above ``kept``, at one z (z,)."""
+        if not self.sums:
+            return []
+        weights, constants, first = self._terms
+        logs = weights @ z + constants
+        totals = np.logaddexp.reduceat(logs, first)
+        return [self.sums[k] for k in np.flatnonzero(totals > kept)]
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array, Index]:
+        """Weights (terms, z) and constants (terms,) of all terms of the sums, and where each sum's
+        begin."""
+        logs = [log for s in self.sums for log in s.logs]
+        first = np.cumsum([0, *(len(s.logs) for s in self.sums)])[:-1]
+        return np.array([g.weights for g in logs]), np.array([g.constant for g in logs]), first
+
+    def values(self, z: Array, rounded: Array) -> dict[str, Any]:
+        """(...,) the values [ohm, F] by part. rounded : (..., rows) logarithms of the rows'
+        values."""
+        out = {name: np.exp(z[..., k]) for name, k in self.shared.items()}
+        for k, row in enumerate(self.rows):
+            out |= dict.fromkeys(row.names, np.exp(rounded[..., k]))
         return out
 
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.entries import OpAmp
 from designer.circuit.board_values import Board, nominal_board
-from designer.circuit.netlist import GROUND, Circuit
+from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.model.find_responses import ModelResponse
@@ -29,20 +30,20 @@ BOLTZMANN, KELVIN = 1.380649e-23, 298.15
 @dataclass(frozen=True)
 class Shifts:
     """How far one unit of each disturbance shifts the displacement from the middle of one
-    clearance, in volts of its first mass's displacement."""
+    clearance, in volts of its first mass's displacement; of several boards (boards,) each."""
 
     clearance: str
     """Name of the clearance; "" where a circuit without one has the first mass's displacement."""
-    offset: Mapping[str, float]
+    offset: Mapping[str, Any]
     """Shift by section, per volt at its input."""
-    current: Mapping[str, float]
+    current: Mapping[str, Any]
     """Shift by net, per ampere into it."""
 
     def between(self, a: str, b: str) -> float:
         """Of one ampere that leaves net a and enters net b."""
-        return self.current.get(b, 0.0) - self.current.get(a, 0.0)
+        return float(self.current.get(b, 0.0) - self.current.get(a, 0.0))
 
-    def over(self, volts: float) -> Shifts:
+    def over(self, volts: Any) -> Shifts:
         """The shifts as shares of one of so many volts."""
         return replace(
             self,
@@ -52,11 +53,14 @@ class Shifts:
 
 
 class Statics:
-    """The open mode's answer to constant sources."""
+    """The open mode's answer to constant sources.
 
-    def __init__(self, circuit: Circuit) -> None:
+    board : whose values count, or several in one (``Boards.stacked``); the nominal one if None.
+    """
+
+    def __init__(self, circuit: Circuit, board: Board | None = None) -> None:
         self.circuit = circuit
-        self._equations = NodalEquations(circuit, nominal_board(circuit))
+        self._equations = NodalEquations(circuit, board or nominal_board(circuit))
         self._nets = [net for net in circuit.nets if net not in circuit.generator_nets]
 
     @cached_property
@@ -71,9 +75,9 @@ class Statics:
         return tuple(map(self._shift, names, self._moved()))
 
     def _shift(self, clearance: str, moved: Array) -> Shifts:
-        """moved : of the displacement, by each section and each net."""
+        """moved : (..., sources) of the displacement, by each section and each net."""
         sections = [s.name for s in self.circuit.sections]
-        volts = moved.tolist()
+        volts = moved.tolist() if moved.ndim == 1 else list(np.moveaxis(moved, -1, 0))
         return Shifts(
             clearance,
             dict(zip(sections, volts, strict=False)),
@@ -88,33 +92,33 @@ class Statics:
         G, right = self._equations.of(key)
         sections = len(c.sections)
         count = sections + len(self._nets)
-        sources = np.zeros((len(G), count))
+        sources = np.zeros((*G.shape[:-1], count))
         for i, row in enumerate(self._section_rows()):
-            sources[row, i] = -1.0
+            sources[..., row, i] = -1.0
         for i, net in enumerate(self._nets, sections):
-            sources[c.nets.index(net), i] = 1.0
-        inputs = np.hstack([right[:, :n], sources, right[:, n + 1 :]])
+            sources[..., c.nets.index(net), i] = 1.0
+        inputs = np.concatenate([right[..., :n], sources, right[..., n + 1 :]], axis=-1)
         y = np.asarray(np.linalg.solve(G, inputs), dtype=np.float64)
         solved = self._equations.solution(y)
-        solved.voltage[GROUND] = np.zeros(y.shape[1])
         rates = self._equations.rates(key, solved)
         # Where each source holds the states, all else at zero.
-        states = np.asarray(-np.linalg.solve(rates[:, :n], rates[:, n:-1]), dtype=np.float64)
+        states = np.asarray(-np.linalg.solve(rates[..., :n], rates[..., n:-1]), dtype=np.float64)
         exits = self._equations.exits(key, solved)
         if not c.stops:
-            return [np.asarray(states[0])]
+            return [np.asarray(states[..., 0, :])]
         return [
             self._from_middle([e for e in exits if e.clearance == k], k, states)
-            / self._equations.per_state(k, solved)
+            / self._equations.per_state(k, solved)[..., None]
             for k in range(len(c.stops))
         ]
 
     def _from_middle(self, ways: Sequence[Exit], clearance: int, states: Array) -> Array:
-        """ways : into each contact of a clearance. states : (n, sources) displaced so far."""
-        n, moved = len(states), np.zeros(states.shape[1])
+        """ways : into each contact of a clearance. states : (..., n, sources) displaced so far."""
+        n, moved = states.shape[-2], np.zeros(1)
         for way in ways:
             side = self._equations.sides(way.target)[clearance]
-            moved += side * (way.row[:n] @ states + way.row[n:-1])
+            by_states = (way.row[..., None, :n] @ states)[..., 0, :]
+            moved = moved + side * (by_states + way.row[..., n:-1])
         return moved / len(ways)
 
     def _section_rows(self) -> list[int]:
@@ -136,12 +140,16 @@ def least_drive(model: MechanicalModel, responses: Sequence[ModelResponse]) -> f
 
 
 def forces(
-    circuit: Circuit, system: SecondOrderSystem, volts: Array, drive: float
+    circuit: Circuit,
+    system: SecondOrderSystem,
+    volts: Array,
+    drive: float,
+    board: Board | None = None,
 ) -> tuple[Shifts, ...]:
     """Disturbances as constant forces at each clearance, between its mass and the other or the
     ground, that shift it as far; as shares of ``drive``, a force in model units.
 
-    volts : (states,) per model unit.
+    volts : (..., states) per model unit. board : as of ``Statics``.
 
     Raises
     ------
@@ -151,11 +159,12 @@ def forces(
     rows = [(c.mass, system.displacement(c), system.push(c)) for c in zones]
     first = np.eye(system.size)[0]
     rows = rows or [(0, first, first)]
-    shifts = Statics(circuit).shifts
+    shifts = Statics(circuit, board).shifts
     out = []
     for (mass, row, push), shift in zip(rows, shifts, strict=True):
         compliance = abs(float(row @ np.linalg.solve(system.stiffness, push)))
-        out.append(shift.over(compliance * drive * float(volts[2 * mass])))
+        own = volts[..., 2 * mass]
+        out.append(shift.over(compliance * drive * (own if own.ndim else float(own))))
     return tuple(out)
 
 
@@ -165,7 +174,7 @@ def largest_offset(opamp: OpAmp) -> float:
     return figure.max if figure.max is not None else opamp.offset_limit
 
 
-def offset_forces(shifts: Shifts, limit: float) -> dict[str, float]:
+def offset_forces(shifts: Shifts, limit: float) -> dict[str, Any]:
     """By section, what an offset of ``limit`` [V] does; independent of each other."""
     return {name: abs(shift) * limit for name, shift in shifts.offset.items()}
 

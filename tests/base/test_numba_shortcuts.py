@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 from numba.core.codegen import JITCodeLibrary
 
 from designer.base import numba_shortcuts
+from designer.base.environment import python_command
 from designer.base.jit import OPTIONS, callee
 
 REFUSAL = "a negative number has no root here"
@@ -76,3 +79,21 @@ def test_an_untested_release_of_numba_goes_its_usual_way(monkeypatch: pytest.Mon
     monkeypatch.setattr(numba, "__version__", "9.9.9")
     assert not numba_shortcuts.install()
     assert JITCodeLibrary.finalize is finalize
+
+
+def test_a_stored_kernel_is_loaded_without_what_only_a_compiler_needs() -> None:
+    script = textwrap.dedent(
+        """
+        import sys
+        import numpy as np
+        from designer.kernels.kernel_algebra import rows_of_terms
+
+        out = np.zeros((2, 2))
+        rows_of_terms(np.array([1.0, 2.0]), np.arange(8.0).reshape(2, 2, 2), out)
+        print("numba.np.npyimpl" in sys.modules, out.tolist())
+        """
+    )
+    command = python_command("-c", script)
+    said = [subprocess.run(command, check=True, capture_output=True, text=True) for _ in range(2)]
+    # Whatever the first has to compile, the second finds.
+    assert said[1].stdout == f"False {[[4.0, 7.0], [16.0, 19.0]]}\n"
