@@ -31,7 +31,6 @@ from designer.dynamics.lyapunov_exponent import (
 from designer.dynamics.orbit import SURE, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.quasi_periodic import DRIFT, closed_curve, frequencies
-from designer.dynamics.sobol_points import sobol
 from designer.dynamics.step_budget import Budget
 from designer.kernels.kernel_orbit import (
     CHAOS,
@@ -419,7 +418,9 @@ def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
 def starts(scale: Array, count: int, seed: int = 0, first: Array | None = None) -> Array:
     """(count, n) initial states: rest, or ``first``, then a scrambled Sobol set in the box
     ± scale."""
-    box = sobol(len(scale), max(1, 1 << (count - 1).bit_length()), seed)
+    from scipy.stats import qmc
+
+    box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
     rest = np.zeros(len(scale)) if first is None else first
     return np.vstack([rest, scale * (2.0 * box - 1.0)])[:count]
 
