@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,7 @@ from designer.verbs.tables import design_written, not_good_enough, synthesised
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
+    from designer.jobs.options import Options
     from designer.model.model_file import ModelFile
 
 
@@ -47,14 +49,30 @@ def synthesise(
         something else.
     ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     """
-    from designer.folders.model_source import source
-    from designer.jobs import synthesise_job, usual_times
-    from designer.jobs.open_design import design_file
     from designer.jobs.options import Options
-    from designer.model.model_file import ModelFile, read_model_file
+    from designer.jobs.writing_process import writing_process
 
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     options.check()
+    with writing_process(options.workers) if out is not None else nullcontext():
+        return _synthesise(model, out, options, catalog, progress, shown, compare=compare)
+
+
+def _synthesise(
+    model: Source,
+    out: Out,
+    options: Options,
+    catalog: Catalog | None,
+    progress: Progress | None,
+    shown: Show,
+    *,
+    compare: bool,
+) -> JobOutcome:
+    from designer.folders.model_source import source
+    from designer.jobs import synthesise_job, usual_times
+    from designer.jobs.open_design import design_file
+    from designer.model.model_file import ModelFile, read_model_file
+
     progress = Progress() if progress is None else progress
     in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
     if out is None and in_memory:
