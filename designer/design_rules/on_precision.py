@@ -9,8 +9,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.circuit.netlist import Diode
-from designer.design_rules.rule_subject import Look, RuleSubject
-from designer.synthesis.static_shifts import (
+from designer.circuit.static_shifts import (
     Shifts,
     far_slope as far_slope_of,
     largest_offset,
@@ -18,6 +17,7 @@ from designer.synthesis.static_shifts import (
     offset_forces,
     thermal,
 )
+from designer.design_rules.rule_subject import Look, RuleSubject
 
 INSULATION = 1e9
 """Ohm between a node and a rail across the board."""

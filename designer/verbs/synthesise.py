@@ -18,7 +18,6 @@ from designer.verbs.tables import design_written, not_good_enough, synthesised
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
-    from designer.jobs.options import Options
     from designer.model.model_file import ModelFile
 
 
@@ -55,39 +54,26 @@ def synthesise(
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     options.check()
     with writing_process(options.workers) if out is not None else nullcontext():
-        return _synthesise(model, out, options, catalog, progress, shown, compare=compare)
+        from designer.folders.model_source import source
+        from designer.jobs import synthesise_job, usual_times
+        from designer.jobs.open_design import design_file
+        from designer.model.model_file import ModelFile, read_model_file
 
-
-def _synthesise(
-    model: Source,
-    out: Out,
-    options: Options,
-    catalog: Catalog | None,
-    progress: Progress | None,
-    shown: Show,
-    *,
-    compare: bool,
-) -> JobOutcome:
-    from designer.folders.model_source import source
-    from designer.jobs import synthesise_job, usual_times
-    from designer.jobs.open_design import design_file
-    from designer.model.model_file import ModelFile, read_model_file
-
-    progress = Progress() if progress is None else progress
-    in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
-    if out is None and in_memory:
-        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+        progress = Progress() if progress is None else progress
+        in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
+        if out is None and in_memory:
+            modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+            _check_comparable(modelfile, compare)
+            return synthesise_job.synthesise_in_memory(
+                modelfile, catalog, compare, options.workers, progress
+            )
+        modelfile, folder = source(model, out)
         _check_comparable(modelfile, compare)
-        return synthesise_job.synthesise_in_memory(
-            modelfile, catalog, compare, options.workers, progress
-        )
-    modelfile, folder = source(model, out)
-    _check_comparable(modelfile, compare)
-    with progress.whole(usual_times.of_design(modelfile)):
-        modelfile = design_file(modelfile, folder, options, progress)
-        return synthesise_job.synthesise_into(
-            modelfile, folder, options, progress, shown, compare=compare
-        )
+        with progress.whole(usual_times.of_design(modelfile)):
+            modelfile = design_file(modelfile, folder, options, progress)
+            return synthesise_job.synthesise_into(
+                modelfile, folder, options, progress, shown, compare=compare
+            )
 
 
 def _check_comparable(modelfile: ModelFile, compare: bool) -> None:
