@@ -145,7 +145,8 @@ def reached_by(verb: str) -> set[str]:
         for node in trees()[module].body
         if isinstance(node, ast.FunctionDef) and node.name == verb
     )
-    blocks = [function, *(node for node in function.body if isinstance(node, ast.With))]
+    withs = (node for node in function.body if isinstance(node, ast.With))
+    blocks: list[ast.FunctionDef | ast.With] = [function, *withs]
     nodes = [node for block in blocks for node in block.body]
     lines = {node.lineno for node in nodes if isinstance(node, ast.ImportFrom)}
     found = reached(module)
