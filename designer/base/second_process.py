@@ -14,12 +14,15 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, BinaryIO, TypeVar
 
 from designer.base.environment import python_command
 
 Result = TypeVar("Result")
 Ask = Callable[..., Callable[[], Any]]
+_asked: ContextVar[Ask | None] = ContextVar("asked", default=None)
+"""The process whose block this is."""
 CALL = "from designer.base.second_process import serve; serve({modules!r})"
 
 
@@ -75,14 +78,21 @@ class OtherProcess:
 @contextmanager
 def other_process(jobs: int, *modules: str) -> Iterator[Ask]:
     """Asks another process where there is a core for it; with one job the function is called here,
-    when its result is asked for. It ends with the block."""
+    when its result is asked for. It ends with the block; within the block of another one that is
+    asked, and no further one is started."""
     if jobs < 2:
         yield lambda function, *arguments: lambda: function(*arguments)
         return
+    known = _asked.get()
+    if known is not None:
+        yield known
+        return
     other = OtherProcess(modules)
+    token = _asked.set(other)
     try:
         yield other
     finally:
+        _asked.reset(token)
         other.close()
 
 

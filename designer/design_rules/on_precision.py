@@ -10,8 +10,7 @@ from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding, value_text
 from designer.catalog.design_rules import BY_ID
 from designer.circuit.netlist import Diode
-from designer.design_rules.rule_subject import Look, RuleSubject
-from designer.synthesis.static_shifts import (
+from designer.circuit.static_shifts import (
     Shifts,
     far_slope as far_slope_of,
     largest_offset,
@@ -19,6 +18,7 @@ from designer.synthesis.static_shifts import (
     offset_forces,
     thermal,
 )
+from designer.design_rules.rule_subject import Look, RuleSubject
 
 INSULATION = 1e9
 """Ohm between a node and a rail across the board."""

@@ -21,11 +21,11 @@ from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
+from designer.circuit.static_shifts import Shifts, forces, least_drive
 from designer.model.find_responses import ModelResponse, peaks
 from designer.synthesis import output_loads
 from designer.synthesis.operating_point import Operating, merged, operating, stuck
 from designer.synthesis.output_loads import Run
-from designer.synthesis.static_shifts import Shifts, forces, least_drive
 
 
 @dataclass(frozen=True)

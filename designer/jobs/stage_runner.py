@@ -16,7 +16,7 @@ from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import plain
 from designer.base.progress import Progress, Show, quiet
-from designer.base.second_process import Ask, other_process
+from designer.base.second_process import Ask
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
@@ -29,10 +29,8 @@ from designer.folders.design_source import (
 )
 from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.options import Options
+from designer.jobs.writing_process import writing_process
 from designer.model.model_file import ModelFile, errors_in
-
-WRITING = "designer.schematic.schematic_drawing", "designer.folders.board_files"
-"""Modules that are imported while the parts are chosen, and needed once they stand."""
 
 
 class StageRunner:
@@ -99,7 +97,7 @@ class StageRunner:
                 compiling_ahead(
                     self.options.jobs or cores(), self.modelfile.model.second_order()
                 ) as compiled,
-                other_process(jobs, *WRITING) as other,
+                writing_process(jobs) as other,
             ):
                 synthesis = stage_choice.synthesise(
                     self.modelfile, self.catalog, jobs=jobs, other=other if jobs > 1 else None

@@ -27,6 +27,7 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import half_parts
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.nominal import circuit_flow, nominal_reduction
+from designer.circuit.static_shifts import least_drive
 from designer.dynamics.attractors import settle
 from designer.dynamics.step_budget import Budget
 from designer.linear_network import linear_search
@@ -49,7 +50,6 @@ from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
 from designer.synthesis.part_checks import check_choices
 from designer.synthesis.scale_box import Conflict
 from designer.synthesis.scale_choice import ScaleAttempt, ScaleChoice
-from designer.synthesis.static_shifts import least_drive
 
 EVERY: dict[Kind, tuple[float, float]] = {"resistor": (1e-2, 1e10), "capacitor": (1e-14, 1.0)}
 """A range that holds every value which is sold [ohm, F]."""

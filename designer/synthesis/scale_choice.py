@@ -25,6 +25,7 @@ from designer.catalog.design_rules import BY_ID
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.netlist import Circuit
 from designer.circuit.scale_fit import LargestFit
+from designer.circuit.static_shifts import forces, largest_offset, offset_forces
 from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.attempt import BASE, Attempt, Order, attempt, completed
 from designer.synthesis.dead_zone_target import DeadZone
@@ -32,7 +33,6 @@ from designer.synthesis.kernel_rounding import Rounding, descend
 from designer.synthesis.limits import GENERATOR_PEAK, ConditionLimits
 from designer.synthesis.scale_box import Conflict, ScaleBox
 from designer.synthesis.scale_program import Affine, LinearBound, ScaleProgram, StatedLimit
-from designer.synthesis.static_shifts import forces, largest_offset, offset_forces
 
 NEAR, FAR = (0.05, 0.2), (0.7, 6.0)
 """Of the logarithm of the thresholds: how far below their best the points lie, in turn; further

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,29 +48,32 @@ def synthesise(
         something else.
     ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     """
-    from designer.folders.model_source import source
-    from designer.jobs import synthesise_job, usual_times
-    from designer.jobs.open_design import design_file
     from designer.jobs.options import Options
-    from designer.model.model_file import ModelFile, read_model_file
+    from designer.jobs.writing_process import writing_process
 
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     options.check()
-    progress = Progress() if progress is None else progress
-    in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
-    if out is None and in_memory:
-        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+    with writing_process(options.workers) if out is not None else nullcontext():
+        from designer.folders.model_source import source
+        from designer.jobs import synthesise_job, usual_times
+        from designer.jobs.open_design import design_file
+        from designer.model.model_file import ModelFile, read_model_file
+
+        progress = Progress() if progress is None else progress
+        in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
+        if out is None and in_memory:
+            modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
+            _check_comparable(modelfile, compare)
+            return synthesise_job.synthesise_in_memory(
+                modelfile, catalog, compare, options.workers, progress
+            )
+        modelfile, folder = source(model, out)
         _check_comparable(modelfile, compare)
-        return synthesise_job.synthesise_in_memory(
-            modelfile, catalog, compare, options.workers, progress
-        )
-    modelfile, folder = source(model, out)
-    _check_comparable(modelfile, compare)
-    with progress.whole(usual_times.of_design(modelfile)):
-        modelfile = design_file(modelfile, folder, options, progress)
-        return synthesise_job.synthesise_into(
-            modelfile, folder, options, progress, shown, compare=compare
-        )
+        with progress.whole(usual_times.of_design(modelfile)):
+            modelfile = design_file(modelfile, folder, options, progress)
+            return synthesise_job.synthesise_into(
+                modelfile, folder, options, progress, shown, compare=compare
+            )
 
 
 def _check_comparable(modelfile: ModelFile, compare: bool) -> None:

@@ -68,3 +68,13 @@ def test_no_module_of_the_working_directory_is_taken(
     monkeypatch.chdir(tmp_path)
     with other_process(2) as other:
         assert other(os.getpid)() != HERE
+
+
+def test_a_block_within_the_block_of_another_asks_that() -> None:
+    with other_process(2) as other:
+        there = other(os.getpid)()
+        with other_process(2, "no.such.module") as again:
+            assert again(os.getpid)() == there
+        assert other(os.getpid)() == there
+    with other_process(2) as other:
+        assert other(os.getpid)() not in (HERE, there)

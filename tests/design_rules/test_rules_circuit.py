@@ -17,6 +17,7 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode
 from designer.circuit.nodal import NodalEquations
 from designer.circuit.reduction import Reduction
+from designer.circuit.static_shifts import Statics, forces, leftovers, thermal
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
@@ -26,7 +27,6 @@ from designer.synthesis import output_loads
 from designer.synthesis.operating_point import _into, operating, stuck
 from designer.synthesis.output_loads import Run
 from designer.synthesis.side_conditions import guaranteed_swing
-from designer.synthesis.static_shifts import Statics, forces, leftovers, thermal
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
 from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text

@@ -137,15 +137,18 @@ def reached(start: str) -> set[str]:
 
 
 def reached_by(verb: str) -> set[str]:
-    """The modules that a verb imports whenever it is called: those at the top of its module and of
-    its function, with all that they import."""
+    """The modules that a verb imports whenever it is called: those at the top of its module, of its
+    function and of its with blocks, with all that they import."""
     module = f"verbs.{verb}"
     (function,) = (
         node
         for node in trees()[module].body
         if isinstance(node, ast.FunctionDef) and node.name == verb
     )
-    lines = {node.lineno for node in function.body if isinstance(node, ast.ImportFrom)}
+    withs = (node for node in function.body if isinstance(node, ast.With))
+    blocks: list[ast.FunctionDef | ast.With] = [function, *withs]
+    nodes = [node for block in blocks for node in block.body]
+    lines = {node.lineno for node in nodes if isinstance(node, ast.ImportFrom)}
     found = reached(module)
     for each in imports():
         if each.importer == module and each.line in lines:

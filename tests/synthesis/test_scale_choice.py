@@ -16,6 +16,7 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Design
 from designer.circuit.noise_gains import stages
+from designer.circuit.static_shifts import forces, least_drive
 from designer.linear_network.linear_search import lower_bound
 from designer.linear_network.linear_terms import Bounds, LinearQuestion, Targets
 from designer.model.circuit_table import CircuitSpec
@@ -34,7 +35,6 @@ from designer.synthesis.scale_program import (
     ScaleProgram,
     StatedLimit,
 )
-from designer.synthesis.static_shifts import forces, least_drive
 from tests.shared.system_text import clearance, system_text, table
 from tests.shared.term_enumeration import everything
 
