@@ -24,7 +24,7 @@ import numpy as np
 from designer.base.proportion import wilson
 from designer.base.threads import parallel
 from designer.circuit.board_arrays import Boards
-from designer.circuit.ensemble import Ensemble
+from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
 from designer.verdicts.exact_circuit import Case, settled
@@ -269,6 +269,12 @@ def replay(
     return [_attributed(i, extent.changes, verdicts) for i in range(len(plan.questions))], cut
 
 
+def trial_of(plan: StudyPlan) -> int | None:
+    """Steps that a board may take to settle that is asked again (``Ensemble.respond``); None where
+    a motion without a period is wanted, which has to be watched."""
+    return BRIEF if all(question.periodic for question in plan.questions) else None
+
+
 def _all(
     plan: StudyPlan,
     extent: Extent,
@@ -306,9 +312,11 @@ def _some(
     boards = extent.boards.take(samples)
     pairs = [(samples.index(r.sample), plan.questions[r.question]) for r in replays]
     cases: list[Case] = [(board, q, q.excitation, q.start.start) for board, q in pairs]
+    within = trial_of(plan)
 
     def one(change: _Change) -> list[Verdict]:
-        rows = settled(Ensemble(change.of(boards)), cases, progress=progress)
+        ensemble = Ensemble(change.of(boards))
+        rows = settled(ensemble, cases, progress=progress, within=within)
         return [verdict for _, verdict, _ in rows]
 
     return list(parallel(one, extent.changes, jobs))

@@ -15,6 +15,7 @@ SHOWN: dict[str, Any] = {
     "agreement": {"asked": 20, "agreed": 20, "undecided": 0},
 }
 ROW: dict[str, Any] = {
+    "commit": "0d3f48e3",
     "number": 3,
     "masses": 1,
     "clearances": 1,
@@ -43,12 +44,16 @@ def test_what_is_wrong_is_listed_by_cause() -> None:
         "rule swing fails",
         "connections stay open",
     ]
-    silent = {key: ROW[key] for key in ("number", "masses", "clearances", "kinds", "size")}
+    blamed = ROW | {"exit": -24}
+    assert list(bench_stranger_runs.causes(blamed)) == ["blame has no end within 900 s of CPU"]
+    told = ("commit", "number", "masses", "clearances", "kinds", "size")
+    silent = {key: ROW[key] for key in told}
     silent |= {"exit": -24, "cpu": 901.0, "wall": 600.0, "said": "…"}
     assert list(bench_stranger_runs.causes(silent)) == ["no end within 900 s of CPU"]
-    rows = [ROW, bad, silent]
+    rows = [ROW, bad, silent, blamed]
     found = bench_stranger_runs.figures(rows, [ROW])
-    assert (found["runs"], found["whole"], found["shown"], found["boards_routed"]) == (3, 2, 1, 1)
+    assert (found["runs"], found["whole"], found["shown"], found["boards_routed"]) == (4, 2, 2, 2)
+    assert found["yield_stated"] == 3
     assert (found["reached"], found["in_time"]) == (1, 1)
     text = bench_stranger_runs.report(rows, [], 1)
     assert "| no end within 900 s of CPU " in text

@@ -14,16 +14,18 @@ from scipy.stats import sobol_indices, uniform
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
+from designer.circuit.ensemble import BRIEF
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.continued_orbit import Function, follow, functions
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import OrbitStatus
 from designer.model.distributions import Uniform
 from designer.model.response_table import Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
-from designer.verdicts.exact_circuit import block
+from designer.verdicts.exact_circuit import block, settled
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields import loss_replay
 from designer.yields.loss_attribution import NOTHING_LOST, Attribution, attribute
@@ -278,6 +280,27 @@ def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
             orbit = settle(flow, question.start.start)
             avoided += judge(orbit, question.spec, question.start)[0] is Verdict.OK
         assert next(s for s in found.subjects if s.name == name).avoided == avoided
+
+
+def test_a_board_that_is_replayed_may_take_no_longer_than_a_trial(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """But for a motion without a period, which is known only once it was watched."""
+    given: list[int | None] = []
+
+    def listened(*asked: Any, within: int | None, **more: Any) -> Any:
+        given.append(within)
+        return settled(*asked, within=within, **more)
+
+    monkeypatch.setattr(loss_replay, "settled", listened)
+    study, rows = plan(2, "offsets"), answers(2, "offsets")
+    chaotic = replace(study.questions[0], spec=Response(omega=1.0, expect=OrbitStatus.APERIODIC))
+    for asked, steps in ((study, BRIEF), (replace(study, questions=(chaotic,)), None)):
+        extent = extent_of(asked, rows, 1)
+        loss_replay.replay(asked, extent, StoredParts(), 2, lambda: None)
+        assert len(given) == len(extent.changes)
+        assert set(given) == {steps}
+        given.clear()
 
 
 def test_the_margin_foretells_boards_it_has_not_seen() -> None:
