@@ -31,8 +31,6 @@ from tests.shared.mechanism_file import mechanism_of
 from tests.shared.mechanisms import absolute
 from tests.shared.system_text import clearance, system_text, table
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 QUICK = TransientSettings(200, 16, 400)
 TIP = 3e-4
 """Of a gap: how much wider and narrower a stop is set to see whether a tip touches it."""

@@ -28,8 +28,6 @@ from designer.yields.margins import Limit, Margin
 from designer.yields.yield_count import Yield
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 BAND = 0.05
 OTHER_SEED = 4242
 

@@ -21,8 +21,6 @@ from designer.model.find_responses import scale_of
 from designer.model.model import Dimensionless
 from tests.shared.model_text import dimensionless
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 SI = """format = 1
 [mechanical]
 M1 = 0.12

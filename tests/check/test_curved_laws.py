@@ -21,8 +21,6 @@ from designer.verbs.bifurcation import show
 from designer.verbs.simulate import tables
 from tests.shared.system_text import table
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 OMEGA, DAMPING, FORCE = 1.4, 0.2, 1.0
 LINEAR = FORCE / math.hypot(1.0 - OMEGA**2, DAMPING * OMEGA)
 

@@ -42,8 +42,6 @@ from designer.yields.study import trust_of_yield
 from designer.yields.yield_count import Yield
 from tests.shared.model_text import SMALL
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 STIFFEST = 1.0 - 2.0**-52
 """The stiffest stop but one that a double can ask for: one impact excites 7e7 of the frequency."""
 DAMPED = Problem(0.9, k0=0.999, zeta=0.2, b=0.5, lower=False)

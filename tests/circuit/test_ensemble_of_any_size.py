@@ -24,8 +24,6 @@ from designer.yields.study import plan_study
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.system_text import clearance, system_text, table
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 STIFFNESS = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 SYSTEM = SecondOrderSystem(
     mass=np.ones(3),

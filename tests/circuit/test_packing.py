@@ -31,7 +31,7 @@ from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import CATALOG, bought, one_sided, rectifier, stage
 from tests.shared.system_text import table
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
 QUAD, DUAL, SINGLE = (CATALOG.opamp(name) for name in ("TL074C", "TL072C", "TL071C"))
 TRIPLE = replace(QUAD, name="three", pins=QUAD.pins[:3])

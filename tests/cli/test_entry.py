@@ -32,8 +32,6 @@ from designer.verdicts.cross_check import OWN_SAMPLES
 from tests.shared.folder_contents import without_cost
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 ROOT = Path(__file__).resolve().parents[2]
 HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [bold] ${HOME}"
 BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'

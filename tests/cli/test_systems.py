@@ -14,8 +14,6 @@ from scipy.integrate import solve_ivp
 from designer.cli import entry
 from tests.shared.system_text import clearance, system_text, table
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 Captured = pytest.CaptureFixture[str]
 
 SHAKEN = system_text(

@@ -24,8 +24,6 @@ from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import PAPER_TABLE
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 ENOUGH = 300_000
 

@@ -26,8 +26,6 @@ from designer.yields.study_identity import study_hash
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.verdicts.test_verdict import nothing, plan
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 ROOT = Path(__file__).resolve().parents[2]
 LOCAL: Any = distributed.LocalCluster
 

@@ -17,8 +17,6 @@ from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import SMALL
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 STUDY = {"samples": 50, "seed": 7, "until": 0.1, "layers": ["samples"]}
 
 

@@ -19,8 +19,6 @@ from designer.model.model_file import parse_model_file, read_model_file
 from designer.verbs.new import new
 from tests.shared.model_text import PAPER_TABLE, dimensionless
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 SHARES = st.floats(0.01, 0.99)

@@ -16,8 +16,6 @@ from tests.circuit.test_reduction import EXACT
 from tests.shared.stages import bought, stage
 from tests.spread.test_spread_model import CATALOG, PAPER
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 ROOT = Path(__file__).resolve().parents[2]
 SOLD = stage("saturation", "both", bought(EXACT))
 

@@ -30,8 +30,6 @@ from designer.plots import bifurcation_plots, captions, point_captions, titles
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.figure_text import clipped, overlapping
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 QUICK = TransientSettings(40, 16, 400)
 ONE_STOP = """
 format = 2

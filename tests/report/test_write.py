@@ -51,8 +51,6 @@ from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed, plain_report
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}
 

@@ -45,6 +45,16 @@ SMALLER = {
     "--samples 100 --out out/rig": "--samples 4 --out out/rig",
     "--omega 1.0 --plots": "--omega 1.0 --starts 2 --plots",
     "--shares 200": "--shares 20",
+    # how many starts lead where is asked in tests/check/test_coexistence.py
+    **{
+        f"simulate {what}": f"simulate {what} --starts 2"
+        for what in (
+            "gap.toml",
+            "examples/paper.toml --omega 1.55 --omega 0.85",
+            "examples/rig.toml",
+        )
+    },
+    "--omega 0.3 --plots out/dry-friction": "--omega 0.3 --starts 2 --plots out/dry-friction",
     # the boards of pages that are routed and asked in ngspice are the paper's and the rig's
     **{
         f"run examples/{name}.toml": f"synthesise examples/{name}.toml"
@@ -58,7 +68,7 @@ SMALLER = {
     "run examples/two-wells-chaos.toml --out out/chaos": (
         "simulate examples/two-wells-chaos.toml --starts 2"
     ),
-    "run examples/gears.toml --out out/gears": "simulate examples/gears.toml",
+    "run examples/gears.toml --out out/gears": "simulate examples/gears.toml --starts 2",
 }
 FILLED = {
     # what a page leaves open, by the command: what a reader would write

@@ -28,7 +28,7 @@ from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
 from tests.shared.rule_cases import generic
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-HARDEST = "through-hole", "SMA jacks", "BNC jacks", "singles", "duals on the surface", "four masses"
+HARDEST = "through-hole", "BNC jacks", "singles", "duals on the surface", "four masses"
 """Cases that ask most of the router: everything in holes, the largest pads, the most packages, the
 narrowest pads, the largest board. The others are a few parts of these more or less; what is theirs
 alone is in their nets, which ``tests/schematic/test_kicad_cli.py`` has of every case."""

@@ -13,8 +13,6 @@ from designer.cli import entry
 from designer.spice import batch_backend
 from designer.spice.batch_backend import program_version
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 VERSION = "case $* in *--version*) echo '** ngspice-46 : Circuit level simulation'; exit;; esac\n"
 RAW = (
     b"Title: t\nDate: today\nPlotname: Transient Analysis\nFlags: real\n"

@@ -17,8 +17,6 @@ from designer.model.model_file import read_model_file
 from designer.spice import twin_runs
 from designer.spice.pool import SpicePool
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 CHAOS = Path(__file__).parents[2] / "examples" / "two-wells-chaos.toml"
 
 

@@ -23,7 +23,7 @@ from tests.shared.simulated_scope import SimulatedScope
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SEED, SAMPLE = 31, 1
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("designs_are_made_once")]
+pytestmark = pytest.mark.slow
 
 
 def recorded(run: BoardRun, prediction: BoardPrediction, nets: Sequence[str]) -> NamedMotion:

@@ -22,8 +22,6 @@ from designer.workbench.record import Record
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 
-pytestmark = pytest.mark.usefixtures("designs_are_made_once")
-
 ROOT = Path(__file__).resolve().parents[2]
 CHANNELS = {"v1": "CH1", "fv": "CH2"}
 STOPLESS = f'format = 1\ntitle = "x"\n{PAPER_TABLE.replace("k0 = 0.95", "k0 = 0.0")}'
