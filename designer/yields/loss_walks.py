@@ -20,7 +20,7 @@ BOARDS = 48
 """Boards of a walk."""
 MOVES = 2
 """Moves of each board at a width."""
-LAST_MOVES, KEPT = 240, 20
+LAST_MOVES, KEPT = 120, 20
 """Moves at the last width, and between two of which the boards are kept."""
 FEWEST_APART, MOST_APART = 0.08, 0.5
 """Independent boards for each that is kept, at least and at most: copies have much in common."""
