@@ -127,3 +127,19 @@ def test_an_exponent_that_does_not_tell_is_measured_longer_unless_periods_are_co
     case = (0, question, asked.excitation, asked.start.start)
     ((_, verdict, _),) = exact_circuit.settled(ensemble, [case], within=within)
     assert verdict is shown
+
+
+def test_what_ngspice_is_given_is_the_board_of_the_answer() -> None:
+    """Of samples that do not begin with the first: each is the reduction of its own draw."""
+    p = plan()
+    pairs = exact_circuit.subjects(p, range(3, 5), 1)
+    assert [(answer.sample, answer.question) for answer, _ in pairs] == [
+        (3, 0), (3, 1), (4, 0), (4, 1)
+    ]  # fmt: skip
+    for answer, subject in pairs:
+        assert subject is not None
+        alone = Reduction(p.circuit, draw(p.circuit, p.spread, p.seed, answer.sample)).system()
+        shown = subject.system.mode(subject.system.start)
+        np.testing.assert_allclose(shown.A, alone.mode(alone.start).A, rtol=1e-12)
+        assert subject.excitation == p.questions[answer.question].excitation
+        assert subject.orbit.response == answer.response
