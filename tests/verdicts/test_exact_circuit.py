@@ -15,10 +15,13 @@ from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.kernels.kernel_boards import POINTS
+from designer.model.response_table import Response
 from designer.spread.spread import draw, draw_many
 from designer.verdicts import exact_circuit
+from designer.verdicts.verdict import Question, Verdict
 from tests.circuit.test_ensemble import FEW, STAGES, nominal
 from tests.verdicts.test_verdict import plan
 
@@ -102,3 +105,41 @@ def test_boards_with_bandwidth_are_judged_as_each_alone() -> None:
         assert answer.verdict is asked.questions[answer.question].judge(orbit)[0]
         assert answer.radius == pytest.approx(orbit.radius, abs=1e-8)
     assert all(a.radius != b.radius for a, b in zip(answers, without, strict=True))
+
+
+@pytest.mark.parametrize(("within", "shown"), [(None, Verdict.LOST), (9, Verdict.FAILED)])
+def test_an_exponent_that_does_not_tell_is_measured_longer_unless_periods_are_counted(
+    monkeypatch: pytest.MonkeyPatch, within: int | None, shown: Verdict
+) -> None:
+    """At least 0.2 is wanted. 0.18 ± 0.05 may be that, 0.18 ± 0.001 is not."""
+    asked = plan().questions[0]
+    spec = Response(1.55, OrbitStatus.APERIODIC, least_exponent=0.2)
+    seconds = asked.excitation.seconds(1.55)
+    rough = replace(failed(""), status=OrbitStatus.APERIODIC, lyapunov=0.18 / seconds)
+    rough = replace(rough, lyapunov_error=0.05 / seconds)
+    fine = replace(rough, lyapunov_error=0.001 / seconds)
+    ensemble = Ensemble(draw_many(plan().circuit, plan().spread, 1, range(1)))
+    monkeypatch.setattr(ensemble, "settle", lambda *_, **__: [rough])
+    monkeypatch.setattr(exact_circuit, "with_exponent", lambda *_: fine)
+    question = Question(
+        spec, asked.excitation, replace(asked.start, status=OrbitStatus.APERIODIC), None
+    )
+    case = (0, question, asked.excitation, asked.start.start)
+    ((_, verdict, _),) = exact_circuit.settled(ensemble, [case], within=within)
+    assert verdict is shown
+
+
+def test_what_ngspice_is_given_is_the_board_of_the_answer() -> None:
+    """Of samples that do not begin with the first: each is the reduction of its own draw."""
+    p = plan()
+    pairs = exact_circuit.subjects(p, range(3, 5), 1)
+    assert [(answer.sample, answer.question) for answer, _ in pairs] == [
+        (3, 0), (3, 1), (4, 0), (4, 1)
+    ]  # fmt: skip
+    for answer, subject in pairs:
+        assert subject is not None
+        alone = Reduction(p.circuit, draw(p.circuit, p.spread, p.seed, answer.sample)).system()
+        shown = subject.system.mode(subject.system.start)
+        np.testing.assert_allclose(shown.A, alone.mode(alone.start).A, rtol=1e-12)
+        assert subject.excitation == p.questions[answer.question].excitation
+        assert subject.orbit.response == answer.response
