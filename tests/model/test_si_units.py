@@ -375,8 +375,8 @@ def studied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = model.parent / "out"
     with pytest.MonkeyPatch.context() as patched:
         without_starts(patched)
-        words = ("tolerance", model, "--out", out, "--rung", "exact", "--samples", "4")
-        words += "--no-blame", "-q"
+        words = ["tolerance", model, "--out", out, "--rung", "exact", "--samples", "4"]
+        words += ["--no-blame", "-q"]
         assert entry.status([str(word) for word in words]) == 0
     return out
 
