@@ -21,6 +21,7 @@ from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.steady_state import TransientSettings
+from designer.folders import sweep_store
 from designer.folders.curve_store import CurveBlocks
 from designer.folders.share_store import ShareBlocks
 from designer.folders.sweep_store import GridStore, SweepStore
@@ -259,6 +260,15 @@ def test_blocks_have_the_columns_of_earlier_versions(made: Any) -> None:
         (folder / work.path).write_bytes(content)
         schema = pq.read_schema(folder / work.path)
         assert ", ".join(f"{column.name}: {column.type}" for column in schema) == work.columns
+
+
+def test_blocks_of_earlier_rules_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By those up to 3, states beside fixed stops were counted from the base."""
+    codes = {sweep_store.work_hash(SWEEP.as_dict())}
+    for rules in range(1, 4):
+        monkeypatch.setattr(sweep_store, "RULES", rules)
+        codes.add(sweep_store.work_hash(SWEEP.as_dict()))
+    assert len(codes) == 4
 
 
 def test_what_is_no_record_is_damage(made: Any) -> None:
