@@ -12,7 +12,7 @@ import pytest
 
 from designer.bifurcations import basin_shares, border_curves, parameter_map, sweep
 from designer.bifurcations.basin_shares import SharePlan
-from designer.bifurcations.border_curve import BorderCurve, CurveMeeting
+from designer.bifurcations.border_curve import BorderCurve, CurveMeeting, read_curve
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.curve_switch import OtherCurve
 from designer.bifurcations.grazing_contact import GrazingContact
@@ -269,6 +269,14 @@ def test_blocks_of_earlier_rules_are_left(monkeypatch: pytest.MonkeyPatch) -> No
         monkeypatch.setattr(sweep_store, "RULES", rules)
         codes.add(sweep_store.work_hash(SWEEP.as_dict()))
     assert len(codes) == 4
+
+
+def test_keys_of_a_curve_that_nobody_knows_are_left() -> None:
+    row: Any = CURVE.as_dict()
+    met = row["codimension_two"][0]
+    for each in (row, met, met["other"], met["other"]["touch"]):
+        each["since"] = 2
+    assert read_curve(row).as_dict() == CURVE.as_dict()
 
 
 def test_what_is_no_record_is_damage(made: Any) -> None:
