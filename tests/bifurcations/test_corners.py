@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from designer.bifurcations.branch_survey import survey
+from designer.bifurcations.conditions import grazings
 from designer.bifurcations.plane_curves import PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import all_windows
@@ -93,6 +94,22 @@ def test_the_curve_of_a_corner_over_two_parameters() -> None:
     for omega, amplitude in curve.values:
         assert amplitude == pytest.approx(amplitude_at_corner(omega), rel=1e-7)
     assert curve.codimension_two == ()
+
+
+def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:
+    """The largest and the least displacement, half a period apart: whichever half of the orbit the
+    followed one is in, the other is no second touch."""
+    flow = subject(STIFFENING, 0.0, 1.4, 1.0).family("omega").flow(1.4)
+    assert [corner.corner for corner in flow.system.corners] == ["F at 1", "F at -1"]
+    start = settle(flow, np.zeros(2)).start
+    every = grazings(flow, start, 1, corners=True)
+    tips = [(each, phase) for each, phase in every if each.contact.tip]
+    assert sorted(each.contact.clearance for each, _ in tips) == [0, 1]
+    assert abs(tips[0][1] - tips[1][1]) == pytest.approx(0.5, abs=1e-9)
+    for own in tips:
+        for symmetric in (True, False):
+            others = grazings(flow, start, 1, own, symmetric=symmetric, corners=True)
+            assert not any(each.contact.tip for each, _ in others)
 
 
 def test_pieces_of_a_curve_have_no_corners() -> None:
