@@ -7,7 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 
+from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.conditions import grazings
 from designer.bifurcations.plane_curves import PlaneWindow, continued
@@ -94,6 +97,72 @@ def test_the_curve_of_a_corner_over_two_parameters() -> None:
     for omega, amplitude in curve.values:
         assert amplitude == pytest.approx(amplitude_at_corner(omega), rel=1e-7)
     assert curve.codimension_two == ()
+
+
+def test_a_fold_on_the_curve_of_a_corner() -> None:
+    """A spring that hardens past ± 1, and once more past ± 2: twice a motion that just comes to 2
+    has a multiplier 1, by another integrator."""
+    points = [[-3.0, -5.5], [-2.0, -3.0], [-1.0, -1.0], [1.0, 1.0], [2.0, 3.0], [3.0, 5.5]]
+    hard = table("law", name="F", between=list(JOINT), points=points)
+    over = subject(hard, 0.0, 1.0, 0.8)
+    family = over.family("omega")
+    orbit = settle(family.flow(1.0), np.zeros(2))
+    (point,) = corners(survey(family, [(1.0, orbit)], 0.98, 1.05, depth=0).points)
+    assert point.stops == "F at 2 and F at -2"
+    window = PlaneWindow((1.0, 1.4), (0.4, 1.0))
+    curve = continued(over.plane("omega", "a.amplitude"), point, 0.8, window)
+    assert curve is not None
+    met = curve.codimension_two
+    assert [each.name for each in met] == ["corner meets fold"] * 2
+    for each in met:
+        omega, amplitude = each.values
+
+        def rates(t: float, x: Array, omega: float = omega, a: float = amplitude) -> Array:
+            spring = x[0] + math.copysign(max(abs(x[0]) - 1.0, 0.0), x[0])
+            return np.array([x[1], a * math.sin(omega * t) - 0.2 * x[1] - spring])
+
+        def image(x: Array, omega: float = omega) -> tuple[Array, float]:
+            times = np.linspace(0.0, 2.0 * math.pi / omega, 4001)
+            kept = solve_ivp(rates, (0.0, times[-1]), x, "DOP853", times, rtol=1e-11, atol=1e-12)
+            return kept.y[:, -1], float(np.abs(kept.y[0]).max())
+
+        start = each.point.z[:2]
+        end, largest = image(start)
+        assert end == pytest.approx(start, abs=1e-7)
+        assert largest == pytest.approx(2.0, abs=1e-5)
+        steps = 1e-5 * np.eye(2)
+        columns = [(image(start + d)[0] - image(start - d)[0]) / 2e-5 for d in steps]
+        multipliers = np.linalg.eigvals(np.array(columns).T)
+        assert np.abs(multipliers - 1.0).min() < 1e-4
+
+
+def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
+    """A law so weak that the motion is linear: the lower of two maxima comes to 1, and is no more
+    where height, rate and curvature of a sine and its third harmonic say so."""
+    weak = table("law", name="F", between=list(JOINT), points=[[0, 0], [1, 1], [2, 2 + 1e-8]])
+    force = table("force", on="a", amplitude=1.0, harmonics=[[3, 0.3, 0.0]])
+    text = system_text({"a": 1.0}, {}, {JOINT: 0.2}, weak, force)
+    over = ModelSubject(parse_model_file(text).model, 0.358)
+    family = over.family("omega")
+    orbit = settle(family.flow(0.358), np.zeros(2))
+    (point,) = corners(survey(family, [(0.358, orbit)], 0.355, 0.365, depth=0).points)
+    window = PlaneWindow((0.34, 0.4), (0.9, 3.2))
+    curve = continued(over.plane("omega", "a.amplitude"), point, 1.0, window)
+    assert curve is not None
+    assert "degenerate corner" in curve.ends
+
+    def off(at: Array) -> Array:
+        phase, omega, amplitude = at
+        waves = [
+            size * np.exp(1j * n * phase) / (1.0 - (n * omega) ** 2 + 0.2j * n * omega)
+            for n, size in ((1, amplitude), (3, 0.3))
+        ]
+        orders = np.array([1j, 3j])
+        return np.array([(orders**d @ waves).imag - (d == 0) for d in range(3)])
+
+    _, *wanted = fsolve(off, [2.8, 0.37, 2.5], xtol=1e-12)
+    (end,) = [each for each in curve.codimension_two if each.name == "degenerate corner"]
+    assert end.values == pytest.approx(wanted, rel=1e-5)
 
 
 def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:
