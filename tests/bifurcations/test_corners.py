@@ -20,7 +20,7 @@ from designer.dynamics.attractors import settle
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.point_captions import caption
-from tests.shared.system_text import system_text, table
+from tests.shared.system_text import clearance, system_text, table
 
 JOINT = ("a", "ground")
 STIFFENING = table(
@@ -97,6 +97,42 @@ def test_the_curve_of_a_corner_over_two_parameters() -> None:
     for omega, amplitude in curve.values:
         assert amplitude == pytest.approx(amplitude_at_corner(omega), rel=1e-7)
     assert curve.codimension_two == ()
+
+
+def test_a_velocity_that_is_largest_where_a_damped_stop_is_met() -> None:
+    """It turns at a kink, for the damper's force jumps there: by another integrator it is that of
+    the corner. No smooth equation holds along its curve, so none is begun."""
+    points = [[-9.0, -0.9], [1.5, 0.15], [9.0, 1.65]]
+    law = table("law", name="drag", between=list(JOINT), points=points) + DRAG
+    gap = clearance("S", *JOINT, upper=0.3, stiffness=2.0, damping=3.0)
+    force = table("force", on="a", amplitude=1.0, constant=1.0)
+    text = system_text({"a": 1.0}, {JOINT: 1.0}, {JOINT: 0.2}, law, gap, force)
+    over, omega = ModelSubject(parse_model_file(text).model, 0.8), 0.8
+    family = over.family("a.amplitude")
+    orbit = settle(family.flow(1.45), np.zeros(2))
+    (point,) = corners(survey(family, [(1.45, orbit)], 1.4, 1.6, depth=0).points)
+    assert point.stops == "drag at 1.5"
+    assert point.error < 1e-8
+
+    def rates(t: float, x: Array) -> Array:
+        pushed = 2.0 * (x[0] - 0.3) + 3.0 * x[1] if x[0] > 0.3 else 0.0
+        drag = 0.1 * x[1] + 0.1 * max(x[1] - 1.5, 0.0)
+        drive = 1.0 + point.value * math.sin(omega * t)
+        return np.array([x[1], drive - 0.2 * x[1] - x[0] - drag - pushed])
+
+    def met(_: float, x: Array) -> float:
+        return float(x[0] - 0.3)
+
+    start, period = point.point.solved.x, 2.0 * math.pi / omega
+    kept = solve_ivp(
+        rates, (0.0, period), start, "DOP853", rtol=1e-10, atol=1e-12, events=met, max_step=0.005
+    )
+    assert kept.y[:, -1] == pytest.approx(start, abs=1e-6)
+    speeds = kept.y_events[0][:, 1]
+    assert speeds.max() == pytest.approx(1.5, abs=1e-6)
+    assert kept.y[1].max() < 1.5 + 1e-6
+    window = PlaneWindow((1.4, 1.6), (0.7, 0.9))
+    assert continued(over.plane("a.amplitude", "omega"), point, omega, window) is None
 
 
 def test_a_fold_on_the_curve_of_a_corner() -> None:
