@@ -68,9 +68,11 @@ def test_a_point_where_the_slope_stays_is_no_corner(unit: float) -> None:
     points = tuple((unit * x, 7.0 * unit * (x if x < 4.0 else 9.0)) for x in places)
     one = ForceLaw("L", (1.0,), "displacement", points)
     assert one.corners == (3.0 * unit,)
-    assert one.bends == {1: ((3.0 * unit, pytest.approx(35.0)),)}
+    ((_, change),) = one.bends[1]
+    assert change == pytest.approx(35.0)
     line = ForceLaw("L", (1.0,), "displacement", points[:5])
-    assert (line.corners, line.even, line.slope) == ((), True, pytest.approx(7.0))
+    assert (line.corners, line.even) == ((), True)
+    assert line.slope == pytest.approx(7.0)
     bent = ForceLaw("L", (1.0,), "displacement", ((-1.0, -1.0), (0.5, 0.5), (1.0, 1.0 + 1e-9)))
     assert bent.corners == (0.5,)
 
