@@ -32,6 +32,8 @@ FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
 TERMS = 16
 """Of the Taylor series over an interval."""
+PIECES = 64
+"""Of an interval, at most: by rounding a tangency may be passed again and again."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def _pieces(flow: Flow, mode: Mode, z: Array, step: float) -> list[_Piece]:
     """The motion over one interval, cut where its mode changes. z : (N,) the augmented state at its
     begin."""
     out, at = list[_Piece](), 0.0
-    while True:
+    while len(out) < PIECES:
         M, terms = step * augmented(mode, flow.drive, flow.orders), [z]
         for k in range(1, TERMS):
             terms.append(M @ terms[-1] / k)
@@ -129,8 +131,9 @@ def _pieces(flow: Flow, mode: Mode, z: Array, step: float) -> list[_Piece]:
                 target = flow.system.mode(guard.target)
         out.append(_Piece(at, length, series))
         if target is mode:
-            return out
+            break
         z, mode, at = length ** np.arange(TERMS) @ series, target, at + length
+    return out
 
 
 def _turning_in(pieces: Sequence[_Piece], row: Array) -> list[tuple[float, float, bool]]:
