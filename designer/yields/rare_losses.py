@@ -14,7 +14,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from itertools import compress
 from operator import not_
@@ -34,12 +34,12 @@ from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
+from designer.spread.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.loss_walks import LossWalk, Shown, independent, walk
 from designer.yields.margins import nominal_limits
 from designer.yields.stored_parts import AnswerLog, StoredParts
-from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
 from designer.yields.yield_count import Yield
 
@@ -275,14 +275,7 @@ class _Sample:
 
     def first(self, count: int) -> _Sample:
         """So many of them."""
-        return _Sample(
-            self.points[:count],
-            self.component[:count],
-            self.lost[:count],
-            self.unanswered[:count],
-            self.responses[:count],
-            self.stands[:count],
-        )
+        return _Sample(*(getattr(self, each.name)[:count] for each in fields(self)))
 
     def joined(self, other: _Sample) -> _Sample:
         """Both samples, one after the other."""
@@ -559,33 +552,30 @@ def _counted(
     regions = _plain_regions(counted, even, drawing.names)
     cube = _mixture(regions, PLAIN, len(drawing.names))
     pilots = LOOKED + len(sample.points) - asked
-    lost_share = (losses - 1) / (answered - 1)
-    result = RareLosses(
-        question=number,
-        lost=lost_share,
+    share = (losses - 1) / (answered - 1)
+    result = replace(
+        _count(number, Yield(answered - losses, losses, 0, asked - answered)),
+        lost=share,
         low=low,
         high=high,
-        unanswered=1.0 - answered / asked,
-        boards=asked,
         pilots=pilots,
-        drawn_lost=losses,
-        effective=float(losses),
-        largest_weight=1.0,
         gain=asked / (asked + pilots),
-        unseen=0.0,
-        narrow=QUANTILE * math.sqrt((1.0 - lost_share) / (losses - 2)) <= target,
+        narrow=QUANTILE * math.sqrt((1.0 - share) / (losses - 2)) <= target,
         regions=tuple(_named(drawing, cube, regions, counted, even)),
         margins=tuple(_margins(drawing, regions)),
-        seconds=0.0,
     )
     return result, sample
 
 
 def counted_losses(number: int, counted: Yield) -> RareLosses | None:
     """The same of what a study has counted, where it lost ``PLENTY`` boards; None where fewer."""
+    plenty = counted.lost + counted.grazing >= PLENTY
+    return _count(number, counted) if plenty else None
+
+
+def _count(number: int, counted: Yield) -> RareLosses:
+    """Of so many plain boards, whatever was lost of them."""
     answered, lost = counted.samples - counted.failed, counted.lost + counted.grazing
-    if lost < PLENTY:
-        return None
     low, high = wilson(lost, answered)
     share = lost / answered
     return RareLosses(

@@ -22,13 +22,13 @@ from designer.cli import entry
 from designer.folders.study_cache import StudyCache
 from designer.folders.study_stores import PIECES
 from designer.model.model_file import parse_model_file
+from designer.spread.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.verdicts.verdict import Verdict
 from designer.yields import loss_walks, rare_losses, stored_parts
 from designer.yields.margins import Margin
 from designer.yields.rare_losses import AnyLost, RareLosses, counted_losses
 from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.study import plan_study
-from designer.yields.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
