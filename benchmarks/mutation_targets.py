@@ -75,7 +75,8 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
     "yields": (
         *_of("base", "proportion", "base/proportion"),
         *_of("yields", "yield_count", "yields/yield_count yields/two_engine_yield"),
-        *_of("yields", "tilted_cube rare_losses", "yields/rare_losses"),
+        *_of("spread", "tilted_cube", "yields/rare_losses"),
+        *_of("yields", "rare_losses", "yields/rare_losses"),
         *_of("yields", "loss_walks", "yields/loss_walks"),
         *_of("yields", "trimmed_yield", "yields/trimmed_yield"),
         *_of("yields", "window_path", "yields/window_path"),

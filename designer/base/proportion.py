@@ -1,12 +1,12 @@
 """The interval of a proportion: every yield, rate and share has Wilson's; limits on what was hardly
-or never seen are by mid-p."""
+or never seen are by mid-p, what was counted up to a number of hits has exact ones."""
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
 
-from scipy.special import betainc, ndtri
+from scipy.special import betainc, betaincinv, ndtri
 
 Z = float(ndtri(0.975))
 TAIL = 0.025
@@ -43,6 +43,17 @@ def mid_p(count: int, of: int) -> tuple[float, float]:
     if of == 0:
         return 0.0, 1.0
     return _lower(count, of), 1.0 - _lower(of - count, of)
+
+
+def inverse_binomial(count: int, of: int, level: float = 0.95) -> tuple[float, float]:
+    """Two-sided interval of a rate where asking ended with hit number ``count``, the last ``of``
+    all: each end leaves at most half of 1 - level, exactly, by the negative binomial law.
+
+    count : at least 1.
+    """
+    tail = 0.5 * (1.0 - level)
+    low = float(betaincinv(count, of - count + 1, tail))
+    return low, float(betaincinv(count, of - count, 1.0 - tail)) if of > count else 1.0
 
 
 def _lower(count: int, of: int) -> float:

@@ -275,6 +275,12 @@ def _write_design(
             write_design(folder, synthesis, stages, options, progress, other)
 
 
+def is_out_of_reach(folder: Folder) -> bool:
+    """Whether the folder has a finished repair that does not reach its yield."""
+    stage = None if folder.manifest is None else folder.manifest.stages.get("cure")
+    return stage is not None and stage.complete and not folder.json(REPAIR)["reached"]
+
+
 def refuse_unreachable(
     modelfile: ModelFile, target: float, budget: float | None, without: Collection[str]
 ) -> None:

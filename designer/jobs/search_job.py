@@ -59,16 +59,13 @@ def search_into(
     ------
     EnvironmentMissing : there is something to confirm and no ngspice; raised before any work.
     """
-    manifest = Folder(out).manifest
-    stage = None if manifest is None else manifest.stages.get("confirmation")
-    if stage is None or not stage.complete:
-        program_version()
+    need_ngspice(Folder(out), options)
     final = searched_into(modelfile, out, options, progress)
     fidelity = fidelity_choice.for_search(Folder(out), options, progress)
     study = run_into(
         final, out, replace(options, rung=fidelity), progress, lambda _: command(options)
     )
-    confirmed = _confirmed(final, out, options, progress)
+    confirmed, stood = _confirmed(final, out, options, progress)
     folder = Folder(out)
     answer = RANDOM.answer(folder)
     answer["search"] = {
@@ -78,12 +75,29 @@ def search_into(
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
     satisfied = study.satisfied and all_confirmed(confirmed)
-    return replace(study, answer=answer, satisfied=satisfied, shown=False)
+    reused = study.reused and stood
+    return replace(study, answer=answer, satisfied=satisfied, reused=reused, shown=False)
 
 
-def confirmed_repair(out: Path, options: Options, progress: Progress) -> dict[str, Any]:
+def need_ngspice(folder: Folder, options: Options) -> None:
+    """Refuse a folder whose design is still to be confirmed, or may be made again, without ngspice.
+
+    Raises
+    ------
+    EnvironmentMissing : it is missing or too old.
+    """
+    manifest = folder.manifest
+    stage = None if manifest is None else manifest.stages.get("confirmation")
+    if stage is None or not stage.complete or options.overwrite:
+        program_version()
+
+
+def confirmed_repair(
+    out: Path, options: Options, progress: Progress
+) -> tuple[dict[str, Any], bool]:
     """How ngspice judges boards of the repaired design in the folder ``out``, as drawn, and what
-    limits each response. They are of no study of the folder, which has none yet."""
+    limits each response; whether the folder held that already. The boards are of no study of the
+    folder, which has none yet."""
     modelfile, _ = source(out, None)
     return _confirmed(modelfile, out, replace(options, samples=SAMPLES), progress, studied=False)
 
@@ -108,9 +122,10 @@ def _confirmed(
     progress: Progress,
     *,
     studied: bool = True,
-) -> dict[str, Any]:
-    """How ngspice judges boards of the study, and what limits each response. studied : whether the
-    folder has that study; its boards are asked here otherwise."""
+) -> tuple[dict[str, Any], bool]:
+    """How ngspice judges boards of the study, and what limits each response; whether the folder
+    held that already. studied : whether the folder has that study; its boards are asked here
+    otherwise."""
     folder, catalog = Folder(out), load_catalog()
     inputs = {
         **design_inputs_of(folder),
@@ -121,7 +136,8 @@ def _confirmed(
         **grade_inputs(modelfile, catalog),
     }
     stages: Stages = {"confirmation": (inputs, [CONFIRMATION])}
-    if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
+    if todo:
         began = time.perf_counter()
         synthesis, stores = design_files.load(folder, modelfile, catalog), None
         if studied:
@@ -131,7 +147,7 @@ def _confirmed(
             cost = {"seconds": time.perf_counter() - began}
             folder.write(CONFIRMATION, dumps({**document, "cost": cost}))
     answer = folder.json(CONFIRMATION)
-    return {k: v for k, v in answer.items() if k not in ("format", "cost")}
+    return {k: v for k, v in answer.items() if k not in ("format", "cost")}, not todo
 
 
 def _confirm(

@@ -72,8 +72,8 @@ def search(
 
     A model file is searched, and written into ``out``. With ``yield_`` or ``ppm`` the found design
     is then repaired at least cost: what comes of it is a design folder of its own, ``out``/cured,
-    and the answer is whether it reaches the yield and ngspice confirms its boards. A design folder
-    is repaired, as ``cure`` does it.
+    and the answer is whether it reaches the yield and ngspice confirms the boards of both designs.
+    A design folder is repaired, as ``cure`` does it.
 
     Raises
     ------
@@ -132,24 +132,26 @@ def search(
     usual = usual_times.SEARCH if repair is None else {**usual_times.SEARCH, **usual_times.REPAIRED}
     with progress.whole(usual):
         found = search_job.search_into(modelfile, folder, options, progress, command)
-        confirmed = None
+        confirmed, stood = None, True
         if repair is None:
             cured = None
         else:
             cured = repair(folder, out=folder / CURED, options=options, progress=progress)
             if cured.reached:
-                confirmed = search_job.confirmed_repair(folder / CURED, options, progress)
+                confirm = search_job.confirmed_repair
+                confirmed, stood = confirm(folder / CURED, options, progress)
     is_another_s = not found.reused if cured is None else not cured.reached
     if is_another_s and (folder / CURED / DESIGN).exists():
         progress.note(f"{folder / CURED} holds an earlier design, which is not of this search")
     if cured is None:
         return found
     repaired = {**cured.answer, "confirmation": confirmed}
+    is_cured = confirmed is not None and search_job.all_confirmed(confirmed)
     return replace(
         found,
         answer={**found.answer, "cure": repaired},
-        satisfied=confirmed is not None and search_job.all_confirmed(confirmed),
-        reused=found.reused and cured.reused,
+        satisfied=found.satisfied and is_cured,
+        reused=found.reused and cured.reused and stood,
     )
 
 
@@ -162,15 +164,18 @@ def _asked_repair(
     ------
     InputError : no repair of a design of this model file can reach it; something else stands where
         the repaired design is to be written.
+    EnvironmentMissing : no ngspice, which is to confirm the repaired design.
     """
     if options.yield_ is None and options.ppm is None:
         return None
-    from designer.jobs import repair_job  # a search need not import the repair
+    from designer.jobs import repair_job, search_job  # a search need not import the repair
 
     target = repair_job.target_of(options.yield_, options.ppm)
     asked: dict[str, Any] = {"target": target, "budget": options.budget, "without": options.without}
     repair_job.refuse_unreachable(modelfile, **asked)
-    Folder(folder / CURED)  # refuses a place where something else stands
+    cured = Folder(folder / CURED)  # refuses a place where something else stands
+    if options.overwrite or not repair_job.is_out_of_reach(Folder(folder)):
+        search_job.need_ngspice(cured, options)
     return partial(repair_job.repair_into, **asked)
 
 

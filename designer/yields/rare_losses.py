@@ -14,7 +14,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from itertools import compress
 from operator import not_
@@ -27,19 +27,19 @@ from scipy.special import ndtri
 from designer.base.arrays import Array, Index, Mask
 from designer.base.plain_json import plain
 from designer.base.progress import doing
-from designer.base.proportion import wilson
+from designer.base.proportion import inverse_binomial, wilson
 from designer.base.rare_words import boards_text
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.spread.board_quantities import between
 from designer.spread.spread import BOARD
+from designer.spread.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.loss_walks import LossWalk, Shown, independent, walk
 from designer.yields.margins import nominal_limits
 from designer.yields.stored_parts import AnswerLog, StoredParts
-from designer.yields.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, width_of
 from designer.yields.worst_corner import LAST
 from designer.yields.yield_count import Yield
 
@@ -99,12 +99,13 @@ STEPS = 16
 SINGLE = 8
 """Parts that are moved alone."""
 PLENTY = 40
-"""Lost boards of a count: with so many it is as good, and nothing is drawn where it is lost."""
+"""Lost boards of a study: with so many its count is as good, and nothing is drawn where it is
+lost."""
 LOOKED, FREQUENT = 512, 8
 """Plain boards that are looked at first, and lost ones of them from which plain boards are
 counted: of an estimate half the boards are lost, and to know that of each may take seconds."""
 COUNTED, MOST_COUNTED = 125, 6_000
-"""Boards of a count at a time, and at most."""
+"""Boards of such a count at a time, and at most."""
 APART = 1.4
 """Spread of lost boards along one way over the most that chance makes, above which they are two."""
 TAG = 0xAA5E
@@ -161,7 +162,8 @@ class RareLosses:
     boards: int
     """Boards of the estimate."""
     pilots: int
-    """Boards that looked for the regions."""
+    """Boards that are not of the estimate: they looked for the regions, or whether losses are
+    plenty."""
     drawn_lost: int
     """Boards of the estimate that were lost."""
     effective: float
@@ -173,7 +175,7 @@ class RareLosses:
     without a loss."""
     unseen: float
     """A region that no search met may hold this share at most, by 95 %: what the plain boards leave
-    of which none, or so many, were lost outside the regions."""
+    of which none, or so many, were lost outside the regions. 0 of a count, which sees all."""
     narrow: bool
     """Whether the interval is as narrow as was aimed at."""
     regions: tuple[LossRegion, ...]
@@ -191,8 +193,11 @@ class RareLosses:
     def ends(self, level: float) -> tuple[float, float]:
         """Ends of the interval at another level than 0.95, without what may be unseen."""
         quantile = float(ndtri(0.5 + 0.5 * level))
-        if not self.pilots:  # counted, not drawn
-            return wilson(self.drawn_lost, round(self.boards * (1.0 - self.unanswered)), quantile)
+        if not self.unseen:  # counted, not drawn
+            answered = round(self.boards * (1.0 - self.unanswered))
+            if self.pilots:  # to a number of losses
+                return inverse_binomial(self.drawn_lost, answered, level)
+            return wilson(self.drawn_lost, answered, quantile)
         if not self.lost:
             return 0.0, 0.0
         spread = (self.lost / self.low) ** (quantile / QUANTILE)
@@ -267,6 +272,10 @@ class _Sample:
     stands: Array
     """(N,) for how many boards of brief answers each stands, itself one of them; 0 of one that was
     asked briefly and is taken for lost."""
+
+    def first(self, count: int) -> _Sample:
+        """So many of them."""
+        return _Sample(*(getattr(self, each.name)[:count] for each in fields(self)))
 
     def joined(self, other: _Sample) -> _Sample:
         """Both samples, one after the other."""
@@ -386,13 +395,28 @@ class _Drawing:
         responses, alone = tuple(response for _, response in verdicts), np.ones(len(points))
         return _Sample(points, component, lost, np.zeros_like(lost), responses, alone)
 
+    def lost_first(self, points: Array, wide: Array | None, count: int) -> Mask:
+        """(rows, count) which boards are lost, of rows of so many one after the other, up to the
+        first of each row: one that takes long is asked until that is known."""
+        brief = self.asked(points, wide, within=self.within)
+        lost = np.array([v is not Verdict.OK for v, _ in brief], dtype=bool)
+        slow = lost & np.array([_is_open(*answer) for answer in brief], dtype=bool)
+        each = lost.reshape(-1, count)  # the same memory
+        while True:
+            first = np.arange(len(each)) * count + each.argmax(axis=1)
+            if not (on := first[slow[first]]).size:
+                return each
+            found = self.asked(points[on], None if wide is None else wide[on])
+            lost[on] = [v not in (Verdict.OK, Verdict.FAILED) for v, _ in found]
+            slow[on] = False
+
     def sample(self, points: Array, component: Index, rng: np.random.Generator) -> _Sample:
         """These boards asked. Where a period is wanted, a board that shows none briefly hardly ever
         comes to it, and to know that takes long: of those that are no plain ones one of ``SURE`` is
         asked on (double sampling: J. Neyman, J. Am. Stat. Assoc. 33, 1938, 101)."""
         brief = self.question.periodic
         found = self.asked(points, within=self.within if brief else None)
-        open_ = np.array([v is Verdict.FAILED or r in WITHOUT_PERIOD for v, r in found], dtype=bool)
+        open_ = np.array([_is_open(*answer) for answer in found], dtype=bool)
         open_ &= brief
         stands = np.where(open_ & (component > 0), float(SURE), 1.0)
         on = open_ & (rng.random(len(points)) * stands < 1.0)
@@ -404,6 +428,11 @@ class _Drawing:
         fine = np.array([v is Verdict.OK for v, _ in found], dtype=bool)
         responses = tuple(response for _, response in found)
         return _Sample(points, component, ~fine & ~failed, failed, responses, stands)
+
+
+def _is_open(verdict: Verdict, response: str) -> bool:
+    """Whether a brief answer may be another one once the board has settled."""
+    return verdict is Verdict.FAILED or response in WITHOUT_PERIOD
 
 
 def rare_losses(
@@ -441,9 +470,10 @@ def rare_losses(
     doing("plain boards")
     first = drawing.scouted(*_mixture([], PLAIN, len(drawing.names)).drawn(LOOKED, look))
     if first.lost.sum() >= FREQUENT:
-        counted = _counted(drawing, number, look)
+        counted, asked = _counted(drawing, number, look, min(most, MOST_COUNTED), target, bound)
         if counted is not None:
             return replace(counted, seconds=time.perf_counter() - began)
+        first = first.joined(asked)
     doing("regions of loss")
     found = _regions(drawing, rng)
     regions = found.regions
@@ -459,10 +489,10 @@ def rare_losses(
         if count >= most or ((narrow or decided) and count >= LEAST_BOARDS):
             break
         sample = sample.joined(drawing.sample(*cube.drawn(BLOCK, rng), double))
-    pilots, plain = LOOKED + found.boards, sample.component == 0
+    pilots, plain = len(first.points) + found.boards, sample.component == 0
     strays = [first.points[first.lost], found.strays, sample.points[plain & sample.lost]]
     elsewhere = int((cube.densities(np.concatenate(strays)).argmax(axis=1) == 0).sum())
-    outside = unseen_share(elsewhere, LOOKED + found.plain + int(plain.sum()))
+    outside = unseen_share(elsewhere, len(first.points) + found.plain + int(plain.sum()))
     low, high = _interval(result.mean, result.error, outside)
     gain = math.nan
     if result.mean > 0.0 and result.error > 0.0:
@@ -487,32 +517,70 @@ def rare_losses(
     )
 
 
-def _counted(drawing: _Drawing, number: int, rng: np.random.Generator) -> RareLosses | None:
-    """Plain boards, until ``PLENTY`` are lost; None where fewer of the most are."""
+def _counted(
+    drawing: _Drawing,
+    number: int,
+    rng: np.random.Generator,
+    most: int,
+    target: float,
+    bound: float | None,
+) -> tuple[RareLosses | None, _Sample]:
+    """Plain boards up to so many lost ones that their share is as narrow as ``target``; or up to
+    ``SOME`` where these tell its side of ``bound``. None where so many are not lost of ``most``
+    boards, by 97.5 %. Beside it the boards that were asked.
+
+    To stop at a number of losses k, of n boards, takes the estimate (k - 1)/(n - 1), whose mean is
+    the share (J. B. S. Haldane, Biometrika 33, 1945, 222); k/n is above it.
+    """
     plain = _mixture([], PLAIN, len(drawing.names))
-    sample = drawing.sample(*plain.drawn(COUNTED, rng), rng)
-    while sample.lost.sum() < PLENTY and len(sample.points) < MOST_COUNTED:
-        sample = sample.joined(drawing.sample(*plain.drawn(COUNTED, rng), rng))
-    lost, failed = int(sample.lost.sum()), int(sample.unanswered.sum())
-    found = counted_losses(number, Yield(len(sample.points) - lost - failed, lost, 0, failed))
-    if found is None:
-        return None
-    even = np.ones(len(sample.points))
-    regions = _plain_regions(sample, even, drawing.names)
+    sample = drawing.sample(*plain.drawn(min(COUNTED, most), rng), rng)
+    enough = max(PLENTY, 2 + math.ceil((QUANTILE / target) ** 2))
+    for losses in ([] if bound is None else [int(SOME)]) + [enough]:
+        while (lost := int(sample.lost.sum())) < losses:
+            left = most - len(sample.points)
+            likely = wilson(lost, int((~sample.unanswered).sum()))[1]
+            if lost + likely * left < losses:
+                return None, sample
+            more = plain.drawn(min(COUNTED, left), rng)
+            sample = sample.joined(drawing.sample(*more, rng))
+        counted = sample.first(int(np.flatnonzero(sample.lost)[losses - 1]) + 1)
+        answered = int((~counted.unanswered).sum())
+        low, high = inverse_binomial(losses, answered)
+        if bound is not None and (high <= bound or low > bound):
+            break
+    even, asked = np.ones(len(counted.points)), len(counted.points)
+    regions = _plain_regions(counted, even, drawing.names)
     cube = _mixture(regions, PLAIN, len(drawing.names))
-    named = _named(drawing, cube, regions, sample, even)
-    return replace(found, regions=tuple(named), margins=tuple(_margins(drawing, regions)))
+    pilots = LOOKED + len(sample.points) - asked
+    share = (losses - 1) / (answered - 1)
+    result = replace(
+        _count(number, Yield(answered - losses, losses, 0, asked - answered)),
+        lost=share,
+        low=low,
+        high=high,
+        pilots=pilots,
+        gain=asked / (asked + pilots),
+        narrow=QUANTILE * math.sqrt((1.0 - share) / (losses - 2)) <= target,
+        regions=tuple(_named(drawing, cube, regions, counted, even)),
+        margins=tuple(_margins(drawing, regions)),
+    )
+    return result, sample
 
 
 def counted_losses(number: int, counted: Yield) -> RareLosses | None:
     """The same of what a study has counted, where it lost ``PLENTY`` boards; None where fewer."""
+    plenty = counted.lost + counted.grazing >= PLENTY
+    return _count(number, counted) if plenty else None
+
+
+def _count(number: int, counted: Yield) -> RareLosses:
+    """Of so many plain boards, whatever was lost of them."""
     answered, lost = counted.samples - counted.failed, counted.lost + counted.grazing
-    if lost < PLENTY:
-        return None
     low, high = wilson(lost, answered)
+    share = lost / answered
     return RareLosses(
         question=number,
-        lost=lost / answered,
+        lost=share,
         low=low,
         high=high,
         unanswered=counted.failed / counted.samples,
@@ -523,7 +591,7 @@ def counted_losses(number: int, counted: Yield) -> RareLosses | None:
         largest_weight=1.0,
         gain=1.0,
         unseen=0.0,
-        narrow=True,
+        narrow=QUANTILE * math.sqrt((1.0 - share) / lost) <= TARGET,
         regions=(),
         margins=(),
         seconds=0.0,
@@ -651,7 +719,7 @@ def _by_limits(drawing: _Drawing) -> Iterator[_Region]:
             continue
         strength = _strength(way, float(middle[j]))
         tilts = np.clip(np.outer(strength * np.array(PATH), way), -STEEPEST, STEEPEST)
-        lost = drawing.scouted(mean_of(tilts), np.zeros(len(tilts), dtype=int)).lost
+        (lost,) = drawing.lost_first(mean_of(tilts), None, len(tilts))
         if lost.any():
             yield _Region(tilts[lost.argmax()], limit.what)
 
@@ -881,8 +949,7 @@ def _widenings(drawing: _Drawing, points: Array) -> list[float | None]:
     found = np.ones(len(points), dtype=bool)
     for _ in range(2):
         widths = np.geomspace(low, high, STEPS, axis=1)
-        lost = drawing.scouted(rows, np.zeros(len(rows), dtype=int), widths.ravel()).lost
-        lost = lost.reshape(widths.shape)
+        lost = drawing.lost_first(rows, widths.ravel(), STEPS)
         found &= lost.any(axis=1)
         first = lost.argmax(axis=1)
         each = np.arange(len(points))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from scipy.stats import binom, binomtest, norm
+from scipy.stats import binom, binomtest, nbinom, norm
 
-from designer.base.proportion import mid_p, wilson
+from designer.base.proportion import inverse_binomial, mid_p, wilson
 
 
 @given(of=st.integers(1, 500), count=st.integers(0, 500), level=st.floats(0.5, 0.999))
@@ -62,3 +62,17 @@ def test_mid_p_is_tight_where_nothing_was_seen_and_still_covers(of: int) -> None
     ]
     assert min(covered) > 0.92
     assert np.mean(covered) > 0.95
+
+
+@pytest.mark.parametrize("count", [2, 20, 45])
+@pytest.mark.parametrize("rate", [0.02, 0.3, 0.9])
+def test_an_interval_of_a_number_of_hits_covers_exactly(count: int, rate: float) -> None:
+    """Of all numbers of asked ones, each as likely as SciPy's negative binomial law has it."""
+    of = np.arange(count, int(nbinom.ppf(1.0 - 1e-9, count, rate)) + count + 1)
+    chance = nbinom.pmf(of - count, count, rate)
+    for level in (0.95, 0.99):
+        low, high = np.transpose([inverse_binomial(count, int(n), level) for n in of])
+        assert 0.7 * (1.0 - level) < chance[(rate < low) | (rate > high)].sum() or rate > 0.1
+        assert chance[rate < low].sum() <= 0.5 * (1.0 - level)
+        assert chance[rate > high].sum() <= 0.5 * (1.0 - level)
+    assert (chance * (count - 1) / (of - 1)).sum() == pytest.approx(rate, abs=1e-6)

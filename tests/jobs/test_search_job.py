@@ -13,8 +13,9 @@ from typing import Any
 
 import pytest
 
+import designer
 from designer.base.design_folder import MODEL, Folder
-from designer.base.errors import InputError
+from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -462,6 +463,62 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
         assert "holds an earlier design" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("found", [True, False])
+@pytest.mark.parametrize("cured", [True, False])
+@pytest.mark.parametrize("stood", [True, False])
+def test_both_designs_are_to_be_confirmed(
+    found: bool, cured: bool, stood: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one that was found, and the one that came of its repair."""
+    gate = {"passed": True}
+    rows = {"responses": [{"gate": gate, "asked": 40, "agreed": 40 if cured else 0}]}
+    monkeypatch.setattr(
+        search_job, "search_into", lambda *_: JobOutcome({}, found, tmp_path, reused=True)
+    )
+    monkeypatch.setattr(
+        "designer.jobs.repair_job.repair_into", lambda *_, **__: CureResult({}, True, True)
+    )
+    monkeypatch.setattr(search_job, "confirmed_repair", lambda *_: (rows, stood))
+    outcome = designer.search(parse_model_file(asked(OPEN)), tmp_path / "out", yield_=0.9)
+    assert outcome.satisfied is (found and cured)
+    assert outcome.reused is stood
+
+
+def test_no_ngspice_is_said_before_a_repair_of_a_search_that_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a repair that is known not to reach its yield nothing is to be confirmed."""
+    folder, asks = Folder(tmp_path / "out"), list[Path]()
+    model = tmp_path / "model.toml"
+    model.write_text(asked(OPEN), encoding="utf-8")
+
+    def missing() -> str:
+        raise EnvironmentMissing("the program ngspice is missing")
+
+    def unreached(path: Path, **_: Any) -> CureResult:
+        asks.append(path)
+        return CureResult({}, False, True)
+
+    def stands(*_: Any) -> JobOutcome:
+        return JobOutcome({}, True, folder.path, reused=True)
+
+    monkeypatch.setattr(search_job, "program_version", missing)
+    monkeypatch.setattr(search_job, "search_into", stands)
+    monkeypatch.setattr("designer.jobs.repair_job.repair_into", unreached)
+    command = ("search", model, "--out", folder.path, "--yield", 0.9, "--resume", "-q", "--json")
+    folder.begin({"confirmation": ({}, ["confirmation.json"])}, {})
+    folder.write("confirmation.json", "{}")
+    folder.finish("confirmation")
+    assert run(*command) == 3
+    assert "ngspice" in capsys.readouterr().err
+    assert not asks
+    folder.begin({"cure": ({}, ["cure.json"])}, {})
+    folder.write("cure.json", '{"format": 1, "reached": false}')
+    folder.finish("cure")
+    assert run(*command) == 1
+    assert asks == [folder.path]
+
+
 def test_a_place_for_the_repaired_design_is_kept_free(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -483,8 +540,8 @@ def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.M
     for name, value in (
         ("program_version", None),
         ("searched_into", None),
-        ("run_into", JobOutcome({}, True, shown=True)),
-        ("_confirmed", {"responses": []}),
+        ("run_into", JobOutcome({}, True, reused=True, shown=True)),
+        ("_confirmed", ({"responses": []}, False)),
     ):
         job = f"designer.jobs.search_job.{name}"
         monkeypatch.setattr(job, lambda *_, value=value, **__: value)
@@ -495,6 +552,7 @@ def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.M
     found = search_into(file, tmp_path, Options(), Progress(), lambda _: "")
     assert found.satisfied
     assert not found.shown
+    assert not found.reused  # the confirmation was made now
 
 
 @pytest.mark.parametrize(

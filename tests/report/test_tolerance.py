@@ -349,7 +349,7 @@ def test_boards_of_a_million_stand_in_the_first_answer(plain: ReportData) -> Non
         "by R203 high, C1 low, which show 2-2-2; R203 alone loses it at 1.3 times its tolerance."
     ) in text
     assert (
-        "is lost on 50 to 70 of a million boards (22.6 to 2617 by the intervals and what may"
+        "is lost on 50 to 70 of a million boards (20.7 to 3095 by the intervals and what may"
         in text
     )
     assert "Boards differ as in the study above, at −20 to 60 °C, each at its own." in text
