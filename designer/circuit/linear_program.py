@@ -60,7 +60,7 @@ class LinearProgram:
 
     def _otherwise(self, cost: Array, most: Array, high: Array) -> Array | None:
         """Where HiGHS says neither: with its presolve, and what else SciPy tries."""
-        bounds = np.column_stack([self._low, high])
+        bounds = list(zip(self._low, high, strict=True))
         found = linprog(cost, A_ub=self._rows, b_ub=most, bounds=bounds, method="highs")
         if found.status == 0:
             return np.asarray(found.x)
