@@ -1,4 +1,5 @@
-"""Small linear programs by HiGHS itself, against known ends and against scipy."""
+"""The linear program that is solved many times: what one solve leaves for the next, and what it
+says where the solver comes to no end; largest errors by it, against those of the minimax."""
 
 from __future__ import annotations
 
@@ -8,16 +9,38 @@ import pytest
 from designer.circuit.linear_program import LinearProgram
 from designer.circuit.scale_fit import LargestFit, minimax
 
+COST = np.array([-1.0, -2.0])
 
-def test_a_program_is_solved_anew_with_other_numbers() -> None:
-    far = np.full(2, 10.0)
-    program = LinearProgram(np.array([[1.0, 1.0], [1.0, -1.0]]), -far, far)
-    x = program.solve(np.array([-1.0, 0.0]), np.array([3.0, 1.0]))
-    assert x == pytest.approx([2.0, 1.0])
-    x = program.solve(np.array([0.0, -1.0]), np.array([3.0, 1.0]), np.array([10.0, 2.5]))
-    assert x is not None
-    assert x[1] == pytest.approx(2.5)
-    assert program.solve(np.zeros(2), np.array([-30.0, 1.0])) is None
+
+def program(high: float) -> LinearProgram:
+    """x + y <= 4 from 0 to ``high``."""
+    return LinearProgram(np.ones((1, 2)), np.zeros(2), np.full(2, high))
+
+
+def test_other_bounds_are_of_one_solve() -> None:
+    asked, most = program(3.0), np.array([4.0])
+    assert asked.solve(COST, most) == pytest.approx([1.0, 3.0])
+    assert asked.solve(COST, most, np.array([3.0, 1.0])) == pytest.approx([3.0, 1.0])
+    assert asked.solve(COST, most) == pytest.approx([1.0, 3.0])
+
+
+def test_none_says_that_no_point_keeps_the_limits() -> None:
+    asked = program(3.0)
+    assert asked.solve(COST, np.array([-1.0])) is None
+    assert asked.solve(COST, np.array([4.0])) is not None
+
+
+def test_a_solver_that_gives_up_says_nothing_of_the_limits() -> None:
+    asked = program(3.0)
+    asked._solver.setOptionValue("simplex_iteration_limit", 0)
+    assert asked.solve(COST, np.array([4.0])) == pytest.approx([1.0, 3.0])
+
+
+def test_a_program_without_a_least_is_refused() -> None:
+    with pytest.raises(ArithmeticError, match="is not solved"):
+        LinearProgram(-np.ones((1, 2)), np.zeros(2), np.full(2, np.inf)).solve(COST, np.zeros(1))
+    with pytest.raises(ArithmeticError, match="not finite"):
+        program(np.nan).solve(COST, np.array([4.0]))
 
 
 @pytest.mark.parametrize("seed", range(5))
