@@ -56,11 +56,20 @@ class LinearProgram:
         status, known = solver.getModelStatus(), highspy.HighsModelStatus
         if status == known.kOptimal:
             return np.array(solver.getSolution().col_value)
-        return None if status == known.kInfeasible else self._otherwise(cost, most, high)
+        if status == known.kInfeasible:
+            return None
+        return ScipyProgram(self._rows, self._low, high).solve(cost, most)
 
-    def _otherwise(self, cost: Array, most: Array, high: Array) -> Array | None:
-        """Where HiGHS says neither: with its presolve, and what else SciPy tries."""
-        bounds = list(zip(self._low, high, strict=True))
+
+class ScipyProgram:
+    """The same by SciPy, with HiGHS's presolve: where several x are best it may find another."""
+
+    def __init__(self, rows: Array, low: Array, high: Array) -> None:
+        self._rows, self._low, self._high = rows, low, high
+
+    def solve(self, cost: Array, most: Array, high: Array | None = None) -> Array | None:
+        """As of ``LinearProgram``."""
+        bounds = list(zip(self._low, self._high if high is None else high, strict=True))
         found = linprog(cost, A_ub=self._rows, b_ub=most, bounds=bounds, method="highs")
         if found.status == 0:
             return np.asarray(found.x)

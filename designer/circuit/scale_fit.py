@@ -1,4 +1,8 @@
-"""The scales at which the largest coefficient error is least: small linear programs."""
+"""The scales at which the largest coefficient error is least: small linear programs.
+
+Of single fits SciPy's way decides: where several scales are best, designs keep those that they have
+had. Where only the largest error counts, HiGHS itself is quicker.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array, Mask
-from designer.circuit.linear_program import LinearProgram
+from designer.circuit.linear_program import LinearProgram, ScipyProgram
 
 
 def least_largest(h: Array, D: Array) -> float:
@@ -40,7 +44,7 @@ class LargestFit:
     """
 
     def __init__(self, D: Array, own: Mask) -> None:
-        self._slopes, self._own, self._fit = D, own, _Fit(D[own])
+        self._slopes, self._own, self._fit = D, own, _Fit(D[own], LinearProgram)
 
     def largest(self, h: Array) -> float:
         """The largest |h + D s|, h (m,).
@@ -56,8 +60,10 @@ class LargestFit:
 class _Fit:
     """The scales of many h with the same D (m, n)."""
 
-    def __init__(self, D: Array) -> None:
-        self._slopes = D
+    def __init__(
+        self, D: Array, kind: type[LinearProgram] | type[ScipyProgram] = ScipyProgram
+    ) -> None:
+        self._slopes, self._kind = D, kind
 
     def level(self, h: Array) -> Array:
         """s (n,) with the least max |h + D s|."""
@@ -74,21 +80,24 @@ class _Fit:
         worst = float(np.abs(h + self._slopes @ level).max())
         cost = np.append(np.zeros(n), np.ones(m))
         most = np.append(np.full(n, np.inf), np.full(m, worst + 1e-12))
-        total = self._sums.solve(cost, np.concatenate([-h, h]), most)
+        try:
+            total = self._sums.solve(cost, np.concatenate([-h, h]), most)
+        except ArithmeticError:  # the level is an answer, too
+            total = None
         if total is None or np.abs(h + self._slopes @ total[:n]).max() > worst + 1e-9:
             return level
         return total[:n]
 
     @cached_property
-    def _levels(self) -> LinearProgram:
+    def _levels(self) -> LinearProgram | ScipyProgram:
         return self._program(np.ones((len(self._slopes), 1)))
 
     @cached_property
-    def _sums(self) -> LinearProgram:
+    def _sums(self) -> LinearProgram | ScipyProgram:
         return self._program(np.eye(len(self._slopes)))
 
-    def _program(self, tops: Array) -> LinearProgram:
+    def _program(self, tops: Array) -> LinearProgram | ScipyProgram:
         """Its variables are s and what |h + D s| may not exceed: tops @ these."""
         D, (_, count) = self._slopes, tops.shape
         low = np.append(np.full(D.shape[1], -np.inf), np.zeros(count))
-        return LinearProgram(np.block([[D, -tops], [-D, -tops]]), low, np.full(len(low), np.inf))
+        return self._kind(np.block([[D, -tops], [-D, -tops]]), low, np.full(len(low), np.inf))

@@ -72,11 +72,9 @@ def work_begins(finished: Finished) -> Iterator[None]:
         yield
 
 
-def damaged(content: bytes, name: str, verb: str) -> Iterator[bytes | None]:
-    """The file cut off, for the verb that reads all of them at several lengths, and no file."""
-    half = len(content) // 2
-    lengths = [0, half, len(content) - 2] if verb == "tolerance" else [half]
-    lengths = lengths if name in READ else []
+def damaged(content: bytes, name: str) -> Iterator[bytes | None]:
+    """The file cut off, one that verbs read at several lengths, and no file."""
+    lengths = [0, len(content) // 2, len(content) - 2] if name in READ else []
     yield from (content[:length] for length in lengths)
     yield None
 
@@ -94,7 +92,7 @@ def test_a_cut_off_file_is_named(
     for name in (*READ, *others):
         path = copied / name
         whole = (finished.path / name).read_bytes()
-        for content in damaged(whole, name, verb):
+        for content in damaged(whole, name):
             (copied / "manifest.json").write_bytes(manifest)  # the work that began has marked it
             path.unlink(missing_ok=True)
             if content is not None:
