@@ -290,18 +290,21 @@ def figures(found: Sequence[Summary]) -> dict[str, Any]:
 def _cells(s: Summary) -> list[str]:
     low, high = s.interval
     few = "" if s.counts else " (too few lost)"
-    return [
-        s.case.name,
-        f"{s.case.width:g}",
-        f"{s.boards:,}".replace(",", " "),
-        str(s.lost),
-        f"{1e6 * s.share:.3g} ({1e6 * low:.3g} to {1e6 * high:.3g})",
+    estimates = [
         f"{1e6 * s.median('lost'):.3g}",
         f"{s.holds} of {len(s.rare)}{few}",
         f"{s.meets} of {len(s.rare)}",
         f"{s.asked:.0f}",
         f"{s.median('wall'):.0f}",
         f"{s.median('gain'):.0f}",
+    ]
+    return [
+        s.case.name,
+        f"{s.case.width:g}",
+        f"{s.boards:,}".replace(",", " "),
+        str(s.lost),
+        f"{1e6 * s.share:.3g} ({1e6 * low:.3g} to {1e6 * high:.3g})",
+        *(estimates if s.rare else ["–"] * len(estimates)),
         s.becomes or "–",
     ]
 
