@@ -345,9 +345,9 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
         filled(
             "*Width*: every law of the parts, offsets and limits over that of bench-1. *Boards*: "
             "those that an estimate takes, pilots included. *Gain*: plain boards that the same "
-            "interval would take over those. *CPU s*: of one estimate, also where other work was beside it "
-            "on the machine. Middle values are medians. The engine that decides "
-            "on a board is the same for both; only which boards are drawn differs."
+            "interval would take over those. *CPU s*: of one estimate, also where other work was "
+            "beside it on the machine. Middle values are medians. The engine that decides on a "
+            "board is the same for both; only which boards are drawn differs."
         ),
         "",
         *table(
