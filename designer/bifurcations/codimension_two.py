@@ -8,8 +8,9 @@ by Brent's method along the curve, every value of it on a converged point.
   the ends, where the pair becomes real, and 1:3 and 1:4 where its sum is -1 and 0.
 - Another multiplier 1 or -1, or another pair on the unit circle: fold-flip and its kin.
 - Grazing meets another kind: a turning point touches a stop on the curve; on a grazing curve a
-  multiplier reaches the unit circle, or a second turning point touches.
-- Degenerate grazing: the turning point ceases to be one, its curvature is zero.
+  multiplier reaches the unit circle, or a second turning point touches. On the curve of a corner
+  too a multiplier may, or a turning point touch a stop; another corner is passed unseen.
+- Degenerate grazing, degenerate corner: the turning point ceases to be one, its curvature is zero.
 - Degenerate pitchfork and degenerate period doubling: the orbits of the curve fall together with
   those that they once left. The curve ends there.
 """
@@ -30,7 +31,7 @@ from designer.bifurcations.conditions import (
     grazings,
 )
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
-from designer.bifurcations.points import TOUCHES, PointKind
+from designer.bifurcations.points import PointKind
 
 APART = 1e-5
 """The step, in scaled units, of the difference that gives the second derivative of the map."""
@@ -153,7 +154,7 @@ def _resonances(total: float, *, symmetric: bool) -> dict[str, float]:
 def meeting(one: PointKind, other: PointKind) -> str:
     """Name of the point where curves of two kinds meet on the same orbit."""
     if one is other:
-        return f"two {one}s" if one in TOUCHES else f"double {one}"
+        return "two grazings" if one is PointKind.GRAZING else f"double {one}"
     a, b = sorted((one, other), key=ORDER.index)
     if b is PointKind.CORNER:
         return f"corner meets {a}"

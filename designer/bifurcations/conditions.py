@@ -23,6 +23,7 @@ from designer.bifurcations.grazing_contact import GrazingContact, height, height
 from designer.bifurcations.points import PointKind
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.turning_points import turning_points_of
 
 Jacobian = Callable[[], Array | None]
@@ -332,9 +333,7 @@ def grazings(
         if symmetric and t.phase >= 0.5 * n:
             continue
         contact = GrazingContact(t.clearance, t.side, t.tip)
-        if but is None or not _is_same(
-            contact, t.phase, *but, mirrored=flow.system.mirror is not None
-        ):
+        if but is None or not _is_same(flow.system, contact, t.phase, *but):
             own = [abs(other.height) for other in near if other.clearance == t.clearance]
             size = max(own) if corners else float(spans[t.clearance])
             out.append((Grazing(contact, n, size, kind), t.phase))
@@ -342,14 +341,22 @@ def grazings(
 
 
 def _is_same(
-    contact: GrazingContact, phase: float, other: Grazing, at: float, *, mirrored: bool
+    system: PiecewiseLinearSystem, contact: GrazingContact, phase: float, other: Grazing, at: float
 ) -> bool:
     """Whether two turning points are one, or mirror images of each other on a symmetric orbit."""
-    if (contact.clearance, contact.tip) != (other.contact.clearance, other.contact.tip):
-        return False
-    n = other.n
-    shift = 0.0 if contact.side == other.contact.side else 0.5 * n
-    if shift and not mirrored:
-        return False
+    n, shift = other.n, 0.0
+    if contact != other.contact:
+        if _image(system, contact) != other.contact:
+            return False
+        shift = 0.5 * n
     off = (phase - at - shift) % n
     return min(off, n - off) < SAME_PHASE
+
+
+def _image(system: PiecewiseLinearSystem, contact: GrazingContact) -> GrazingContact | None:
+    """The same turning point on the mirror image of an orbit; None where there is none."""
+    first = len(system.clearances)
+    if contact.clearance >= first:
+        number = system.corner_images[contact.clearance - first]
+        return None if number < 0 else replace(contact, clearance=first + number)
+    return None if system.mirror is None else replace(contact, side=-contact.side)

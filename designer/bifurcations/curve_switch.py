@@ -14,7 +14,7 @@ Both curves pass through the point; what else is unknown is the tangent of the o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -93,11 +93,12 @@ def read_other_curve(
     """
     if row is None:
         return None
-    fields = {**row, "symmetric": symmetric, "values": values}
-    if row["touch"] is not None:
-        touch = dict(row["touch"])
-        fields |= {"phase": touch.pop("phase"), "size": touch.pop("size"), "touch": touch}
-    return read_record(OtherCurve, fields)
+    own = {name: row[name] for name in ("kind", "n", "state", "stable")}
+    own |= {"symmetric": symmetric, "values": values}
+    if (touch := row["touch"]) is not None:
+        contact = {each.name: touch[each.name] for each in fields(GrazingContact)}
+        own |= {"touch": contact, "phase": touch["phase"], "size": touch["size"]}
+    return read_record(OtherCurve, own)
 
 
 def other_curve(system: ExtendedSystem, c: CodimensionTwo) -> OtherCurve | None:

@@ -229,8 +229,11 @@ def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[PointKind
 
 
 def _corners(a: BranchPoint, b: BranchPoint) -> list[int]:
-    """Numbers of the corners that are not passed as often at both."""
-    pairs = enumerate(zip(a.crossings, b.crossings, strict=False))
+    """Numbers of the corners that are not passed as often at both; none where a law has another
+    number of them."""
+    if len(a.crossings) != len(b.crossings):
+        return []
+    pairs = enumerate(zip(a.crossings, b.crossings, strict=True))
     return [k for k, (before, after) in pairs if before != after]
 
 

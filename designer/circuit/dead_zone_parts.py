@@ -40,7 +40,8 @@ class DeadZoneStage:
 
     @property
     def rectifies(self) -> bool:
-        """Whether diodes make its dead zones, each stop by a half of its own."""
+        """Whether diodes make its dead zones, each stop by a half of its own. Every kind but the
+        paper's is a rectifier or a variant of it, with its resistors' names and its sizing."""
         return self.kind != "saturation"
 
     @property

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
-from scipy.optimize import linprog
 
 from designer.base.arrays import Array, Mask
 from designer.circuit.linear_program import LinearProgram
@@ -16,7 +17,7 @@ def least_largest(h: Array, D: Array) -> float:
     ------
     ArithmeticError : the solver found nothing, which no finite h and D can cause.
     """
-    return float(np.abs(h + D @ _level(h, D)).max())
+    return float(np.abs(h + D @ _Fit(D).level(h)).max())
 
 
 def minimax(h: Array, D: Array) -> Array:
@@ -26,38 +27,9 @@ def minimax(h: Array, D: Array) -> Array:
 
     Raises
     ------
-    ArithmeticError : the solver found nothing, which no finite h and D can cause.
+    ArithmeticError : as ``least_largest``.
     """
-    m, n = D.shape
-    level = _level(h, D)
-    worst = float(np.abs(h + D @ level).max())
-    # Second pass: |e_i| <= t_i <= worst, least sum of t.
-    total = linprog(
-        np.concatenate([np.zeros(n), np.ones(m)]),
-        A_ub=np.block([[D, -np.eye(m)], [-D, -np.eye(m)]]),
-        b_ub=np.concatenate([-h, h]),
-        bounds=[(None, None)] * n + [(0.0, worst + 1e-12)] * m,
-        method="highs",
-    )
-    best = level
-    if total.x is not None and np.abs(h + D @ total.x[:n]).max() <= worst + 1e-9:
-        best = total.x[:n]
-    return np.asarray(best, dtype=float)
-
-
-def _level(h: Array, D: Array) -> Array:
-    """s (n,) with the least max |h + D s|."""
-    m, n = D.shape
-    level = linprog(
-        np.concatenate([np.zeros(n), [1.0]]),
-        A_ub=np.block([[D, -np.ones((m, 1))], [-D, -np.ones((m, 1))]]),
-        b_ub=np.concatenate([-h, h]),
-        bounds=[(None, None)] * n + [(0.0, None)],
-        method="highs",
-    )
-    if level.x is None:  # feasible for every h, so only a broken solver comes here
-        raise ArithmeticError(f"no minimax scales: {level.message}")
-    return np.asarray(level.x[:n], dtype=float)
+    return _Fit(D).best(h)
 
 
 class LargestFit:
@@ -68,39 +40,55 @@ class LargestFit:
     """
 
     def __init__(self, D: Array, own: Mask) -> None:
-        self._slopes, self._own, fitted = D, own, D[own]
-        (m, n), inf = fitted.shape, np.inf
-        ones, eye = np.ones((m, 1)), np.eye(m)
-        free, at_least = np.full(n, -inf), np.zeros(m)
-        self._levels = LinearProgram(
-            np.block([[fitted, -ones], [-fitted, -ones]]), np.append(free, 0.0), np.full(n + 1, inf)
-        )
-        self._sums = LinearProgram(
-            np.block([[fitted, -eye], [-fitted, -eye]]),
-            np.append(free, at_least),
-            np.full(n + m, inf),
-        )
+        self._slopes, self._own, self._fit = D, own, _Fit(D[own])
 
     def largest(self, h: Array) -> float:
         """The largest |h + D s|, h (m,).
 
         Raises
         ------
-        ArithmeticError : as ``minimax``.
+        ArithmeticError : as ``least_largest``.
         """
-        (m, n), own = self._slopes[self._own].shape, h[self._own]
-        ends = np.concatenate([-own, own])
-        level = self._levels.solve(np.eye(1, n + 1, n)[0], ends)
-        if level is None:
+        fit = self._fit.level if self._own.all() else self._fit.best
+        return float(np.abs(h + self._slopes @ fit(h[self._own])).max())
+
+
+class _Fit:
+    """The scales of many h with the same D (m, n)."""
+
+    def __init__(self, D: Array) -> None:
+        self._slopes = D
+
+    def level(self, h: Array) -> Array:
+        """s (n,) with the least max |h + D s|."""
+        n = self._slopes.shape[1]
+        level = self._levels.solve(np.eye(1, n + 1, n)[0], np.concatenate([-h, h]))
+        if level is None:  # feasible for every h, so only a broken solver comes here
             raise ArithmeticError("no minimax scales")
-        errors = h + self._slopes @ level[:n]
-        worst = float(np.abs(errors[self._own]).max())
-        if not self._own.all():
-            cost = np.append(np.zeros(n), np.ones(m))
-            most = np.append(np.full(n, np.inf), np.full(m, worst + 1e-12))
-            total = self._sums.solve(cost, ends, most)
-            if total is not None:
-                fitted = h + self._slopes @ total[:n]
-                if np.abs(fitted[self._own]).max() <= worst + 1e-9:
-                    errors = fitted
-        return float(np.abs(errors).max())
+        return level[:n]
+
+    def best(self, h: Array) -> Array:
+        """Of those the one with the least sum: |e_i| <= t_i <= worst, least sum of t."""
+        m, n = self._slopes.shape
+        level = self.level(h)
+        worst = float(np.abs(h + self._slopes @ level).max())
+        cost = np.append(np.zeros(n), np.ones(m))
+        most = np.append(np.full(n, np.inf), np.full(m, worst + 1e-12))
+        total = self._sums.solve(cost, np.concatenate([-h, h]), most)
+        if total is None or np.abs(h + self._slopes @ total[:n]).max() > worst + 1e-9:
+            return level
+        return total[:n]
+
+    @cached_property
+    def _levels(self) -> LinearProgram:
+        return self._program(np.ones((len(self._slopes), 1)))
+
+    @cached_property
+    def _sums(self) -> LinearProgram:
+        return self._program(np.eye(len(self._slopes)))
+
+    def _program(self, tops: Array) -> LinearProgram:
+        """Its variables are s and what |h + D s| may not exceed: tops @ these."""
+        D, (_, count) = self._slopes, tops.shape
+        low = np.append(np.full(D.shape[1], -np.inf), np.zeros(count))
+        return LinearProgram(np.block([[D, -tops], [-D, -tops]]), low, np.full(len(low), np.inf))

@@ -48,7 +48,8 @@ def offset(s: RuleSubject) -> Iterator[Finding]:
 
 
 def _quieter(s: RuleSubject, per_volt: float) -> str:
-    """What helps against offsets, with the op-amps on which the same parts keep the rule.
+    """What helps against offsets, with the op-amps on which the same parts keep the rule. Whether
+    their bias currents, limits and bandwidths suit, the other rules say once one is taken.
 
     per_volt : the force that offsets make, over the largest of them.
     """
@@ -63,7 +64,8 @@ def _quieter(s: RuleSubject, per_volt: float) -> str:
     keep = [f"{name} ({force:.2g})" for name, force in forces.items() if rule.keeps(force, limit)]
     if not keep:
         return f"no op-amp of the catalogue has so little offset; {rule.do}"
-    return f"take circuit.opamp {' or '.join(keep)}; or {rule.do}"
+    names = " or ".join(keep)
+    return f"take circuit.opamp {names} (no other rule is judged with it); or {rule.do}"
 
 
 def bias(s: RuleSubject) -> Iterator[Finding]:

@@ -35,6 +35,9 @@ LONGEST_WALK = 512
 ROUNDING = 1e-14
 """What cannot be told from zero, over the sum of a guard's terms' magnitudes."""
 
+SAME = 1e-9
+"""Relative: what may differ between a corner and the mirror image of another."""
+
 ModeKey = tuple[int, ...]
 
 
@@ -304,6 +307,17 @@ class PiecewiseLinearSystem:
                     found[guard.corner] = guard
                     keys.append(guard.target)
         return tuple(found.values())
+
+    @cached_property
+    def corner_images(self) -> tuple[int, ...]:
+        """Of each of ``corners`` the number of its mirror image; -1 without one."""
+        if self.mirror is None:
+            return (-1,) * len(self.corners)
+        rows = np.array([corner.row for corner in self.corners])
+        images = np.column_stack([rows[:, :-2] @ self.mirror, -rows[:, -2], rows[:, -1]])
+        scale = np.abs(rows).max(axis=1)
+        off = np.abs(images[:, None] - rows).max(axis=2) / scale
+        return tuple(int(np.argmin(each)) if each.min() < SAME else -1 for each in off)
 
     @property
     def built(self) -> int:

@@ -5,24 +5,35 @@ the dip between two contacts that become one. The exact flow's own margins have 
 see dips, so the turning points are found here: exact states at a dense grid, between two nodes the
 quintic that matches height, rate and curvature at both. A contact that begins and ends within one
 interval errs by the square of its penetration, so the sign of the height and its zero are right.
+
+The velocity that a corner of a law watches turns at a kink where the force of a stop jumps (its
+damper's, or a preload). There an interval is split where the mode changes, by the exact motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
+from scipy.optimize import brentq
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.dynamics.flow import Flow
+from designer.dynamics.mode_tables import augmented, augmented_row, augmented_state
 from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import Mode, ModeKey
 
 RESOLUTION = 0.05
 """The interval of the grid, over the fastest rate that an orbit meets; it leaves 1e-13 of the
 peak."""
 FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
+TERMS = 16
+"""Of the Taylor series over an interval."""
+PIECES = 64
+"""Of an interval, at most: by rounding a tangency may be passed again and again."""
 
 
 @dataclass(frozen=True)
@@ -67,16 +78,79 @@ def turning_points_of(
         return []
     rows = [row for _, _, row in stops]
     past = np.stack([x @ row[:-2] + row[-2] * u + row[-1] for row in rows])
-    first, second = _derivatives(flow, x, angle)
+    first, second, mode_of, keys = _derivatives(flow, x, angle)
     step = drive.period / points
+    split: dict[int, list[_Piece]] = {}
+    if not system.continuous and any(j >= len(system.clearances) for j, *_ in stops):
+        for i in np.flatnonzero(mode_of[:-1] != mode_of[1:]).tolist():
+            mode = system.mode(keys[mode_of[i]])
+            split[i] = _pieces(flow, mode, augmented_state(x[i], angle[i], flow.orders), step)
     turning: list[TurningPoint] = []
     for (clearance, side, row), h in zip(stops, past, strict=True):
         C, D = row[:-2], row[-2]
+        kinked = split if clearance >= len(system.clearances) else {}
+        found = _turning(h, first @ C + D * du, second @ C + D * ddu, step, but=kinked)
+        whole = augmented_row(row, drive, flow.orders)
+        found += [
+            (i + place, height, tip)
+            for i, pieces in kinked.items()
+            for place, height, tip in _turning_in(pieces, whole)
+        ]
         turning += [
             TurningPoint(clearance, side, tip, node / points, height)
-            for node, height, tip in _turning(h, first @ C + D * du, second @ C + D * ddu, step)
+            for node, height, tip in sorted(found)
         ]
     return turning
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A part of an interval, in one mode."""
+
+    first: float
+    """Where it begins, in intervals."""
+    length: float
+    """How much of the interval it is."""
+    terms: Array
+    """(TERMS, N) Taylor terms of the augmented state there."""
+
+
+def _pieces(flow: Flow, mode: Mode, z: Array, step: float) -> list[_Piece]:
+    """The motion over one interval, cut where its mode changes. z : (N,) the augmented state at its
+    begin."""
+    out, at = list[_Piece](), 0.0
+    while len(out) < PIECES:
+        M, terms = step * augmented(mode, flow.drive, flow.orders), [z]
+        for k in range(1, TERMS):
+            terms.append(M @ terms[-1] / k)
+        series, length, target = np.array(terms), 1.0 - at, mode
+        for guard in mode.guards:
+            value = Polynomial(series @ augmented_row(guard.row, flow.drive, flow.orders))
+            if value(0.0) < 0.0 < value(length):
+                length = float(brentq(value, 0.0, length, xtol=1e-15))
+                target = flow.system.mode(guard.target)
+        out.append(_Piece(at, length, series))
+        if target is mode:
+            break
+        z, mode, at = length ** np.arange(TERMS) @ series, target, at + length
+    return out
+
+
+def _turning_in(pieces: Sequence[_Piece], row: Array) -> list[tuple[float, float, bool]]:
+    """As of ``_turning`` within an interval, of a row over the augmented state: also where the rate
+    jumps from one sign to the other."""
+    out, before = list[tuple[float, float, bool]](), None
+    for piece in pieces:
+        height = Polynomial(piece.terms @ row)
+        rate = height.deriv()
+        rises, ends = bool(rate(0.0) > 0.0), bool(rate(piece.length) > 0.0)
+        if before not in (None, rises):
+            out.append((piece.first, float(height(0.0)), not rises))
+        if rises != ends:
+            place = _change(rate, piece.length)
+            out.append((piece.first + place, float(height(place)), rises))
+        before = ends
+    return out
 
 
 def corner_crossings(flow: Flow, orbit: Orbit) -> tuple[int, ...]:
@@ -97,8 +171,9 @@ def _rate(flow: Flow, orbit: Orbit) -> float:
     return max(float(np.abs(np.linalg.eigvals(A)).max()) for A in matrices)
 
 
-def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
-    """(nodes, states) x' and x'', each node in the mode that holds there at its drive phase."""
+def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array, Index, list[ModeKey]]:
+    """(nodes, states) x' and x'', each node in the mode that holds there at its drive phase;
+    (nodes,) numbers of these modes, and their keys."""
     drive, orders = flow.drive, flow.system.orders
     u, du = drive.at(angle), drive.rate_at(angle)
     second_drive, moving = drive.second_at(angle), drive.second_rate_at(angle)
@@ -106,8 +181,10 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
     turns = _turned(waves, drive.amplitude * np.sin(angle), drive.omega, orders or ())
     first, second = np.empty_like(x), np.empty_like(x)
     left, near = np.arange(len(x)), None
+    mode_of, keys = np.zeros(len(x), dtype=np.int64), list[ModeKey]()
     while len(left):
         near = flow.mode_at(x[left[0]], float(angle[left[0]]), near)
+        keys.append(near)
         mode = flow.system.mode(near)
         holds = np.ones(len(left), dtype=bool)
         for guard in mode.guards:
@@ -115,6 +192,7 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
             holds &= value + guard.second * second_drive[left] <= 0.0
         holds[0] = True  # by rounding a guard may be above zero where its mode was found
         nodes, left = left[holds], left[~holds]
+        mode_of[nodes] = len(keys) - 1
         first[nodes] = x[nodes] @ mode.A.T + u[nodes, None] * mode.B + mode.d
         second[nodes] = du[nodes, None] * mode.B
         if mode.waves is not None:
@@ -124,7 +202,7 @@ def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array]:
             first[nodes] += second_drive[nodes, None] * mode.second
             second[nodes] += moving[nodes, None] * mode.second
         second[nodes] += first[nodes] @ mode.A.T
-    return first, second
+    return first, second, mode_of, keys
 
 
 def _turned(waves: Array, sine: Array, omega: float, orders: Sequence[int]) -> Array:
@@ -136,23 +214,32 @@ def _turned(waves: Array, sine: Array, omega: float, orders: Sequence[int]) -> A
     return np.stack(rates, axis=-1)
 
 
-def _turning(h: Array, dh: Array, ddh: Array, step: float) -> list[tuple[float, float, bool]]:
-    """(place, value, greatest) of h where its rate changes sign; places in nodes."""
+def _turning(
+    h: Array, dh: Array, ddh: Array, step: float, but: Mapping[int, object]
+) -> list[tuple[float, float, bool]]:
+    """(place, value, greatest) of h where its rate changes sign; places in nodes. but : intervals
+    that are left out."""
     out = []
     for i in np.flatnonzero((dh[:-1] > 0.0) != (dh[1:] > 0.0)):
-        quintic = _quintic(h[i : i + 2], step * dh[i : i + 2], step**2 * ddh[i : i + 2])
-        rate = np.polynomial.Polynomial(quintic).deriv()
-        low, high = 0.0, 1.0
-        rising = bool(rate(0.0) > 0.0)
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if (rate(middle) > 0.0) == rising:
-                low = middle
-            else:
-                high = middle
-        place = 0.5 * (low + high)
-        out.append((float(i) + place, float(np.polynomial.Polynomial(quintic)(place)), rising))
+        if i in but:
+            continue
+        quintic = Polynomial(_quintic(h[i : i + 2], step * dh[i : i + 2], step**2 * ddh[i : i + 2]))
+        rate = quintic.deriv()
+        place = _change(rate, 1.0)
+        out.append((float(i) + place, float(quintic(place)), bool(rate(0.0) > 0.0)))
     return out
+
+
+def _change(rate: Polynomial, high: float) -> float:
+    """Where a polynomial that has different signs at 0 and at ``high`` changes its own."""
+    low, rising = 0.0, bool(rate(0.0) > 0.0)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if (rate(middle) > 0.0) == rising:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 def _quintic(h: Array, dh: Array, ddh: Array) -> Array:

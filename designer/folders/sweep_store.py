@@ -20,7 +20,7 @@ from designer.dynamics.orbit import Motion
 from designer.dynamics.steady_state import SteadyMotion
 from designer.folders.work_files import WorkFiles
 
-RULES = 3
+RULES = 4
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
 _STEP = columns_of(
     SteadyMotion,

@@ -14,9 +14,9 @@ from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.plain_json import dumps
 from designer.base.printed import one_line
 from designer.base.progress import Progress
-from designer.circuit.design import GeneratorSetting
+from designer.circuit.design import Design, GeneratorSetting
 from designer.dynamics.counts import read_counts
-from designer.dynamics.drive_shape import SINE
+from designer.dynamics.drive_shape import has_harmonics
 from designer.folders.report_sections import BENCHED as NAME
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
@@ -113,13 +113,10 @@ def _fits(record: BenchedRecord) -> bool:
 def check_fits(
     prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
 ) -> None:
-    """InputError where the generator gives no sine, for records are recognised by it, and where
-    boards with laws, or with dampers in their stops, are to be fitted: the fit knows contacts
-    alone, and rates that are continuous there."""
-    if prediction.synthesis.design.drive_shapes != (SINE,):
-        found = "a board whose drive has another shape, a phase of its own, or a second channel"
-        expected = "records of a board that one sine drives; a phase that all forces have may go"
-        raise InputError(None, "--record", found, expected)
+    """InputError where the generator does not give the sine that forces of phase 0 take, for
+    records are recognised by it, and where boards with laws, or with dampers in their stops, are to
+    be fitted: the fit knows contacts alone, and rates that are continuous there."""
+    _check_drive(prediction.synthesis.design)
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
     for option, wanted in asked.items():
@@ -129,6 +126,24 @@ def check_fits(
         if wanted and prediction.circuit.dependent_capacitors:
             expected = "a board whose stops have no dampers; records alone are named"
             raise InputError(None, option, "a board with dampers in its stops", expected)
+
+
+def _check_drive(design: Design) -> None:
+    shapes, system, more = design.drive_shapes, design.model.second_order(), ""
+    if len(shapes) > 1:
+        found = "a second channel"
+    elif has_harmonics(*shapes):
+        found = "another shape"
+    elif not system.driven_by_sine:
+        found = "a phase of its own"
+        more = (
+            "; a phase that all forces have may go, but not that of dampers to ground beside stops "
+            "that stay"
+        )
+    else:
+        return
+    expected = f"records of a board that one sine of phase 0 drives{more}"
+    raise InputError(None, "--record", f"a board whose drive has {found}", expected)
 
 
 def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:

@@ -289,18 +289,18 @@ def _misfits(swept: Sweep, window: Window) -> list[LawMisfit]:
         return []
     family, values = subject.family(plan.parameter), plan.values.tolist()
     first, last = values.index(window.low), values.index(window.high)
+    tracks = (window.track,) if window.track in plan.tracks else plan.tracks
     worst: dict[tuple[str, ...], LawMisfit] = {}
     for k in {first, (first + last) // 2, last}:
         model, units = subject.drawn({plan.parameter: values[k]})
-        steps = [swept.steps[track][k] for track in plan.tracks]
-        shown = next((step for step in steps if step.response == window.response), None)
-        if shown is None:
-            continue
-        orbit = Orbit(shown.status, shown.n, shown.p, shown.q, shown.start)
-        for misfit in law_misfits(model, family.flow(values[k]), orbit, units):
-            known = worst.get(misfit.where)
-            if known is None or (misfit.beyond, misfit.error) > (known.beyond, known.error):
-                worst[misfit.where] = misfit
+        for step in (swept.steps[track][k] for track in tracks):
+            if (step.response, step.symmetric) != (window.response, window.symmetric):
+                continue
+            orbit = Orbit(step.status, step.n, step.p, step.q, step.start)
+            for misfit in law_misfits(model, family.flow(values[k]), orbit, units):
+                known = worst.get(misfit.where)
+                if known is None or (misfit.beyond, misfit.error) > (known.beyond, known.error):
+                    worst[misfit.where] = misfit
     return list(worst.values())
 
 

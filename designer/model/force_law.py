@@ -18,6 +18,10 @@ import numpy as np
 from designer.base.arrays import Array
 
 Quantity = Literal["displacement", "velocity"]
+Point = tuple[float, float]
+ROUNDING = 1e-12
+"""Of the force, over the sizes that it is made of: a point that is no further off the line between
+its neighbours is no corner."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,17 @@ class ForceLaw:
     force acts on each mass with the negative of its coefficient, or of ``push``."""
     quantity: Quantity
     points: tuple[tuple[float, float], ...]
-    """(x, force) by rising x, at least two: corners, and a point on each piece beyond them."""
+    """(x, force) by rising x, at least two: corners, and a point on each piece beyond them. Those
+    where the slope stays are left out."""
     push: tuple[float, ...] = ()
     """(n,) as of ``Clearance.push``; () where it is ``row``."""
     curved: bool = False
     """Whether its pieces stand for a curve, whose corners are none."""
+
+    def __post_init__(self) -> None:
+        threes = zip(self.points, self.points[1:], self.points[2:], strict=False)
+        inner = (b for a, b, c in threes if _bent(a, b, c))
+        object.__setattr__(self, "points", (self.points[0], *inner, self.points[-1]))
 
     @cached_property
     def slopes(self) -> tuple[float, ...]:
@@ -107,3 +117,11 @@ class ForceLaw:
         """The same with every length, speed and force ``factor`` times as large."""
         points = tuple((factor * x, factor * force) for x, force in self.points)
         return replace(self, points=points)
+
+
+def _bent(before: Point, point: Point, after: Point) -> bool:
+    """Whether the slope changes at a point, but for rounding."""
+    (x0, f0), (x, force), (x1, f1) = before, point, after
+    slope = (f1 - f0) / (x1 - x0)
+    size = max(abs(f0), abs(f1)) + abs(slope) * max(abs(x0), abs(x1))
+    return abs(force - f0 - slope * (x - x0)) > ROUNDING * size

@@ -314,8 +314,10 @@ class SecondOrderSystem:
 
     @property
     def driven_by_sine(self) -> bool:
-        """Whether all forces are in phase, or in antiphase, and of one frequency."""
-        return not (self.orders or self.drive_waves(1.0)[0].cosine.any())
+        """Whether all forces are in phase, or in antiphase, and of one frequency, whatever it
+        is."""
+        # Cosines of two groups cancel at one frequency alone.
+        return not (self.orders or any(group[1][1].any() for group in self._groups(1.0)))
 
     @property
     def even(self) -> bool:

@@ -179,7 +179,8 @@ class ScaleBox:
         return np.array(weights), np.array(ends)
 
     def _solve(self, worth: Array, bounds: Sequence[LinearBound]) -> Array | None:
-        """z of one linear program."""
+        """z of one linear program, whose rows the next has not: a LinearProgram is for many solves
+        of the same."""
         rows, ends = self._limits(bounds)
         solved = linprog(
             -worth,

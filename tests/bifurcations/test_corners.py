@@ -7,8 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 
+from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
+from designer.bifurcations.conditions import grazings
 from designer.bifurcations.plane_curves import PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import all_windows
@@ -16,7 +20,7 @@ from designer.dynamics.attractors import settle
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.point_captions import caption
-from tests.shared.system_text import system_text, table
+from tests.shared.system_text import clearance, system_text, table
 
 JOINT = ("a", "ground")
 STIFFENING = table(
@@ -93,6 +97,124 @@ def test_the_curve_of_a_corner_over_two_parameters() -> None:
     for omega, amplitude in curve.values:
         assert amplitude == pytest.approx(amplitude_at_corner(omega), rel=1e-7)
     assert curve.codimension_two == ()
+
+
+def test_a_velocity_that_is_largest_where_a_damped_stop_is_met() -> None:
+    """It turns at a kink, for the damper's force jumps there: by another integrator it is that of
+    the corner. No smooth equation holds along its curve, so none is begun."""
+    points = [[-9.0, -0.9], [1.5, 0.15], [9.0, 1.65]]
+    law = table("law", name="drag", between=list(JOINT), points=points) + DRAG
+    gap = clearance("S", *JOINT, upper=0.3, stiffness=2.0, damping=3.0)
+    force = table("force", on="a", amplitude=1.0, constant=1.0)
+    text = system_text({"a": 1.0}, {JOINT: 1.0}, {JOINT: 0.2}, law, gap, force)
+    over, omega = ModelSubject(parse_model_file(text).model, 0.8), 0.8
+    family = over.family("a.amplitude")
+    orbit = settle(family.flow(1.45), np.zeros(2))
+    (point,) = corners(survey(family, [(1.45, orbit)], 1.4, 1.6, depth=0).points)
+    assert point.stops == "drag at 1.5"
+    assert point.error < 1e-8
+
+    def rates(t: float, x: Array) -> Array:
+        pushed = 2.0 * (x[0] - 0.3) + 3.0 * x[1] if x[0] > 0.3 else 0.0
+        drag = 0.1 * x[1] + 0.1 * max(x[1] - 1.5, 0.0)
+        drive = 1.0 + point.value * math.sin(omega * t)
+        return np.array([x[1], drive - 0.2 * x[1] - x[0] - drag - pushed])
+
+    def met(_: float, x: Array) -> float:
+        return float(x[0] - 0.3)
+
+    start, period = point.point.solved.x, 2.0 * math.pi / omega
+    kept = solve_ivp(
+        rates, (0.0, period), start, "DOP853", rtol=1e-10, atol=1e-12, events=met, max_step=0.005
+    )
+    assert kept.y[:, -1] == pytest.approx(start, abs=1e-6)
+    assert kept.y_events is not None
+    assert kept.y_events[0][:, 1].max() == pytest.approx(1.5, abs=1e-6)
+    assert kept.y[1].max() < 1.5 + 1e-6
+    window = PlaneWindow((1.4, 1.6), (0.7, 0.9))
+    assert continued(over.plane("a.amplitude", "omega"), point, omega, window) is None
+
+
+def test_a_fold_on_the_curve_of_a_corner() -> None:
+    """A spring that hardens past ± 1, and once more past ± 2: twice a motion that just comes to 2
+    has a multiplier 1, by another integrator."""
+    points = [[-3.0, -5.5], [-2.0, -3.0], [-1.0, -1.0], [1.0, 1.0], [2.0, 3.0], [3.0, 5.5]]
+    hard = table("law", name="F", between=list(JOINT), points=points)
+    over = subject(hard, 0.0, 1.0, 0.8)
+    family = over.family("omega")
+    orbit = settle(family.flow(1.0), np.zeros(2))
+    (point,) = corners(survey(family, [(1.0, orbit)], 0.98, 1.05, depth=0).points)
+    assert point.stops == "F at 2 and F at -2"
+    window = PlaneWindow((1.0, 1.4), (0.4, 1.0))
+    curve = continued(over.plane("omega", "a.amplitude"), point, 0.8, window)
+    assert curve is not None
+    met = curve.codimension_two
+    assert [each.name for each in met] == ["corner meets fold"] * 2
+    for each in met:
+        omega, amplitude = each.values
+
+        def rates(t: float, x: Array, omega: float = omega, a: float = amplitude) -> Array:
+            spring = x[0] + math.copysign(max(abs(x[0]) - 1.0, 0.0), x[0])
+            return np.array([x[1], a * math.sin(omega * t) - 0.2 * x[1] - spring])
+
+        def image(x: Array, omega: float = omega) -> tuple[Array, float]:
+            times = np.linspace(0.0, 2.0 * math.pi / omega, 4001)
+            kept = solve_ivp(rates, (0.0, times[-1]), x, "DOP853", times, rtol=1e-11, atol=1e-12)
+            return kept.y[:, -1], float(np.abs(kept.y[0]).max())
+
+        start = each.point.z[:2]
+        end, largest = image(start)
+        assert end == pytest.approx(start, abs=1e-7)
+        assert largest == pytest.approx(2.0, abs=1e-5)
+        steps = 1e-5 * np.eye(2)
+        columns = [(image(start + d)[0] - image(start - d)[0]) / 2e-5 for d in steps]
+        multipliers = np.linalg.eigvals(np.array(columns).T)
+        assert np.abs(multipliers - 1.0).min() < 1e-4
+
+
+def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
+    """A law so weak that the motion is linear: the lower of two maxima comes to 1, and is no more
+    where height, rate and curvature of a sine and its third harmonic say so."""
+    weak = table("law", name="F", between=list(JOINT), points=[[0, 0], [1, 1], [2, 2 + 1e-8]])
+    force = table("force", on="a", amplitude=1.0, harmonics=[[3, 0.3, 0.0]])
+    text = system_text({"a": 1.0}, {}, {JOINT: 0.2}, weak, force)
+    over = ModelSubject(parse_model_file(text).model, 0.358)
+    family = over.family("omega")
+    orbit = settle(family.flow(0.358), np.zeros(2))
+    (point,) = corners(survey(family, [(0.358, orbit)], 0.355, 0.365, depth=0).points)
+    window = PlaneWindow((0.34, 0.4), (0.9, 3.2))
+    curve = continued(over.plane("omega", "a.amplitude"), point, 1.0, window)
+    assert curve is not None
+    assert "degenerate corner" in curve.ends
+
+    def off(at: Array) -> Array:
+        phase, omega, amplitude = at
+        waves = [
+            size * np.exp(1j * n * phase) / (1.0 - (n * omega) ** 2 + 0.2j * n * omega)
+            for n, size in ((1, amplitude), (3, 0.3))
+        ]
+        orders = np.array([1j, 3j])
+        return np.array([(orders**d @ waves).imag - (d == 0) for d in range(3)])
+
+    _, *wanted = fsolve(off, [2.8, 0.37, 2.5], xtol=1e-12)
+    (end,) = [each for each in curve.codimension_two if each.name == "degenerate corner"]
+    assert end.values == pytest.approx(wanted, rel=1e-5)
+
+
+def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:
+    """The largest and the least displacement, half a period apart: whichever half of the orbit the
+    followed one is in, the other is no second touch."""
+    flow = subject(STIFFENING, 0.0, 1.4, 1.0).family("omega").flow(1.4)
+    assert [corner.corner for corner in flow.system.corners] == ["F at 1", "F at -1"]
+    start = settle(flow, np.zeros(2)).start
+    every = grazings(flow, start, 1, corners=True)
+    tips = [(each, phase) for each, phase in every if each.contact.tip]
+    assert sorted(each.contact.clearance for each, _ in tips) == [0, 1]
+    assert abs(tips[0][1] - tips[1][1]) == pytest.approx(0.5, abs=1e-9)
+    for own in tips:
+        for symmetric in (True, False):
+            others = grazings(flow, start, 1, own, symmetric=symmetric, corners=True)
+            assert not any(each.contact.tip for each, _ in others)
 
 
 def test_pieces_of_a_curve_have_no_corners() -> None:

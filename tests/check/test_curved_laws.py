@@ -70,6 +70,22 @@ def test_a_sweep_and_the_page_with_sliders_say_so_too(capsys: pytest.CaptureFixt
     assert said.startswith(f"1-0-0 draws the cubic spring between m and ground to {LINEAR:.4g}")
 
 
+def test_of_two_orbits_of_one_name_each_window_tells_its_own() -> None:
+    """A hardening spring past its resonance: the sweep up stays on the large orbit, the sweep down
+    on the small one, about F/(ω² - 1)."""
+    stiff = text(1.0, 1.0).replace(f"damping = {DAMPING}", "damping = 0.05")
+    modelfile = parse_model_file(stiff.replace(f"amplitude = {FORCE}", "amplitude = 0.2"))
+    made = bifurcation(
+        modelfile, from_=1.0, to=1.6, steps=7, up=True, down=True, points=False, jobs=1
+    )
+    down, up = made.answer["windows"]
+    assert (down["track"], up["track"]) == ("down", "up")
+    assert (down["response"], down["symmetric"]) == (up["response"], up["symmetric"])
+    assert up["beyond_range"][0]["reached"] > 1.0
+    assert "beyond_range" not in down
+    assert down["coarse_range"][0]["reached"] == pytest.approx(0.2 / (1.6**2 - 1.0), rel=0.1)
+
+
 def peak_of(k3: float) -> float:
     """Amplitude from rest with the cube itself."""
 

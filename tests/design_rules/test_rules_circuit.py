@@ -348,6 +348,7 @@ def test_offsets_that_are_too_large_name_the_op_amps_that_keep_the_rule() -> Non
         force = run_rules.look("offset-force", with_figure("offset", max=offset)).value
         assert f"{name} ({force:.2g})" in advice
     assert "TL072H" not in advice
+    assert "(no other rule is judged with it)" in advice
     made = base().synthesis
     strict = Override(1e-6, "a test")
     file = replace(made.modelfile, rules={"offset-force": strict})

@@ -13,7 +13,7 @@ from designer.base.errors import InputError
 from designer.check.absolute_motion import absolute_extremes
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
-from designer.fidelity.system_runge_kutta import rates_of
+from designer.fidelity.system_runge_kutta import rates_of, run
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of
@@ -90,6 +90,41 @@ def test_the_absolute_motion_is_another_integrators(shape: str, stop: str) -> No
         shown = companion.of(at, states, OMEGA)
         assert shown[:, 0] == pytest.approx(np.interp(at, times, other[0]), abs=1e-4)
         assert shown[:, 1] == pytest.approx(np.interp(at, times, other[1]), abs=1e-4)
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_a_force_whose_cosine_the_base_cancels_at_one_frequency_is_kept_at_others(
+    stays: bool,
+) -> None:
+    """x″ + 0.1 (x − y)′ + (x − y) + stop = F sin(ωt + φ), the stop over x or over x − y: with what
+    the base's damper does, or its inertia, all forces are a sine at ω = 1."""
+    omega, phase = 2.0, math.pi / 2 if stays else math.pi / 4
+    amplitude, turn = (-0.1, 0.0) if stays else (-math.sqrt(2.0), math.pi / 2)
+    text = system_text({"a": 1.0}, {GROUNDED: 1.0}, {GROUNDED: 0.1})
+    text += table("force", on="a", amplitude=amplitude, phase=phase)
+    text += clearance("S", *GROUNDED, upper=0.2, stiffness=4.0)
+    text += base('stops = "fixed"' if stays else f"phase = {turn}", "1.0")
+    model = parse_model_file(text).model
+    system = model.second_order()
+    assert not system.driven_by_sine
+    assert abs(system.drive_waves(1.0)[0].cosine[0]) < 1e-15 < abs(system.drive_waves(1.0)[0].sine)
+    orbit = settle(model_flow(model, omega), np.zeros(2))
+    assert orbit.status is OrbitStatus.PERIODIC
+
+    def ground(t: float) -> Array:
+        return np.array([math.sin(omega * t + turn), omega * math.cos(omega * t + turn)])
+
+    def rates(t: float, state: Array) -> Array:
+        z, w = state - ground(t)
+        push = 4.0 * max((state[0] if stays else z) - 0.2, 0.0)
+        force = amplitude * math.sin(omega * t + phase)
+        return np.array([state[1], force - 0.1 * w - z - push])
+
+    start = orbit.start + (0.0 if stays else ground(0.0))
+    span = orbit.n * 2.0 * math.pi / omega
+    kept = solve_ivp(rates, (0.0, span), start, "DOP853", rtol=1e-11, atol=1e-13)
+    assert kept.y[:, -1] == pytest.approx(start, abs=1e-8)
+    assert run(model, omega, orbit.start, orbit.n, 4000) == pytest.approx(orbit.start, abs=1e-6)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -12,15 +12,17 @@ import pytest
 
 from designer.bifurcations import basin_shares, border_curves, parameter_map, sweep
 from designer.bifurcations.basin_shares import SharePlan
-from designer.bifurcations.border_curve import BorderCurve, CurveMeeting
+from designer.bifurcations.border_curve import BorderCurve, CurveMeeting, read_curve
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.curve_switch import OtherCurve
 from designer.bifurcations.grazing_contact import GrazingContact
-from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.parameter_map import MapCell, MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.sweep import SweepPlan
-from designer.dynamics.steady_state import TransientSettings
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import SteadyMotion, TransientSettings
+from designer.folders import sweep_store
 from designer.folders.curve_store import CurveBlocks
 from designer.folders.share_store import ShareBlocks
 from designer.folders.sweep_store import GridStore, SweepStore
@@ -236,6 +238,15 @@ class _Curves:
         return [curve.as_dict() for curve in border_curves.run(CURVES, [], store=store)]
 
     path = CurveBlocks.name(0)
+    columns = (
+        "kind: string, response: string, symmetric: bool, "
+        "points: list<element: list<element: double>>, stable: list<element: bool>, "
+        "ends: list<element: string>, codimension_two: list<element: struct<kind: string, "
+        "values: list<element: double>, other: struct<kind: string, n: int64, "
+        "state: list<element: double>, stable: bool, touch: struct<clearance: int64, side: int64, "
+        "tip: bool, phase: double, size: double>>>>, "
+        "begun_at: struct<curve: int64, kind: string, values: list<element: double>>"
+    )
 
 
 WORKS: dict[str, Any] = {"sweep": _Sweep(), "map": _Map(), "shares": _Shares(), "curves": _Curves()}
@@ -255,10 +266,52 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 def test_blocks_have_the_columns_of_earlier_versions(made: Any) -> None:
     """Otherwise what those stored is not read."""
     work, folder, _, content = made
-    if not isinstance(work, _Curves):
-        (folder / work.path).write_bytes(content)
-        schema = pq.read_schema(folder / work.path)
-        assert ", ".join(f"{column.name}: {column.type}" for column in schema) == work.columns
+    (folder / work.path).write_bytes(content)
+    assert columns(folder / work.path) == work.columns
+
+
+def columns(path: Path) -> str:
+    return ", ".join(f"{column.name}: {column.type}" for column in pq.read_schema(path))
+
+
+def test_blocks_of_several_stops_have_the_columns_of_earlier_versions(tmp_path: Path) -> None:
+    """Beside those of one, where there is something in them."""
+    place = np.zeros(4)
+    counts: dict[str, Any] = {"n": 1, "p": 1, "q": 1, "more": ((1, 2), (0, 3))}
+    shared = {**counts, "status": OrbitStatus.PERIODIC, "symmetric": True, "lyapunov": -0.1}
+    step = SteadyMotion(
+        **shared, lyapunov_error=0.0, radius=0.5, start=place, end=place, minima=place,
+        velocities=place, further=(place,), periods=4,
+    )  # fmt: skip
+    cell = MapCell(**shared, i=0, j=0, strobe=tuple(place.tolist()))
+    store = SweepStore(files(tmp_path, []), "omega")
+    store.write("down", 0, [1.4], [step])
+    assert columns(tmp_path / _Sweep.path) == (
+        f"{_Sweep.columns}, more: list<element: list<element: int64>>, "
+        "further: list<element: list<element: double>>"
+    )
+    grid = GridStore(files(tmp_path, []), "map", *AXES)
+    grid.write(0, [cell])
+    assert columns(tmp_path / _Map.path) == (
+        f"{_Map.columns}, more: list<element: list<element: int64>>"
+    )
+
+
+def test_blocks_of_earlier_rules_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By those up to 3, states beside fixed stops were counted from the base."""
+    codes = {sweep_store.work_hash(SWEEP.as_dict())}
+    for rules in range(1, 4):
+        monkeypatch.setattr(sweep_store, "RULES", rules)
+        codes.add(sweep_store.work_hash(SWEEP.as_dict()))
+    assert len(codes) == 4
+
+
+def test_keys_of_a_curve_that_nobody_knows_are_left() -> None:
+    row: Any = CURVE.as_dict()
+    met = row["codimension_two"][0]
+    for each in (row, met, met["other"], met["other"]["touch"]):
+        each["since"] = 2
+    assert read_curve(row).as_dict() == CURVE.as_dict()
 
 
 def test_what_is_no_record_is_damage(made: Any) -> None:

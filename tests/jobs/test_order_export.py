@@ -15,7 +15,7 @@ from designer.jobs import export_job
 from designer.jobs.rules_job import RulesAnswer
 from tests.jobs.test_kicad_export import MODEL, Done, designer, snapshot
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
 
 @pytest.fixture(scope="module")

@@ -20,14 +20,12 @@ from designer.folders.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.repair_job import repair_into
 from designer.jobs.study_job import run_into
-from designer.model.model_file import read_model_file
+from designer.jobs.synthesise_job import synthesise_into
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
-from tests.shared.quick_folders import quick_folder, without_starts
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank", "quick_reports", "designs_are_made_once")
-
-FRESH = Options(seed=4242, samples=400, rung="exact", blame=False)
+FRESH = Options(seed=4242, samples=400, rung="exact")
 """Of the study by which a repair is judged."""
 
 
@@ -65,10 +63,9 @@ class Whole:
 
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     """The repair of this model file's design by this kind alone."""
-    design, repaired = quick_folder(model, where / "design"), where / "cured"
-    with pytest.MonkeyPatch.context() as patched:
-        without_starts(patched)
-        found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
+    design, repaired = where / "design", where / "cured"
+    synthesise_into(parse_model_file(model), design, Options(), Progress())
+    found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
     return Whole(design, repaired, found.answer)
 

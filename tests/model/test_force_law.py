@@ -61,6 +61,22 @@ def test_what_joins_in_at_the_corners_makes_the_force(
     assert mirrored.reach == law.reach
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-4, 0.3])
+def test_a_point_where_the_slope_stays_is_no_corner(unit: float) -> None:
+    """Nor does it break a symmetry, and a small change of the slope is none of rounding."""
+    places = [-3.0, -1.0, 0.1, 1.0, 3.0, 4.0]
+    points = tuple((unit * x, 7.0 * unit * (x if x < 4.0 else 9.0)) for x in places)
+    one = ForceLaw("L", (1.0,), "displacement", points)
+    assert one.corners == (3.0 * unit,)
+    ((_, change),) = one.bends[1]
+    assert change == pytest.approx(35.0)
+    line = ForceLaw("L", (1.0,), "displacement", points[:5])
+    assert (line.corners, line.even) == ((), True)
+    assert line.slope == pytest.approx(7.0)
+    bent = ForceLaw("L", (1.0,), "displacement", ((-1.0, -1.0), (0.5, 0.5), (1.0, 1.0 + 1e-9)))
+    assert bent.corners == (0.5,)
+
+
 @pytest.mark.parametrize(("k1", "k3"), [(0.0, 1.0), (1.0, 2.0), (-1.0, 1.0), (2.0, -0.3)])
 @pytest.mark.parametrize("count", [2, 4, 8, 20])
 def test_pieces_of_a_cubic_miss_it_by_what_they_say(k1: float, k3: float, count: int) -> None:

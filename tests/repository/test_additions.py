@@ -273,8 +273,8 @@ print(json.dumps({
 """
 
 
-def test_a_dead_zone_stage_touches_two_files(tmp_path: Path) -> None:
-    """Its name, and what is built: here a rectifier each half of which has an output of its own,
+def test_a_variant_of_the_rectifier_touches_two_files(tmp_path: Path) -> None:
+    """Its name, and what is built: here a stage each half of which has an output of its own,
     whether its halves are equal or not. It is chosen, and shows what the model does."""
     place = grown(tmp_path, STAGE)
     model = tmp_path / "model.toml"

@@ -1,55 +1,57 @@
-"""Answers that one process of the tests has computed and the others look up: by what was asked, and
-by the sources that answer.
+"""Answers that one process of a test run has computed and the others look up, by what was asked.
+
+Of one run alone: all its processes have the same sources, libraries and environment.
 """
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
+import os
 import pickle
-import shutil
-import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import IO, Any
 
 import numpy as np
+import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("designer", "catalogs")
+from tests.shared.house import ORDER
 
-
-def _state() -> str:
-    """A hash of what answers are made by: sources, catalogues, Python and NumPy."""
-    digest = hashlib.sha256(repr((sys.version, np.__version__)).encode())
-    for path in sorted(each for name in SOURCES for each in (ROOT / name).rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            digest.update(path.relative_to(ROOT).as_posix().encode())
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
-
-
-BEGAN = _state()
-"""When this process began to import the sources."""
-_answers: dict[str, Any] = {}
+PATIENCE = 1000.0
+"""Seconds that a process waits for another's answer: less than a test may take."""
+_answers: dict[str, bytes] = {}
 _folders: list[Path] = []
+_running: list[pytest.Item] = []
 
 
-def open_store(place: Path) -> None:
-    """Keep answers in this folder; those of other sources go."""
-    mine = place / BEGAN
-    for other in place.glob("*"):
-        if other != mine:
-            shutil.rmtree(other, ignore_errors=True)
-    _folders[:] = [mine]
+def open_store(folder: Path) -> None:
+    """Keep answers in this folder, which is of this run."""
+    folder.mkdir(exist_ok=True)
+    _folders[:] = [folder]
+
+
+@contextmanager
+def during(item: pytest.Item) -> Iterator[None]:
+    """Inside, this test runs."""
+    _running[:] = [item]
+    try:
+        yield
+    finally:
+        _running.clear()
 
 
 def stored(function: Callable[..., Any], of: int | None = None) -> Callable[..., Any]:
-    """The same function, which looks among the stored answers first; errors are raised anew.
+    """The same function, which looks among the stored answers first; errors are raised anew. Each
+    caller gets an object of its own.
+
+    What a test computes while it has patched what the function may use is not stored.
 
     of : how many of its first arguments decide its answer; None for all, by name or by place.
     """
@@ -57,35 +59,78 @@ def stored(function: Callable[..., Any], of: int | None = None) -> Callable[...,
     @wraps(function)
     def answer(*arguments: Any, **named: Any) -> Any:
         deciding = (arguments, named) if of is None else arguments[:of]
-        asked = function.__module__, function.__qualname__, _plain(deciding)
+        catalogs = os.environ.get("DESIGNER_CATALOGS")
+        asked = function.__module__, function.__qualname__, catalogs, _plain(deciding)
         key = hashlib.sha256(repr(asked).encode()).hexdigest()
         if key not in _answers:
             with _alone(_folders[0] / key) as path:
-                if path.exists():
-                    _answers[key] = pickle.loads(path.read_bytes())
-                else:
-                    _answers[key] = function(*arguments, **named)
-                    _put(path, _answers[key])
-        return _answers[key]
+                if not path.exists():
+                    found = function(*arguments, **named)
+                    if not _patched(function):
+                        _put(path, found)
+                    return found
+                _answers[key] = path.read_bytes()
+        return pickle.loads(_answers[key])
 
     return answer
 
 
+def _patched(function: Callable[..., Any]) -> bool:
+    """Whether the running test's ``monkeypatch`` has put anything where the function may meet it:
+    not in a package after its own, which it cannot import."""
+    patch = getattr(_running[0], "funcargs", {}).get("monkeypatch") if _running else None
+    if patch is None:
+        return False
+    last = _place(function.__module__, len(ORDER))
+    return bool(patch._setitem) or any(
+        _place(_home(target), -1) <= last for target, *_ in patch._setattr
+    )
+
+
+def _home(target: object) -> str:
+    """The name of a module, or where a class or an object's class stands."""
+    if isinstance(target, ModuleType):
+        return target.__name__
+    return (target if isinstance(target, type) else type(target)).__module__
+
+
+def _place(module: str, outside: int) -> int:
+    """That of a module's package in the order. outside : what stands for all others."""
+    home, _, rest = module.partition(".")
+    package = rest.partition(".")[0]
+    return ORDER.index(package) if home == "designer" and package in ORDER else outside
+
+
 @contextmanager
 def _alone(path: Path) -> Iterator[Path]:
-    """Inside, no other process computes this answer too: it waits for it."""
-    path.parent.mkdir(parents=True, exist_ok=True)  # a run of other sources may have removed it
+    """Inside, no other process computes this answer too: it waits for it.
+
+    Raises
+    ------
+    TimeoutError : another has computed it for longer than ``PATIENCE``.
+    """
     with path.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        _wait(lock)
         yield path
 
 
+def _wait(lock: IO[str]) -> None:
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > end:
+                raise TimeoutError(
+                    f"{lock.name}: another process computes this answer since {PATIENCE:g} s"
+                ) from None
+            time.sleep(0.05)
+
+
 def _put(path: Path, found: Any) -> None:
-    """Store an answer, unless somebody has edited the sources since: it may be of either."""
-    if _state() == BEGAN:
-        partial = path.with_suffix(".part")
-        partial.write_bytes(pickle.dumps(found))
-        partial.replace(path)
+    partial = path.with_suffix(".part")
+    partial.write_bytes(pickle.dumps(found))
+    partial.replace(path)
 
 
 def _plain(value: Any) -> Any:

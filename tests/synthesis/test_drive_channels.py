@@ -376,10 +376,16 @@ def test_the_board_has_a_jack_for_each_channel() -> None:
 
 
 def test_no_record_of_such_a_board_is_named() -> None:
-    for name in ("square", "two phases"):
-        assert made(name).design.drive_shapes != (SINE,)
-        with pytest.raises(InputError, match="a phase that all forces have may go"):
+    """The phase that stops which stay make cannot go."""
+    for name, found, expected in (
+        ("square", "another shape", "one sine of phase 0 drives$"),
+        ("two phases", "a second channel", "one sine of phase 0 drives$"),
+        ("phase", "a phase of its own", "a phase that all forces have may go, but not"),
+        ("stops that stay", "a phase of its own", "dampers to ground beside stops that stay$"),
+    ):
+        with pytest.raises(InputError, match=expected) as refused:
             check_fits(BoardPrediction(made(name)), fit=False, boards=False, decays=[])
+        assert refused.value.found == f"a board whose drive has {found}"
 
 
 THREE = table("force", on="ball", amplitude=1.0, harmonics=[[2, 0.3, 0.0]]) + table(
