@@ -290,18 +290,21 @@ def figures(found: Sequence[Summary]) -> dict[str, Any]:
 def _cells(s: Summary) -> list[str]:
     low, high = s.interval
     few = "" if s.counts else " (too few lost)"
+    estimates = [
+        f"{1e6 * s.median('lost'):.3g}",
+        f"{s.holds} of {len(s.rare)}{few}",
+        f"{s.meets} of {len(s.rare)}",
+        f"{s.asked:.0f}",
+        f"{s.median('cpu'):.0f}",
+        f"{s.median('gain'):.0f}",
+    ]
     return [
         s.case.name,
         f"{s.case.width:g}",
         f"{s.boards:,}".replace(",", " "),
         str(s.lost),
         f"{1e6 * s.share:.3g} ({1e6 * low:.3g} to {1e6 * high:.3g})",
-        f"{1e6 * s.median('lost'):.3g}",
-        f"{s.holds} of {len(s.rare)}{few}",
-        f"{s.meets} of {len(s.rare)}",
-        f"{s.asked:.0f}",
-        f"{s.median('wall'):.0f}",
-        f"{s.median('gain'):.0f}",
+        *(estimates if s.rare else ["–"] * len(estimates)),
         s.becomes or "–",
     ]
 
@@ -329,7 +332,7 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
         f"- Commit of the plain boards: {', '.join(plain) or 'none yet'}",
         f"- Commit of the estimates: {', '.join(rare) or 'none yet'}; so far "
         f"{f['of_all_cases']} of the {times * len(CASES)}, all by the same rules",
-        f"- Machine: {machine()}",
+        f"- Machine that made this page: {machine()}",
         "",
         filled(
             f"{f['meet']} of {f['of_all_cases']} intervals of 95 % meet that of the plain share. "
@@ -342,13 +345,14 @@ def report(found: Sequence[Summary], boards: int, times: int) -> str:
         filled(
             "*Width*: every law of the parts, offsets and limits over that of bench-1. *Boards*: "
             "those that an estimate takes, pilots included. *Gain*: plain boards that the same "
-            "interval would take over those. Middle values are medians. The engine that decides "
-            "on a board is the same for both; only which boards are drawn differs."
+            "interval would take over those. *CPU s*: of one estimate, also where other work was "
+            "beside it on the machine. Middle values are medians. The engine that decides on a "
+            "board is the same for both; only which boards are drawn differs."
         ),
         "",
         *table(
             ["case", "width", "plain boards", "lost", "of a million, plain", "estimated",
-             "hold it", "meet its interval", "boards", "s", "gain", "lost boards show"],
+             "hold it", "meet its interval", "boards", "CPU s", "gain", "lost boards show"],
             [_cells(s) for s in found],
         ),
     ]  # fmt: skip

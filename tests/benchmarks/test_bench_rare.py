@@ -101,6 +101,9 @@ def test_cases_with_too_few_lost_boards_are_left_out() -> None:
     few = Summary(case, [plain(case, 0) | {"lost": 2} | made], [rare(case, 0) | made])
     assert figures([few])["share_held"] is None
     assert "too few lost" in report([few], BLOCK, 1)
+    none = report([Summary(case, few.plain, [])], BLOCK, 1)
+    assert "nan" not in none
+    assert "so far 0 of the" in none
 
 
 def test_wider_boards_are_as_much_further_off() -> None:

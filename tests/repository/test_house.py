@@ -70,19 +70,19 @@ LAZY = {
 """Imports inside functions, outside the verbs and the command line, each with its reason."""
 REACH = {
     "catalog": 6_150,
-    "new": 11_450,
+    "new": 11_500,
     "simulate": 27_900,
-    "bifurcation": 34_450,
-    "reproduce": 56_600,
-    "rules": 60_050,
-    "explore": 58_700,
-    "bench": 62_250,
-    "trade": 64_700,
-    "export": 66_050,
-    "synthesise": 64_750,
-    "run": 68_050,
-    "tolerance": 68_150,
-    "search": 73_050,
+    "bifurcation": 34_600,
+    "reproduce": 56_750,
+    "rules": 60_150,
+    "explore": 58_850,
+    "bench": 62_400,
+    "trade": 64_800,
+    "export": 66_150,
+    "synthesise": 64_850,
+    "run": 68_150,
+    "tolerance": 68_200,
+    "search": 73_250,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 
