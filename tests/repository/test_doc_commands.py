@@ -54,7 +54,6 @@ SMALLER = {
             "examples/rig.toml",
         )
     },
-    "--omega 0.3 --plots out/dry-friction": "--omega 0.3 --starts 2 --plots out/dry-friction",
     # the boards of pages that are routed and asked in ngspice are the paper's and the rig's
     **{
         f"run examples/{name}.toml": f"synthesise examples/{name}.toml"
