@@ -13,7 +13,7 @@ from scipy.optimize import fsolve
 from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.conditions import grazings
-from designer.bifurcations.plane_curves import PlaneWindow, continued
+from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import all_windows
 from designer.dynamics.attractors import settle
@@ -83,14 +83,21 @@ def test_a_corner_of_a_law_of_velocity() -> None:
     assert point.stops == "drag at 0.5 and drag at -0.5"
 
 
-def test_the_curve_of_a_corner_over_two_parameters() -> None:
-    over = subject(STIFFENING, 0.0, 1.6, 1.0)
+def curve_of_corner(
+    over: ModelSubject, start: float, ends: tuple[float, float], window: PlaneWindow
+) -> PlaneCurve:
+    """That of the one corner on the branch of what is reached from rest at a frequency."""
     family = over.family("omega")
-    orbit = settle(family.flow(1.6), np.zeros(2))
-    (point,) = corners(survey(family, [(1.6, orbit)], 1.36, 1.7, depth=0).points)
-    window = PlaneWindow((1.2, 1.7), (0.6, 1.8))
+    orbit = settle(family.flow(start), np.zeros(2))
+    (point,) = corners(survey(family, [(start, orbit)], *ends, depth=0).points)
     curve = continued(over.plane("omega", "a.amplitude"), point, 1.0, window)
     assert curve is not None
+    return curve
+
+
+def test_the_curve_of_a_corner_over_two_parameters() -> None:
+    over = subject(STIFFENING, 0.0, 1.6, 1.0)
+    curve = curve_of_corner(over, 1.6, (1.36, 1.7), PlaneWindow((1.2, 1.7), (0.6, 1.8)))
     assert curve.kind is PointKind.CORNER
     assert set(curve.ends) == {"edge of a.amplitude"}
     assert len(curve.points) > 10
@@ -179,12 +186,7 @@ def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
     force = table("force", on="a", amplitude=1.0, harmonics=[[3, 0.3, 0.0]])
     text = system_text({"a": 1.0}, {}, {JOINT: 0.2}, weak, force)
     over = ModelSubject(parse_model_file(text).model, 0.358)
-    family = over.family("omega")
-    orbit = settle(family.flow(0.358), np.zeros(2))
-    (point,) = corners(survey(family, [(0.358, orbit)], 0.355, 0.365, depth=0).points)
-    window = PlaneWindow((0.34, 0.4), (0.9, 3.2))
-    curve = continued(over.plane("omega", "a.amplitude"), point, 1.0, window)
-    assert curve is not None
+    curve = curve_of_corner(over, 0.358, (0.355, 0.365), PlaneWindow((0.34, 0.4), (0.9, 3.2)))
     assert "degenerate corner" in curve.ends
 
     def off(at: Array) -> Array:
