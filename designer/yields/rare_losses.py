@@ -751,7 +751,11 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     # It takes long to say what clips or has no n-p-q: those walks are shorter.
     fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
     quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
-    ends = [*walk(quick, shown(False), rng), *walk(slow, shown(True), rng, FEW_MOVES)]
+    ends = list(walk(quick, shown(False), rng))
+    commonest = max(
+        (each.share for each, points in zip(quick, ends, strict=True) if len(points)), default=0.0
+    )
+    ends += walk(slow, shown(True), rng, FEW_MOVES, commonest)
     found, may = list[_Region](), _tiltable(drawing.names)
     for each, points in zip([*quick, *slow], ends, strict=True):
         if not len(points):  # it ended on its way
@@ -791,7 +795,8 @@ def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], i
     walks = list[LossWalk]()
     for kind, (wide, boards) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
         even = np.ones(len(boards))
-        walks += [LossWalk.of(kind, wide, boards[side]) for side in _sides(boards, even, even > 0)]
+        for side in _sides(boards, even, even > 0):
+            walks.append(LossWalk.of(kind, wide, boards[side], float(side.sum()) / EXPLORED))
     return walks[:MOST_WALKS], asked
 
 
