@@ -22,6 +22,9 @@ MOVES = 2
 """Moves of each board at a width."""
 LAST_MOVES, KEPT = 120, 20
 """Moves at the last width, and between two of which the boards are kept."""
+MINOR = 0.01
+"""Share of the commonest kind's losses below which a walk is kept after ``KEPT`` last moves: what
+it finds adds next to nothing."""
 FEWEST_APART, MOST_APART = 0.08, 0.5
 """Independent boards for each that is kept, at least and at most: copies have much in common."""
 CHI = 0.455
@@ -62,6 +65,8 @@ class LossWalk:
     """Width at which these boards are lost."""
     normal: Array
     """(N, coordinates) the boards, as normal numbers."""
+    share: float
+    """Share of all boards of that width that are lost so, as far as its steps say."""
     step: float = NARROWED
     reach: float = REACH
     tries: int = 0
@@ -72,10 +77,11 @@ class LossWalk:
     """(N, coordinates) boards of width 1, after some moves each."""
 
     @classmethod
-    def of(cls, kind: str, width: float, points: Array) -> LossWalk:
-        """From lost boards (N, coordinates) of one width, each as often as another."""
+    def of(cls, kind: str, width: float, points: Array, share: float) -> LossWalk:
+        """From lost boards (N, coordinates) of one width, each as often as another, which are so
+        large a share of all."""
         each = np.arange(BOARDS) % len(points)
-        return cls(kind, width, width, ndtri(np.clip(points, EDGE, 1.0 - EDGE))[each])
+        return cls(kind, width, width, ndtri(np.clip(points, EDGE, 1.0 - EDGE))[each], share)
 
     @property
     def going(self) -> bool:
@@ -104,6 +110,7 @@ class LossWalk:
                 self.any_loss, self.tries, self.step = True, 0, NARROWED
             return
         self.width, self.tries = self.next_width, 0
+        self.share *= float(stay.mean())
         if stay.mean() > STAY:
             self.step = max(self.step**1.5, LONGEST)
         kept = self.normal[stay]
@@ -111,9 +118,15 @@ class LossWalk:
 
 
 def walk(
-    walks: Sequence[LossWalk], shown: Shown, rng: np.random.Generator, moves: int = LAST_MOVES
+    walks: Sequence[LossWalk],
+    shown: Shown,
+    rng: np.random.Generator,
+    moves: int = LAST_MOVES,
+    commonest: float = 0.0,
 ) -> tuple[Array, ...]:
-    """Lead all walks to the width 1, as far as they come. moves : of each board at that width.
+    """Lead all walks to the width 1, as far as they come. moves : of each board at that width;
+    fewer of a walk whose share is minor beside another's, or beside that of the ``commonest`` loss
+    that is known.
 
     Returns for each walk (N, coordinates) lost boards of width 1, spread as lost boards of its kind
     are; none where it ended on its way. Boards that are near each other in it are not independent.
@@ -125,7 +138,12 @@ def walk(
         for _ in range(MOVES):
             _moved(going, shown, rng)
     there = [w for w in walks if w.width == 1.0]
-    for move in range(moves if there else 0):
+    telling = MINOR * max([commonest, *(w.share for w in there)])
+    for move in range(moves):
+        if move == KEPT:
+            there = [w for w in there if w.share >= telling]
+        if not there:
+            break
         _moved(there, shown, rng)
         if (move + 1) % KEPT == 0:
             for each in there:

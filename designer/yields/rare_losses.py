@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from itertools import compress
@@ -75,6 +75,10 @@ OFTEN = 0.05
 MET, MANY = 3, 16
 """Boards that show one kind of loss at a width, at least, for it to be followed back; and from the
 least width at which so many do, where one has them."""
+SEARCHES = 3
+"""Walks from lost boards, and from those that lie in none of the regions found so."""
+ELSEWHERE = 0.4
+"""Density of a region's boards over that of all, below which a board is taken not to lie in it."""
 EXPLORED = 512
 """Boards of a width."""
 SCOUTED = 40_000
@@ -666,15 +670,14 @@ def _regions(drawing: _Drawing, rng: np.random.Generator) -> _Found:
     regions, asked = [*wide, *limits], len(PATH) * len(limits) + spent
     clear, strays = 0, list[Array]()
     for _ in range(PILOTS):
-        some = regions[:MOST_REGIONS]
-        cube = _mixture(some, 0.3, len(drawing.names))
+        cube = _mixture(regions, 0.3, len(drawing.names))
         sample = drawing.scouted(*cube.drawn(PILOT, rng))
         asked += len(sample.points)
         clear += int((sample.component == 0).sum())
         strays.append(sample.points[(sample.component == 0) & sample.lost])
-        moved = _moved(some, cube, sample, drawing.names) or some
-        regions = sorted(moved, key=lambda region: -region.adds)
-    return _Found(regions[:MOST_REGIONS], asked, clear, np.concatenate(strays))
+        moved = _moved(regions, cube, sample, drawing.names) or regions
+        regions = sorted(moved, key=lambda region: -region.adds)[:MOST_REGIONS]
+    return _Found(regions, asked, clear, np.concatenate(strays))
 
 
 def _mixture(regions: Sequence[_Region], plain: float, size: int) -> TiltedCube:
@@ -737,8 +740,29 @@ def _strength(way: Array, reliability_index: float) -> float:
 
 def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_Region], int]:
     """A tilt for each kind of loss that boards show which are further off than they may be: of
-    those boards, led back to what parts may be (``loss_walks``)."""
-    walks, asked = _met(drawing, rng)
+    those boards, led back to what parts may be (``loss_walks``). Boards of a walk are copies of few
+    in the end, so that of two regions of one kind it may leave one: lost boards that lie in no
+    region of their kind begin walks again."""
+    wider, asked = _wider_boards(drawing, rng)
+    regions = dict[str, list[_Region]]()
+    walks = _begun(wider)
+    for _ in range(SEARCHES):
+        found, spent = _led_back(drawing, walks, rng)
+        asked += spent
+        for kind, region in found:
+            regions.setdefault(kind, []).append(region)
+        again = {kind: [region.tilt for region in regions[kind]] for kind, _ in found}
+        walks = _begun([each.outside(again) for each in wider])
+        if not walks:
+            break
+    return [region for some in regions.values() for region in some], asked
+
+
+def _led_back(
+    drawing: _Drawing, walks: Sequence[LossWalk], rng: np.random.Generator
+) -> tuple[list[tuple[str, _Region]], int]:
+    """Regions at the ends of these walks, each with the kind of loss, and the boards asked."""
+    asked = 0
 
     def shown(whole: bool) -> Shown:
         def kinds(points: Array, widths: Array) -> list[str]:
@@ -751,8 +775,10 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
     # It takes long to say what clips or has no n-p-q: those walks are shorter.
     fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
     quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
-    ends = [*walk(quick, shown(False), rng), *walk(slow, shown(True), rng, FEW_MOVES)]
-    found, may = list[_Region](), _tiltable(drawing.names)
+    ends = list(walk(quick, shown(False), rng))
+    commonest = max((w.share for w in quick if not w.going), default=0.0)
+    ends += walk(slow, shown(True), rng, FEW_MOVES, commonest)
+    found, may = list[tuple[str, _Region]](), _tiltable(drawing.names)
     for each, points in zip([*quick, *slow], ends, strict=True):
         if not len(points):  # it ended on its way
             continue
@@ -761,38 +787,77 @@ def _by_wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[
         even, share = np.ones(len(points)), independent(points) / len(points)
         for mine in _sides(points, even, lost, share) if lost.any() else ():
             count = share * float(mine.sum())
+            if (
+                count < FEWEST and mine.sum() < lost.sum()
+            ):  # too few tell where; others begin there again
+                continue
             tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), count)
             if tilt.any():
-                found.append(_Region(tilt, f"boards {each.met:g} times as far off"))
+                region = _Region(tilt, f"boards {each.met:g} times as far off")
+                found.append((each.kind, region))
     return found, asked
 
 
-def _met(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[LossWalk], int]:
-    """Walks from each kind of loss at the least width at which enough boards show it, the nearest
-    first, and the boards that were asked; wider boards are asked until enough are lost."""
-    size, asked, last = len(drawing.names), 0, False
-    plain = _mixture([], PLAIN, size)
-    met = dict[str, tuple[float, Array]]()
+@dataclass(frozen=True)
+class _WiderBoards:
+    """Boards whose parts are off by more than they may be."""
+
+    width: float
+    """By how much more."""
+    points: Array
+    """(N, coordinates)"""
+    kinds: tuple[str, ...]
+    """The kind of loss of each, "" where it is fine."""
+
+    def outside(self, tilts: Mapping[str, Sequence[Array]]) -> _WiderBoards:
+        """The same boards, those fine that are not of these kinds or lie where tilts of their kind
+        lead, which lean the less the wider boards are."""
+        kinds = list(self.kinds)
+        for k, kind in enumerate(kinds):
+            if kind not in tilts:
+                kinds[k] = ""
+        for kind in {*kinds} - {""}:
+            leans = [tilt_of(0.5 + (mean_of(tilt) - 0.5) / self.width) for tilt in tilts[kind]]
+            even = np.full(len(leans), 1.0 / len(leans))
+            cube = TiltedCube.of(leans, 0.0, self.points.shape[1], even)
+            inside = cube.densities(self.points)[:, 1:].max(axis=1) * len(leans) >= ELSEWHERE
+            kinds = ["" if k == kind and i else k for k, i in zip(kinds, inside, strict=True)]
+        return replace(self, kinds=tuple(kinds))
+
+
+def _wider_boards(drawing: _Drawing, rng: np.random.Generator) -> tuple[list[_WiderBoards], int]:
+    """Boards of one width after the other, until enough are lost, and how many were asked."""
+    plain = _mixture([], PLAIN, len(drawing.names))
+    found, last = list[_WiderBoards](), False
     for wide in WIDE:
         points, component = plain.drawn(EXPLORED, rng)
         sample = drawing.scouted(points, component, np.full(len(points), wide))
-        asked += len(points)
         each = zip(sample.responses, sample.lost, strict=True)
-        kinds = [_kind_of(response) if lost else "" for response, lost in each]
-        for kind in {*kinds} - {""}:
-            here = points[[shown == kind for shown in kinds]]
-            before = len(met[kind][1]) if kind in met else MET - 1
-            if before < min(len(here), MANY):
-                met[kind] = (wide, here)
+        kinds = tuple(_kind_of(response) if lost else "" for response, lost in each)
+        found.append(_WiderBoards(wide, points, kinds))
         if sample.lost.mean() >= OFTEN:
             if last:  # a width more, for kinds of loss that the first had too few of
                 break
             last = True
+    return found, sum(len(each.points) for each in found)
+
+
+def _begun(wider: Sequence[_WiderBoards]) -> list[LossWalk]:
+    """Walks from each kind of loss at the least width at which enough boards show it, the nearest
+    first."""
+    met = dict[str, tuple[float, Array]]()
+    for boards in wider:
+        for kind in {*boards.kinds} - {""}:
+            here = boards.points[[shown == kind for shown in boards.kinds]]
+            before = len(met[kind][1]) if kind in met else MET - 1
+            if before < min(len(here), MANY):
+                met[kind] = (boards.width, here)
     walks = list[LossWalk]()
-    for kind, (wide, boards) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
-        even = np.ones(len(boards))
-        walks += [LossWalk.of(kind, wide, boards[side]) for side in _sides(boards, even, even > 0)]
-    return walks[:MOST_WALKS], asked
+    for kind, (wide, points) in sorted(met.items(), key=lambda each: (each[1][0], each[0])):
+        even = np.ones(len(points))
+        for side in _sides(points, even, even > 0):
+            walks.append(LossWalk.of(kind, wide, points[side], float(side.sum()) / EXPLORED))
+    return walks[:MOST_WALKS]
 
 
 def _kind_of(shown: str) -> str:

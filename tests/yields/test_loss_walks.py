@@ -31,22 +31,24 @@ def shown(points: Array, widths: Array) -> list[str]:
 
 def begun(kind: str, width: float, rng: np.random.Generator) -> LossWalk:
     points = rng.random((20_000, SIZE))
-    here = [k == kind for k in shown(points, np.full(len(points), width))]
-    return LossWalk.of(kind, width, points[here][:12])
+    here = np.array([k == kind for k in shown(points, np.full(len(points), width))])
+    return LossWalk.of(kind, width, points[here][:12], float(here.mean()))
 
 
 def test_boards_that_have_walked_have_the_law_of_lost_boards() -> None:
-    """Each kind alone; of a kind that no board of width 1 shows, none is left."""
+    """Each kind alone, and how common it is; of a kind that no board of width 1 shows, none is
+    left."""
     rng = np.random.default_rng(4)
     walks = [begun("2-2-2", 2.0, rng), begun("clipped", 2.5, rng), begun("far", 2.5, rng)]
     large, small, none = walk(walks, shown, rng)
     assert len(none) == 0
-    for points, threshold, mine in (
-        (large, 9.5, large[:, :SUMMED]),
-        (small, 10.2, 1.0 - small[:, -SUMMED:]),
+    for begun_there, points, threshold, mine in (
+        (walks[0], large, 9.5, large[:, :SUMMED]),
+        (walks[1], small, 10.2, 1.0 - small[:, -SUMMED:]),
     ):
         assert (mine.sum(axis=1) > threshold).all()
         beyond = quad(lambda s: irwin_hall(SUMMED, s), threshold, SUMMED)[0]
+        assert 0.3 < begun_there.share / irwin_hall(SUMMED, threshold) < 3.0
         mean = threshold + beyond / irwin_hall(SUMMED, threshold)
         assert mine.sum(axis=1).mean() == pytest.approx(mean, abs=0.05)
         assert mine.mean(axis=0) == pytest.approx(mean / SUMMED, abs=0.06)
@@ -65,7 +67,7 @@ def test_a_loss_that_is_called_otherwise_on_better_parts_is_followed() -> None:
     rng = np.random.default_rng(8)
     points = rng.random((200_000, SIZE))
     far = [k == "4-4-4" for k in called(points, np.full(len(points), 2.0))]
-    (found,) = walk([LossWalk.of("4-4-4", 2.0, points[far][:12])], called, rng, moves=40)
+    (found,) = walk([LossWalk.of("4-4-4", 2.0, points[far][:12], 1e-3)], called, rng, moves=40)
     assert set(called(found, np.ones(len(found)))) == {"2-2-2"}
 
 
@@ -79,7 +81,7 @@ def test_copies_are_no_independent_boards(copies: int, least: float, most: float
 
 def test_boards_lie_within_what_parts_may_be() -> None:
     """A coordinate of 1 is beyond the end of its part's law, where an unbounded one is infinite."""
-    far = LossWalk("clipped", 2.0, 2.0, np.array([[-40.0, 0.0, 40.0]]))
+    far = LossWalk("clipped", 2.0, 2.0, np.array([[-40.0, 0.0, 40.0]]), 0.1)
     low, middle, high = far.points[0]
     assert (low, middle) == (0.0, 0.5)
     assert 1.0 - 1e-15 < high < 1.0
@@ -90,9 +92,18 @@ def test_moves_are_as_long_as_boards_stay_lost(kind: str, reach: float) -> None:
     """Where every board is lost a move may forget where it began; where none stays, a short one is
     tried, and the boards are where they were."""
     begun_at = np.random.default_rng(1).random((12, 5))
-    each = LossWalk.of("2-2-2", 1.0, begun_at)
+    each = LossWalk.of("2-2-2", 1.0, begun_at, 0.1)
     before = each.normal
     walk([each], lambda points, _: [kind] * len(points), np.random.default_rng(2), moves=20)
     assert each.reach == reach
     assert (each.normal == before).all() == (kind == "")
     assert len(each.kept) == 1
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.1, 6), (1e-5, 1)])
+def test_a_loss_that_adds_nothing_walks_briefly(share: float, kept: int) -> None:
+    begun_at = np.random.default_rng(1).random((12, 5))
+    each = LossWalk.of("2-2-2", 1.0, begun_at, share)
+    rng = np.random.default_rng(2)
+    walk([each], lambda points, _: ["2-2-2"] * len(points), rng, commonest=0.01)
+    assert len(each.kept) == kept

@@ -152,6 +152,25 @@ def test_the_interval_covers_a_probability_that_is_known(
     assert all(len(r.regions) >= 1 and r.regions[0].becomes == "1-0-0" for r in found)
 
 
+@pytest.mark.parametrize("ends", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_two_regions_of_one_kind_of_loss_are_found(
+    monkeypatch: pytest.MonkeyPatch, ends: bool
+) -> None:
+    """Lost where twelve coordinates are large together, or where twelve others are, or where they
+    are small themselves. What is lost shows the same, and a walk tends to end in one of the two. Of
+    16 intervals of 95 % at least 12 cover: fewer have a chance of 1 in 1000."""
+    truth = irwin_hall(12, 10.0) + irwin_hall(12, 9.7)
+
+    def lost(points: Array) -> list[str]:
+        first = points[:, :12].sum(axis=1)
+        second = 12.0 - first if ends else points[:, -12:].sum(axis=1)
+        return ["1-0-0" if a > 10.0 or b > 9.7 else "" for a, b in zip(first, second, strict=True)]
+
+    found = [estimated(monkeypatch, 60, lost, seed) for seed in range(16)]
+    assert sum(r.low <= truth <= r.high for r in found) >= 12
+    assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
+
+
 def test_a_limit_of_the_nominal_board_leads_to_the_losses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where wider boards show nothing, and in fewer coordinates than there are: of 60 intervals of
     95 % at least 52 cover."""
