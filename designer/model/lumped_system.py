@@ -21,16 +21,15 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import one_of
+from designer.base.schema import GREATEST, SMALLEST, one_of
 from designer.dynamics.drive_shape import SINE
+from designer.laws.element_keys import GROUND, check_joined, check_size, refuse
+from designer.laws.force_law import ForceLaw
+from designer.laws.law_elements import KINDS, NonlinearElement
 from designer.model.clearance import Clearance, combined
-from designer.model.element_keys import GROUND, check_joined, check_size, refuse
-from designer.model.force_law import ForceLaw
-from designer.model.law_elements import KINDS, NonlinearElement
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
 from designer.model.matrices import Matrices
 from designer.model.mechanics import HarmonicForce, SecondOrderSystem, reaches_ground
-from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")
 """Names that mean something else."""

@@ -21,7 +21,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import UNREADABLE, inside, reason
 from designer.base.schema import Accepts, FileTable
 from designer.base.units import parse_quantity
-from designer.model.element_keys import NAME
+from designer.laws.element_keys import NAME
 
 Rows = tuple[tuple[float, ...], ...]
 LARGEST = 64

@@ -24,9 +24,9 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.drive_shape import SINE, Channel, Shape, channels
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.laws.force_law import ForceLaw, Quantity
 from designer.model.clearance import Clearance
 from designer.model.dead_zones import dead_zones
-from designer.model.force_law import ForceLaw, Quantity
 
 
 @dataclass(frozen=True)
