@@ -225,6 +225,10 @@ class Law(NonlinearElement):
             refuse(f"{field}.points", text, f"x in {expected}: the law is of a {self.quantity}")
         for value in chain.from_iterable(self.corners):
             check_size(f"{field}.points", value, "numbers")
+        for i, ((x0, _), (x1, _)) in enumerate(pairwise(self.corners), start=1):
+            if not x0 < x1:  # a sweep's: those of a file rise
+                text = f"x{i} = {x0:g} and x{i + 1} = {x1:g}"
+                refuse(f"{field}.points", text, f"points by rising x, not {text}")
         slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(self.corners)]
         steepest = max(slopes, key=abs)
         if not abs(steepest) <= NUMBERS[1]:

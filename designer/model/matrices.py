@@ -128,6 +128,16 @@ class Matrices(FileTable):
         return np.array(self.damping)
 
     @property
+    def entries(self) -> Iterator[tuple[str, str, str, tuple[int, int]]]:
+        """(matrix, name of the row, of the column, indices) of every entry that may differ from the
+        others: of mass and stiffness those on and above the diagonal."""
+        for key in ("mass", "damping", "stiffness"):
+            for i, name in enumerate(self.names):
+                for j, other in enumerate(self.names):
+                    if j >= i or key == "damping":
+                        yield key, name, other, (i, j)
+
+    @property
     def coupled(self) -> Iterator[tuple[str, str]]:
         """The pairs of masses that an entry of one of the matrices couples."""
         for matrix in (self.mass, self.stiffness, self.damping):
