@@ -38,6 +38,11 @@ from designer.base.errors import MISSING, InputError
 from designer.base.json_schema import Json, either, listed
 from designer.base.units import is_bare_milli, parse_quantity
 
+SMALLEST = math.nextafter(0.0, 1.0)
+"""The least number above 0."""
+GREATEST = math.nextafter(math.inf, 0.0)
+"""The greatest number."""
+
 
 @dataclass(frozen=True)
 class FileTable:

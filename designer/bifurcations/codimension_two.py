@@ -7,9 +7,9 @@ by Brent's method along the curve, every value of it on a converged point.
 - 1:1 and 1:2 resonance: a second multiplier 1 (on a fold) or -1 (on a doubling); on a torus curve
   the ends, where the pair becomes real, and 1:3 and 1:4 where its sum is -1 and 0.
 - Another multiplier 1 or -1, or another pair on the unit circle: fold-flip and its kin.
-- Grazing meets another kind: a turning point touches a stop on the curve; on a grazing curve a
-  multiplier reaches the unit circle, or a second turning point touches. On the curve of a corner
-  too a multiplier may, or a turning point touch a stop; another corner is passed unseen.
+- Grazing, or a corner, meets another kind: a turning point touches a stop or a corner on the
+  curve; on the curve of a grazing or a corner a multiplier reaches the unit circle, or a second
+  turning point touches; on that of a corner its own corner once more is passed unseen.
 - Degenerate grazing, degenerate corner: the turning point ceases to be one, its curvature is zero.
 - Degenerate pitchfork and degenerate period doubling: the orbits of the curve fall together with
   those that they once left. The curve ends there.
@@ -17,12 +17,14 @@ by Brent's method along the curve, every value of it on a converged point.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.bifurcations.conditions import (
     Condition,
     Grazing,
@@ -32,6 +34,8 @@ from designer.bifurcations.conditions import (
 )
 from designer.bifurcations.extended_system import CurvePoint, ExtendedSystem
 from designer.bifurcations.points import PointKind
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.turning_points import corner_crossings
 
 APART = 1e-5
 """The step, in scaled units, of the difference that gives the second derivative of the map."""
@@ -99,11 +103,13 @@ class WatchedPoint:
     """The test functions there."""
     partner: Array
     """(states,) from the orbit to its partner; see ``partner``."""
+    crossings: tuple[int, ...]
+    """As of ``turning_points.corner_crossings``, but for the curve's own corner."""
 
 
 def watched(system: ExtendedSystem, p: CurvePoint) -> WatchedPoint:
     """The point with its test functions, for ``locate`` on both sides of it."""
-    return WatchedPoint(p, events(system, p), partner(system, p))
+    return WatchedPoint(p, events(system, p), partner(system, p), _crossings(system, p))
 
 
 def events(system: ExtendedSystem, p: CurvePoint) -> dict[Event, float]:
@@ -154,7 +160,8 @@ def _resonances(total: float, *, symmetric: bool) -> dict[str, float]:
 def meeting(one: PointKind, other: PointKind) -> str:
     """Name of the point where curves of two kinds meet on the same orbit."""
     if one is other:
-        return "two grazings" if one is PointKind.GRAZING else f"double {one}"
+        touches = {PointKind.GRAZING: "two grazings", PointKind.CORNER: "two corners"}
+        return touches.get(one, f"double {one}")
     a, b = sorted((one, other), key=ORDER.index)
     if b is PointKind.CORNER:
         return f"corner meets {a}"
@@ -183,8 +190,12 @@ def locate(
         for event, root in found
         if root is not None
     ]
-    if not np.array_equal(a.impacts, b.impacts):
-        grazed = _bisected(system, a, b)
+    changed = [] if np.array_equal(a.impacts, b.impacts) else [False]
+    # None where a law has lost a corner, or got one.
+    if before.crossings != after.crossings and len(before.crossings) == len(after.crossings):
+        changed.append(True)
+    for corners in changed:
+        grazed = _bisected(system, a, b, corners=corners)
         out += [] if grazed is None else [replace(grazed, position=index + grazed.position)]
     return sorted(out, key=lambda c: c.position)
 
@@ -226,35 +237,61 @@ def _root(system: ExtendedSystem, a: CurvePoint, b: CurvePoint, event: Event) ->
     return None if jumped else (share, known[share])
 
 
-def _bisected(system: ExtendedSystem, a: CurvePoint, b: CurvePoint) -> CodimensionTwo | None:
-    """Where the counts of impacts change between two points: closed in on, then solved for.
+def _crossings(system: ExtendedSystem, p: CurvePoint) -> tuple[int, ...]:
+    """``WatchedPoint.crossings``."""
+    flow = system.flow(p.z)
+    if not flow.system.corners:
+        return ()
+    orbit = Orbit(OrbitStatus.PERIODIC, n=system.n, start=p.z[: system.states])
+    counts = list(corner_crossings(flow, orbit))
+    if isinstance(p.condition, Grazing) and p.condition.kind is PointKind.CORNER:
+        own = p.condition.contact.clearance - len(flow.system.clearances)
+        for number in {own, flow.system.corner_images[own]} - {-1}:
+            counts[number] = 0
+    return tuple(counts)
+
+
+def _bisected(
+    system: ExtendedSystem, a: CurvePoint, b: CurvePoint, *, corners: bool
+) -> CodimensionTwo | None:
+    """Where the counts of impacts, or how often corners are passed, change between two points:
+    closed in on, then solved for.
 
     Its position is the share of the way.
     """
-    name = meeting(a.condition.kind, PointKind.GRAZING)
+
+    def counts(p: CurvePoint) -> Index | tuple[int, ...]:
+        return _crossings(system, p) if corners else p.impacts
+
+    def met(p: CurvePoint, share: float, more: Sequence[Any]) -> CodimensionTwo:
+        # The curve of a corner itself is that of any point of a branch.
+        return CodimensionTwo(name, p, share, *(() if corners else more))
+
+    name = meeting(a.condition.kind, PointKind.CORNER if corners else PointKind.GRAZING)
     low, high, found, beyond = 0.0, 1.0, a, b
+    begun = counts(a)
     for halving in range(HALVINGS):
         middle = 0.5 * (low + high)
         point = system.between(a, b, middle)
         if point is None:
             break
-        if np.array_equal(point.impacts, a.impacts):
+        if np.array_equal(counts(point), begun):
             low, found = middle, point
         else:
             high, beyond = middle, point
         if halving in TRIES:
             reach = 2.0 * (high - low) * system.distance(a.z, b.z)
-            if grazed := _grazing_within(system, found, reach):
-                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
+            if grazed := _grazing_within(system, found, reach, corners=corners):
+                return met(grazed[0], low, grazed[1:])
     if high - low >= 1e-6:
         # No point lies between them at a corner; it is smooth from the side that is clear.
         reach = 2.0 * (high - low) * system.distance(a.z, b.z)
         for p in (found, beyond):
-            if grazed := _grazing_within(system, p, reach):
-                return CodimensionTwo(name, grazed[0], low, *grazed[1:])
+            if grazed := _grazing_within(system, p, reach, corners=corners):
+                return met(grazed[0], low, grazed[1:])
         return None
-    grazing, phase = next(iter(_turning(system, found)), (None, 0.0))
-    return CodimensionTwo(name, found, low, grazing, np.array([phase]))
+    grazing, phase = next(iter(_turning(system, found, corners=corners)), (None, 0.0))
+    return met(found, low, (grazing, np.array([phase])))
 
 
 def _grazing_within(
@@ -307,7 +344,6 @@ def grazing_near(system: ExtendedSystem, p: CurvePoint, index: int) -> Codimensi
         name = meeting(p.condition.kind, PointKind.GRAZING)
         return CodimensionTwo(name, grazed[0], float(index + 1), *grazed[1:])
     if cornered := _grazing_within(system, p, CORNER, corners=True):
-        # The curve of the corner itself is that of any point of a branch.
         name = meeting(p.condition.kind, PointKind.CORNER)
         return CodimensionTwo(name, cornered[0], float(index + 1))
     return None

@@ -35,12 +35,12 @@ class Family:
 
         Raises
         ------
-        InputError : the value lies outside the domain.
+        InputError : the value lies outside the domain, or nothing can have it.
         """
         flow = self._flows.get(value)
         if flow is not None:
             return flow
-        if not self.contains(value):
+        if not self.within(value):
             raise InputError(
                 None, self.parameter, value, f"a number between {self.low:g} and {self.high:g}"
             )
@@ -49,6 +49,15 @@ class Family:
         return self._flows.setdefault(value, self.build(value))
 
     def contains(self, value: float) -> bool:
+        """Whether there is a flow at the value: others may keep the parameter from it that its own
+        domain does not know of."""
+        try:
+            self.flow(value)
+        except InputError:
+            return False
+        return True
+
+    def within(self, value: float) -> bool:
         """Whether the value lies inside the domain."""
         return self.low <= value <= self.high
 
@@ -71,7 +80,7 @@ class FlowPlane:
 
     def contains(self, first: float, second: float) -> bool:
         """Whether both values lie inside their domains."""
-        return self.first.contains(first) and self.second.contains(second)
+        return self.first.within(first) and self.second.within(second)
 
     def along_first(self, second: float) -> Family:
         """The family over the first parameter, at a value of the second."""

@@ -19,8 +19,8 @@ from designer.base.si_unit import value_text
 from designer.check.absolute_motion import followed
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit
-from designer.model.hertz_law import POWER
-from designer.model.law_elements import NonlinearElement, SmoothLaw
+from designer.laws.hertz_law import POWER
+from designer.laws.law_elements import NonlinearElement, SmoothLaw
 from designer.model.lumped_elements import Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel

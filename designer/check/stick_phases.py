@@ -12,7 +12,7 @@ from designer.base.arrays import Array
 from designer.check.absolute_motion import followed
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit
-from designer.model.law_elements import Friction
+from designer.laws.law_elements import Friction
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
 

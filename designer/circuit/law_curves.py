@@ -14,7 +14,7 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.dead_zone_reading import DeadZoneReading
 from designer.circuit.design import Design
 from designer.circuit.reduction import Reduction
-from designer.model.force_law import ForceLaw
+from designer.laws.force_law import ForceLaw
 from designer.model.relative_motion import subscripted
 
 FAR = 1.25

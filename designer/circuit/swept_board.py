@@ -11,7 +11,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.schema import one_of
+from designer.base.schema import GREATEST, SMALLEST, one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.subject import ShownStop
@@ -31,7 +31,6 @@ from designer.model.mechanics import (
     check_omega,
     frequency_range,
 )
-from designer.model.model import GREATEST, SMALLEST
 from designer.model.relative_motion import shown_stops, subscripted
 from designer.model.si_units import NO_UNITS
 

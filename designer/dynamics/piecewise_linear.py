@@ -59,7 +59,7 @@ class Guard:
     second: float = 0.0
     """Coefficient of the second drive."""
     corner: str = ""
-    """Of a corner of a force that is no stop's, what it is called."""
+    """Of a corner of a force that is no contact's begin or end, what it is called."""
 
     @property
     def row(self) -> Array:
@@ -298,13 +298,16 @@ class PiecewiseLinearSystem:
 
     @cached_property
     def corners(self) -> tuple[Guard, ...]:
-        """The corners of forces that are no stops', positive on the side away from rest. Where
-        turning points are looked at they are numbered after the clearances."""
+        """The corners of forces that are no contact's begin, positive on the side away from rest.
+        Where turning points are looked at they are numbered after the clearances."""
         found, keys = dict[str, Guard](), [self.start]
         while keys:
-            for guard in self.mode(keys.pop(0)).guards:
+            key = keys.pop(0)
+            for guard in self.mode(key).guards:
                 if guard.corner and guard.corner not in found:
                     found[guard.corner] = guard
+                    keys.append(guard.target)
+                elif guard.clearance >= 0 and key == self.start:
                     keys.append(guard.target)
         return tuple(found.values())
 

@@ -113,9 +113,9 @@ def _fits(record: BenchedRecord) -> bool:
 def check_fits(
     prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
 ) -> None:
-    """InputError where the generator does not give the sine that forces of phase 0 take, for
-    records are recognised by it, and where boards with laws, or with dampers in their stops, are to
-    be fitted: the fit knows contacts alone, and rates that are continuous there."""
+    """InputError where the generator does not give one sine, for records are recognised by it, and
+    where boards with laws, or with dampers in their stops, are to be fitted: the fit knows contacts
+    alone, and rates that are continuous there."""
     _check_drive(prediction.synthesis.design)
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
@@ -129,21 +129,11 @@ def check_fits(
 
 
 def _check_drive(design: Design) -> None:
-    shapes, system, more = design.drive_shapes, design.model.second_order(), ""
-    if len(shapes) > 1:
-        found = "a second channel"
-    elif has_harmonics(*shapes):
-        found = "another shape"
-    elif not system.driven_by_sine:
-        found = "a phase of its own"
-        more = (
-            "; a phase that all forces have may go, but not that of dampers to ground beside stops "
-            "that stay"
-        )
-    else:
-        return
-    expected = f"records of a board that one sine of phase 0 drives{more}"
-    raise InputError(None, "--record", f"a board whose drive has {found}", expected)
+    shapes = design.drive_shapes
+    if len(shapes) > 1 or has_harmonics(*shapes):
+        found = "a second channel" if len(shapes) > 1 else "another shape"
+        expected = "records of a board that one sine drives"
+        raise InputError(None, "--record", f"a board whose drive has {found}", expected)
 
 
 def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:

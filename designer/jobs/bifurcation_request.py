@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -132,6 +134,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     subject = _at_frequency(request, subject, modelfile, swept)
     values = np.linspace(low, high, steps)
     if request.second is not None:
+        _check_pairs(subject, "--map", {over: (low, high), name: (float(ys[0]), float(ys[-1]))})
         course = _course(request, parameter_map.COURSE)
         return MapPlan(subject, over, values, name, ys, course=course)
     if request.starts is not None:
@@ -160,7 +163,7 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
         raise InputError(None, "--and", name, f"another parameter than --over {name}")
     read = _reader(subject, modelfile)
     one, other = (_checked(read, subject, "--and", name, value) for value in ends)
-    held = subject.fixed({plan.parameter: None})
+    held = subject.fixed({plan.parameter: None, name: None})
     at = held.get(name)
     if at is None:
         names = [n for n, value in held.items() if value is not None and n != plan.parameter]
@@ -169,8 +172,8 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
     if not low < high or not low <= at <= high:
         expected = f"two ends about {at:.6g}, the value along the sweep"
         raise InputError(None, "--and", f"{name} from {low:g} to {high:g}", expected)
-    values = plan.values
-    window = PlaneWindow((float(values[0]), float(values[-1])), (low, high))
+    window = PlaneWindow((float(plan.values[0]), float(plan.values[-1])), (low, high))
+    _check_pairs(subject, "--and", {plan.parameter: window.first, name: window.second})
     depth = CURVE_DEPTH if request.depth is None else request.depth
     return CurvePlan(subject, plan.parameter, name, float(at), window, depth)
 
@@ -251,6 +254,19 @@ def _checked(
     number = read.value(option, name, value)
     subject.check(option, name, number)
     return number
+
+
+def _check_pairs(subject: Swept, option: str, ends: Mapping[str, tuple[float, float]]) -> None:
+    """InputError unless two parameters of a model may have their ends at once."""
+    if not isinstance(subject, ModelSubject):
+        return
+    for values in product(*ends.values()):
+        change = dict(zip(ends, values, strict=True))
+        try:
+            subject.drawn(change)
+        except InputError as error:
+            found = " with ".join(f"{name} = {value:g}" for name, value in change.items())
+            raise InputError(None, option, found, error.expected) from None
 
 
 def _check_options(request: Request) -> None:

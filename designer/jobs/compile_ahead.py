@@ -25,8 +25,8 @@ from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
+from designer.laws.element_keys import GROUND
 from designer.model.circuit_table import CircuitSpec
-from designer.model.element_keys import GROUND
 from designer.model.lumped_elements import Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import SecondOrderSystem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from designer.model.law_elements import Law
+from designer.laws.law_elements import Law
 from designer.model.lumped_elements import words_of
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.model.force_law import Quantity
+from designer.laws.force_law import Quantity
 
 Sides = Literal["both", "upper", "lower"]
 POSITIONS: dict[Sides, tuple[int, ...]] = {"both": (1, -1), "upper": (1,), "lower": (-1,)}

@@ -11,8 +11,8 @@ from itertools import zip_longest
 import numpy as np
 
 from designer.base.errors import InputError
+from designer.laws.force_law import ForceLaw
 from designer.model.clearance import Clearance, Side, combined
-from designer.model.force_law import ForceLaw
 
 ROUNDING = 1e-9
 """Relative: of a slope, what is none."""

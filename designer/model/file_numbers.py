@@ -45,7 +45,7 @@ class FileNumbers:
                 numbers[name] = self._number(name, value)
             elif name == "b":
                 raise InputError(None, "b", value, "the gaps themselves: b is a factor on all")
-            elif value is None or isinstance(value, str):
+            elif (value is None or isinstance(value, str)) and not _indexed(model.places[name]):
                 put_key(*self._entry(data, name), name, value)
             else:
                 numbers[name] = self._number(name, value)
@@ -67,21 +67,35 @@ class FileNumbers:
         if isinstance(model, LumpedSystem):
             units = model.units if in_si(self.si, model) else {}
             for name in changed:
-                if name != "b":
+                if name != "b" and model.places[name][0] != "matrices":
                     entry, key = self._entry(data, name)
                     value = new.parameter(name)
-                    entry[key] = _with_unit(value, units.get(name, ""), entry.get(key))
+                    old = entry.get(key) if isinstance(entry, dict) else entry[key]
+                    entry[key] = _with_unit(value, units.get(name, ""), old)
+            assert isinstance(new, LumpedSystem)
+            if new.matrices is not None and new.matrices != model.matrices:
+                for key in ("mass", "damping", "stiffness"):
+                    data["matrices"][key] = [list(row) for row in getattr(new.matrices, key)]
         elif self.mechanical is None:
             data["model"] |= {name: new.parameter(name) for name in changed}
         elif changed:
             assert isinstance(new, Dimensionless)
             _put_si(data["mechanical"], self.mechanical, new)
 
-    def _entry(self, data: dict[str, Any], name: str) -> tuple[dict[str, Any], str]:
-        """The table of a system's file that has a parameter, and its key there."""
+    def _entry(self, data: dict[str, Any], name: str) -> tuple[Any, Any]:
+        """The table, or the point of a law, of a system's file that has a parameter, and its key
+        there."""
         assert isinstance(self.model, LumpedSystem)
-        table, index, key = self.model.places[name]
-        return (data[table] if index is None else data[table][index]), key
+        found: Any = data
+        *way, key = self.model.places[name]
+        for step in way:
+            found = found[step]
+        return found, key
+
+
+def _indexed(way: Sequence[str | int]) -> bool:
+    """Whether a number stands in a list of a key's value, which no text replaces."""
+    return isinstance(way[-1], int)
 
 
 def _put_si(table: dict[str, Any], old: Mechanical, model: Dimensionless) -> None:

@@ -18,9 +18,9 @@ from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, WITHOUT_PERIOD, Orbit, OrbitStatus
+from designer.laws.force_law import Quantity
 from designer.model.clearance import Clearance
 from designer.model.driven import model_flow
-from designer.model.force_law import Quantity
 from designer.model.mechanics import MechanicalModel, SecondOrderSystem, check_omega
 from designer.model.model import Dimensionless, SiScales
 from designer.model.response_table import Response

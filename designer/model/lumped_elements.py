@@ -18,10 +18,10 @@ from designer.base.errors import InputError
 from designer.base.schema import Accepts, FileTable, choice, number, physical, whole_number
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.dynamics.drive_shape import SINE, Shape
+from designer.laws.element_keys import GROUND, NAME, combination, signed, two_bodies
+from designer.laws.hertz_law import HertzPieces, hertz_pieces
+from designer.laws.law_elements import KINDS, CubicSpring, Friction, Law, NonlinearElement
 from designer.model.clearance import Side
-from designer.model.element_keys import GROUND, NAME, combination, signed, two_bodies
-from designer.model.hertz_law import HertzPieces, hertz_pieces
-from designer.model.law_elements import KINDS, CubicSpring, Friction, Law, NonlinearElement
 from designer.model.matrices import Matrices
 from designer.model.waveforms import Waveform, series
 

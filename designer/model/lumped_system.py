@@ -14,23 +14,22 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import one_of
+from designer.base.schema import GREATEST, SMALLEST, one_of
 from designer.dynamics.drive_shape import SINE
+from designer.laws.element_keys import GROUND, check_joined, check_size, refuse
+from designer.laws.force_law import ForceLaw
+from designer.laws.law_elements import KINDS, NonlinearElement
 from designer.model.clearance import Clearance, combined
-from designer.model.element_keys import GROUND, check_joined, check_size, refuse
-from designer.model.force_law import ForceLaw
-from designer.model.law_elements import KINDS, NonlinearElement
 from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, joined_by, turned
 from designer.model.matrices import Matrices
 from designer.model.mechanics import HarmonicForce, SecondOrderSystem, reaches_ground
-from designer.model.model import GREATEST, SMALLEST
 
 RESERVED = (GROUND, "base")
 """Names that mean something else."""
@@ -318,6 +317,7 @@ TABLES = {
     "gaps": "clearance",
     "forces": "force",
     "base": "base",
+    "matrices": "matrices",
     **{kind.LIST: kind.TABLE for kind in KINDS},
 }
 """The table of a model file that has each list of elements."""
@@ -327,6 +327,7 @@ UNITS = {
     "upper_stiffness": "N/m",
     "lower_stiffness": "N/m",
     "damping": "N s/m",
+    "points": "N",
     "upper": "m",
     "lower": "m",
     "preload": "N",
@@ -337,8 +338,34 @@ UNITS = {
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``, of a law's numbers
 ``LawNumber``."""
 _LAWS = {kind.LIST: kind.PARAMETERS for kind in KINDS}
+_SOLE = ("base", "matrices")
+"""Fields of one element."""
+NEAREST = 1e-6
+"""Of the distance of two points of a law: how near a sweep takes one to the other."""
+Way = tuple[str | int, ...]
+"""Fields and indices from an element on to one of its numbers."""
 
 _MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant", "phase")
+
+
+def _in_file(way: Way) -> Way:
+    """The same in the tables of a model file, where the points of a law are a list."""
+    return tuple(step for step in way if step != "values")
+
+
+def _step(found: Any, step: str | int) -> Any:
+    return getattr(found, step) if isinstance(step, str) else found[step]
+
+
+def _changed(found: Any, way: Way, value: float) -> Any:
+    """An element, or a part of one, with another number at the end of the way."""
+    if not way:
+        return value
+    step, *rest = way
+    inner = _changed(_step(found, step), tuple(rest), value)
+    if isinstance(step, str):
+        return replace(found, **{step: inner})
+    return (*found[:step], inner, *found[step + 1 :])
 
 
 @dataclass(frozen=True)
@@ -362,9 +389,9 @@ class LumpedSystem(Elements):
         check_damped(system.spanning_state_matrix())
 
     def _check_sizes(self) -> None:
-        for name, (table, index, key) in self.places.items():
-            place = table if index is None else f"{table}[{index + 1}]"
-            check_size(f"{place}.{key}", self.parameter(name))
+        for name, way in self.places.items():
+            texts = (f".{step}" if isinstance(step, str) else f"[{step + 1}]" for step in way)
+            check_size("".join(texts).removeprefix("."), self.parameter(name))
 
     def second_order(self) -> SecondOrderSystem:
         """The equations of motion."""
@@ -456,14 +483,22 @@ class LumpedSystem(Elements):
     @cached_property
     def parameters(self) -> Mapping[str, tuple[float, float]]:
         """``b``, and each number of an element as NAME.key: hammer.mass, hammer-casing.stiffness,
-        A.upper, hammer.amplitude, base.amplitude."""
-        return {
-            "b": (SMALLEST, GREATEST),
-            **{
-                name: (LEAST[group][key], MOST.get(key, GREATEST))
-                for name, (group, _, key) in self._places.items()
-            },
-        }
+        A.upper, hammer.amplitude, base.amplitude. Of a law's points x1, f1, x2, …; of matrices
+        entries, stiffness.tip.middle."""
+        ends = {name: self._domain(name) for name in ("b", *self._places)}
+        for law in self.laws:
+            for i, ((x0, _), (x1, _)) in enumerate(pairwise(law.corners), start=1):
+                lower, upper, near = f"{law.name}.x{i}", f"{law.name}.x{i + 1}", NEAREST * (x1 - x0)
+                ends[lower] = ends[lower][0], x1 - near
+                ends[upper] = x0 + near, GREATEST
+        return ends
+
+    def _domain(self, name: str) -> tuple[float, float]:
+        """What a parameter may be, whatever the others are."""
+        if name == "b":
+            return SMALLEST, GREATEST
+        group, _, (key, *_) = self._places[name]
+        return LEAST.get(group, {}).get(str(key), -GREATEST), MOST.get(str(key), GREATEST)
 
     @cached_property
     def units(self) -> Mapping[str, str]:
@@ -471,28 +506,34 @@ class LumpedSystem(Elements):
         g."""
         amplitudes = {"forces": "N", "base": "m" if self.base is None else self.base.unit}
 
-        def unit(group: str, key: str) -> str:
-            if group in _LAWS:
+        def unit(group: str, index: int, way: Way) -> str:
+            key = str(way[0])
+            if group == "laws" and way[-1] == 0:
+                return {"displacement": "m", "velocity": "m/s"}[self.laws[index].quantity]
+            if key in _LAWS.get(group, {}):
                 return _LAWS[group][key].unit
             return amplitudes[group] if key == "amplitude" else UNITS.get(key, "")
 
-        found = {name: unit(group, key) for name, (group, _, key) in self._places.items()}
+        found = {name: unit(*place) for name, place in self._places.items()}
         return {name: text for name, text in found.items() if text}
 
     @property
     def idle(self) -> frozenset[str]:
-        """A factor of 1; dampers and forces of 0."""
+        """A factor of 1; dampers and forces of 0; points and entries, which are too many."""
 
-        def may_be(group: str, key: str) -> bool:
-            return _LAWS[group][key].idle_at_zero if group in _LAWS else key in _MAY_BE_ZERO
+        def is_idle(name: str, group: str, way: Way) -> bool:
+            key = str(way[0])
+            own = _LAWS.get(group, {}).get(key)
+            may_be = key in _MAY_BE_ZERO if own is None else own.idle_at_zero
+            return len(way) > 1 or (may_be and self.parameter(name) == 0.0)
 
-        names = {name for name, (group, _, key) in self._places.items() if may_be(group, key)}
-        idle = {name for name in names if self.parameter(name) == 0.0}
+        places = self._places.items()
+        idle = {name for name, (group, _, way) in places if is_idle(name, group, way)}
         return frozenset(idle | ({"b"} if self.b == 1.0 else set()))
 
     @cached_property
-    def _places(self) -> dict[str, tuple[str, int, str]]:
-        """The list, the index in it and the field of each parameter but ``b``."""
+    def _places(self) -> dict[str, tuple[str, int, Way]]:
+        """The list, the index in it and the way on to each parameter but ``b``."""
         named: dict[str, list[str]] = {
             "masses": list(self.names) if self.matrices is None else [],
             "springs": ["-".join(spring.between) for spring in self.springs],
@@ -502,32 +543,44 @@ class LumpedSystem(Elements):
             "base": ["base"] if self.base is not None else [],
             **{k.LIST: [e.bodies for e in self._elements(k.LIST)] for k in KINDS},
         }
-        return {
-            f"{name}.{key}": (group, index, key)
+        places: dict[str, tuple[str, int, Way]] = {
+            f"{name}.{key}": (group, index, (key,))
             for group, names in named.items()
             for index, name in enumerate(names)
             for key in LEAST[group]
             if getattr(self._elements(group)[index], key) is not None
         }
+        for index, law in enumerate(self.laws):
+            for i in range(len(law.corners)):
+                for k, letter in enumerate("xf"):
+                    way = "points", "values", i, k
+                    places[f"{law.name}.{letter}{i + 1}"] = "laws", index, way
+        if self.matrices is not None:
+            for key, name, other, indices in self.matrices.entries:
+                places[f"{key}.{name}.{other}"] = "matrices", 0, (key, *indices)
+        return places
 
     @property
-    def places(self) -> Mapping[str, tuple[str, int | None, str]]:
+    def places(self) -> Mapping[str, Way]:
         """Where in a model file each parameter but ``b`` stands: table, index in a list of tables,
-        key."""
+        key, indices."""
         return {
-            name: (TABLES[group], None if group == "base" else index, key)
-            for name, (group, index, key) in self._places.items()
+            name: (TABLES[group], *(() if group in _SOLE else (index,)), *_in_file(way))
+            for name, (group, index, way) in self._places.items()
         }
 
     def _elements(self, group: str) -> Sequence[Any]:
-        return (self.base,) if group == "base" else tuple(getattr(self, group))
+        return (getattr(self, group),) if group in _SOLE else tuple(getattr(self, group))
 
     def parameter(self, name: str) -> float:
         """The value of one of ``parameters``."""
         if name == "b":
             return self.b
-        group, index, key = self._places[name]
-        return float(getattr(self._elements(group)[index], key))
+        group, index, way = self._places[name]
+        found = self._elements(group)[index]
+        for step in way:
+            found = _step(found, step)
+        return float(found)
 
     def changed(self, changes: Mapping[str, float]) -> LumpedSystem:
         """The model with other values of some ``parameters``.
@@ -538,7 +591,7 @@ class LumpedSystem(Elements):
         """
         new: dict[str, Any] = {}
         for name, value in changes.items():
-            low, high = self.parameters[name]
+            low, high = self._domain(name)
             if not low <= value <= high:
                 expected = "a number" + ("" if low < 0.0 else " >= 0" if low == 0.0 else " > 0")
                 expected += f", at most {high:g}" if high < GREATEST else ""
@@ -546,12 +599,17 @@ class LumpedSystem(Elements):
             if name == "b":
                 new["b"] = value
                 continue
-            group, index, key = self._places[name]
+            group, index, way = self._places[name]
             elements = list(new.get(group, self._elements(group)))
-            elements[index] = replace(elements[index], **{key: value})
+            elements[index] = _changed(elements[index], way, value)
+            if group == "matrices" and way[0] != "damping":
+                elements[index] = _changed(elements[index], (way[0], *way[:0:-1]), value)
             new[group] = tuple(elements)
-        if "base" in new:
-            (new["base"],) = new["base"]
+        for sole in new.keys() & set(_SOLE):
+            (new[sole],) = new[sole]
+        if "matrices" in new:
+            rows = new["matrices"].mass
+            new["masses"] = tuple(replace(m, mass=rows[i][i]) for i, m in enumerate(self.masses))
         return replace(self, **new) if new else self
 
     def as_dict(self) -> dict[str, object]:

@@ -21,7 +21,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import UNREADABLE, inside, reason
 from designer.base.schema import Accepts, FileTable
 from designer.base.units import parse_quantity
-from designer.model.element_keys import NAME
+from designer.laws.element_keys import NAME
 
 Rows = tuple[tuple[float, ...], ...]
 LARGEST = 64
@@ -126,6 +126,16 @@ class Matrices(FileTable):
     def damping_matrix(self) -> Array:
         """(n, n) damping matrix."""
         return np.array(self.damping)
+
+    @property
+    def entries(self) -> Iterator[tuple[str, str, str, tuple[int, int]]]:
+        """(matrix, name of the row, of the column, indices) of every entry that may differ from the
+        others: of mass and stiffness those on and above the diagonal."""
+        for key in ("mass", "damping", "stiffness"):
+            for i, name in enumerate(self.names):
+                for j, other in enumerate(self.names):
+                    if j >= i or key == "damping":
+                        yield key, name, other, (i, j)
 
     @property
     def coupled(self) -> Iterator[tuple[str, str]]:

@@ -24,9 +24,9 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.drive_shape import SINE, Channel, Shape, channels
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.laws.force_law import ForceLaw, Quantity
 from designer.model.clearance import Clearance
 from designer.model.dead_zones import dead_zones
-from designer.model.force_law import ForceLaw, Quantity
 
 
 @dataclass(frozen=True)
@@ -538,8 +538,10 @@ class _Contact:
     """Coefficient of the drive in what is watched."""
     clearance: int = -1
     """Index of the clearance whose contact it is; -1 of a law."""
-    law: str = ""
-    """Name of the law whose corners are its own; "" of one that stands for a curve."""
+    name: str = ""
+    """What its corners are corners of."""
+    corners: tuple[float, ...] = ()
+    """Where the slope of its force changes, but where a stop is touched and on a curve."""
 
     @classmethod
     def with_stops(cls, system: SecondOrderSystem, index: int, ground: float) -> _Contact:
@@ -556,6 +558,8 @@ class _Contact:
             clearance.damping,
             ground * float(along.sum()) if fixed else 0.0,
             index,
+            clearance.name,
+            tuple(side * (stop.gap + stop.rise) for side, stop in clearance.sides if stop.rise),
         )
 
     @classmethod
@@ -564,8 +568,9 @@ class _Contact:
         along = np.array(law.row)
         watched = _interleaved(along, 0 if law.quantity == "displacement" else 1)
         push_back = _interleaved(system.over_mass(system.push(law)), 1)
-        name = "" if law.curved else law.name
-        return cls(watched, np.zeros_like(watched), push_back, law.bends, {}, law=name)
+        corners = () if law.curved else law.corners
+        rate = np.zeros_like(watched)
+        return cls(watched, rate, push_back, law.bends, {}, name=law.name, corners=corners)
 
     def push(self, level: int, A: Array, B: Array, d: Array) -> None:
         """Add the force of what has joined in to the equations.
@@ -603,7 +608,8 @@ class _Contact:
         # Contact begins or ends; deeper springs only stiffen it.
         touches = not (level and key[index])
         clearance = self.clearance if touches else -1
-        corner = f"{self.law} at {-sign * constant:.6g}" if self.law else ""
+        place = -sign * constant
+        corner = f"{self.name} at {place:.6g}" if clearance < 0 and place in self.corners else ""
         row = sign * self.row, sign * self.on_drive, constant
         return Guard(*row, target, clearance, corner=corner)
 
@@ -636,8 +642,8 @@ class MechanicalModel(Hashable, Protocol):
 
     @property
     def idle(self) -> frozenset[str]:
-        """Those of ``parameters`` whose value is that of an element that is not there; a title
-        leaves them out."""
+        """Those of ``parameters`` that a title leaves out: with the value of an element that is not
+        there, or too many."""
         ...
 
     def parameter(self, name: str) -> float:

@@ -15,7 +15,16 @@ from typing import Annotated, Any
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.base.schema import Accepts, FileTable, check_values, choice, number, physical
+from designer.base.schema import (
+    GREATEST,
+    SMALLEST,
+    Accepts,
+    FileTable,
+    check_values,
+    choice,
+    number,
+    physical,
+)
 from designer.model.clearance import Clearance, Sides
 from designer.model.mechanics import SecondOrderSystem
 
@@ -28,9 +37,7 @@ TRIED = {
 """Closed intervals beyond which a parameter is refused, though it is a number in its domain: the
 slowest and the fastest motion are then so far apart that the linear algebra, or a single drive
 period, comes to no end (docs/stability.md)."""
-SMALLEST = math.nextafter(0.0, 1.0)
 BELOW_ONE = math.nextafter(1.0, 0.0)
-GREATEST = math.nextafter(math.inf, 0.0)
 DOMAINS = {
     "b": (SMALLEST, GREATEST),
     "k0": (0.0, BELOW_ONE),

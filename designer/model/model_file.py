@@ -41,11 +41,11 @@ from designer.catalog.entries import Kind
 from designer.catalog.parts_catalog import Catalog
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import OrbitStatus
+from designer.laws.law_elements import KINDS, CubicSpring, Friction, Law
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
 from designer.model.file_numbers import FileNumbers, put_at
-from designer.model.law_elements import KINDS, CubicSpring, Friction, Law
 from designer.model.lumped_elements import BaseTable, Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.matrices import Matrices, written_out

@@ -21,7 +21,7 @@ from designer.base.schema import (
     literal,
     nested_table,
 )
-from designer.model.law_elements import KINDS
+from designer.laws.law_elements import KINDS
 
 WHERE = "docs/model-file.md#limits"
 MODELS = ("model", "mechanical")

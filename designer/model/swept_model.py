@@ -157,11 +157,11 @@ class ModelSubject:
 
     def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters, in the order in which a model file has them; those
-        that stand for nothing left out."""
-        ordered = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
-        names = [name for name in ordered if name in self.model.parameters]
-        values = {name: self.model.parameter(name) for name in names if name not in self.model.idle}
-        return {"omega": self.omega, **values}
+        that a title leaves out are there where they are swept."""
+        model, ordered = self.model, dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
+        left_out = model.idle - swept.keys()
+        names = [name for name in ordered if name in model.parameters and name not in left_out]
+        return {"omega": self.omega, **{name: model.parameter(name) for name in names}}
 
     def remarks(self) -> tuple[str, ...]:
         """Which stop there is, where there is one only."""

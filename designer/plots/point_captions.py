@@ -15,7 +15,7 @@ NAMES = {
     PointKind.FOLD: "fold",
     PointKind.GRAZING: "grazing",
     PointKind.TORUS: "torus bifurcation",
-    PointKind.CORNER: "corner of a law",
+    PointKind.CORNER: "corner of a force",
 }
 """The names of the kinds in a sentence."""
 

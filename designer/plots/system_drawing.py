@@ -14,8 +14,8 @@ from typing import TypeVar
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, styled
-from designer.model.element_keys import GROUND
-from designer.model.law_elements import CubicSpring, NonlinearElement
+from designer.laws.element_keys import GROUND
+from designer.laws.law_elements import CubicSpring, NonlinearElement
 from designer.model.lumped_elements import Damper, Gap, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted

@@ -13,8 +13,8 @@ from dataclasses import fields, replace
 from designer.base.arrays import Array
 from designer.base.si_unit import quantity_text
 from designer.base.units import ACCELERATIONS
-from designer.model.element_keys import GROUND
-from designer.model.law_elements import CubicSpring, Friction, Law, NonlinearElement
+from designer.laws.element_keys import GROUND
+from designer.laws.law_elements import CubicSpring, Friction, Law, NonlinearElement
 from designer.model.lumped_elements import Force, Gap, MovingBase, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted

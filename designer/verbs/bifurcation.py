@@ -32,8 +32,8 @@ def bifurcation(
             "--over",
             "NAME",
             "omega (default), b, k0, zeta, m, k, c or f20; of format 2 a number of an element, "
-            "such as A.upper; with --circuit frequency in Hz (default), omega, amplitude or "
-            "offset in V; with --basins a state.",
+            "such as A.upper, F.x2 of a law or stiffness.a.b of matrices; with --circuit frequency "
+            "in Hz (default), omega, amplitude or offset in V; with --basins a state.",
         ),
     ] = None,
     from_: Annotated[
@@ -524,7 +524,8 @@ _SWEEP = f"{_EVERY} down up starts points"
 _LINE = "designer bifurcation"
 _SWEPT = (
     "omega (default), b, k0, zeta, m, k, c or f20; of format 2 a number of an element, such as "
-    "A.upper; with --circuit frequency in Hz (default), omega, amplitude or offset in V."
+    "A.upper, F.x2 of a law or stiffness.a.b of matrices; with --circuit frequency in Hz "
+    "(default), omega, amplitude or offset in V."
 )
 _OF_SWEEP = {
     "over": _SWEPT,

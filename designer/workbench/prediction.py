@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +12,13 @@ from designer.base.arrays import Array, Mask
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import GeneratorSetting, settings
 from designer.circuit.netlist import Circuit, Excitation
-from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.drive_shape import SINE
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
+from designer.model.find_responses import ModelResponse
 from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
@@ -144,8 +147,10 @@ class BoardPrediction:
 
     @cached_property
     def settings(self) -> tuple[GeneratorSetting, ...]:
-        """The generator's settings of ``setup.csv``."""
-        return settings(self.synthesis.design, self.synthesis.model_responses)
+        """The generator's settings of ``setup.csv``. A record begins at any moment, so a sine of
+        whatever phase is one of phase 0."""
+        every = settings(self.synthesis.design, self.synthesis.model_responses)
+        return tuple(replace(setting, shape=SINE) for setting in every)
 
     @cached_property
     def responses(self) -> tuple[PredictedResponse, ...]:
@@ -155,10 +160,24 @@ class BoardPrediction:
         for setting, response in zip(self.settings, self.synthesis.model_responses, strict=True):
             orbit = on_circuit(system, self.synthesis.design, response)
             if orbit.n:
+                orbit = self._from_phase_0(orbit, response, setting)
                 waves = self.waves(orbit, setting)
                 starts = self._starts(orbit, waves)
                 shown.append(PredictedResponse(response.spec, setting, orbit, waves, starts))
         return tuple(shown)
+
+    def _from_phase_0(
+        self, orbit: Orbit, response: ModelResponse, setting: GeneratorSetting
+    ) -> Orbit:
+        """The same orbit from where the sine of its drive has the phase 0."""
+        system = self.reduction.system()
+        flow = circuit_flow(system, self.synthesis.design, response)
+        ((_, sine, cosine),) = flow.drive.shape
+        if not cosine:
+            return orbit
+        points = flow.run(orbit.start, 1, mode=orbit.mode or None, points=POINTS).strobes
+        turn = -np.arctan2(cosine, sine) / (2.0 * np.pi) % 1.0
+        return settle(Flow(system, setting.excitation.drive), points[round(turn * POINTS)])
 
     @property
     def twins(self) -> bool:

@@ -32,9 +32,12 @@ from reports.makers import (
     bilinear,
     chain_modes,
     den_hartog,
+    double_well,
     grazing_map,
+    instant_impact,
     persistence,
     rattle,
+    standing_post,
     weight,
 )
 from reports.makers.board_part import board_part
@@ -55,6 +58,9 @@ EXAMPLES: Mapping[str, Example] = {
     "three-masses": chain_modes.EXAMPLE,
     "hammer-base": weight.EXAMPLE,
     "dry-friction": den_hartog.EXAMPLE,
+    "double-well": double_well.EXAMPLE,
+    "restitution": instant_impact.EXAMPLE,
+    "fixed-stop": standing_post.EXAMPLE,
 }
 """What is shown of each model file, by its name."""
 OTHER = Example(lambda _: [], "", "")

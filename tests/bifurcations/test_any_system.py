@@ -67,6 +67,33 @@ def test_grazing_is_where_the_free_response_fills_a_clearance(
     assert f"grazing at the upper stop of {name} at ω = " in caption(point, "ω")
 
 
+def test_grazing_over_an_entry_of_a_matrix() -> None:
+    """Where the free response of the coupled masses fills the gap, by the complex response."""
+    omega, gap = 0.8, 0.9
+    text = """format = 2
+[matrices]
+names = ["a", "b"]
+mass = [1.0, 1.5]
+stiffness = [[2.0, -0.6], [-0.6, 3.0]]
+damping = [[0.2, 0.0], [0.0, 0.1]]
+"""
+    text += clearance("A", "a", "ground", upper=gap, stiffness=9.0)
+    text += table("force", on="b", amplitude=2.0)
+
+    def amplitude(entry: float) -> float:
+        K = np.array([[2.0, entry], [entry, 3.0]], dtype=complex)
+        whole = K - omega**2 * np.diag([1.0, 1.5]) + 1j * omega * np.diag([0.2, 0.1])
+        return float(abs(np.linalg.solve(whole, [0.0, 2.0])[0]))
+
+    wanted = brentq(lambda entry: amplitude(entry) - gap, -1.0, -0.1)
+    family = ModelSubject(parse_model_file(text).model, omega).family("stiffness.a.b")
+    orbit = settle(family.flow(0.9 * wanted), np.zeros(4))
+    assert orbit.response == "1-0-0"
+    branch = trace(start(family, orbit, 0.9 * wanted), 1.1 * wanted, 0.8 * wanted)
+    (point,) = [p for p in locate(branch) if p.kind is PointKind.GRAZING]
+    assert point.value == pytest.approx(wanted, rel=1e-9)
+
+
 @pytest.mark.parametrize(("omega", "survives"), [(0.8, False), (0.7, False), (0.5, True)])
 def test_grazing_on_a_moving_ground(omega: float, survives: bool) -> None:
     """The soft-impact rig: a = e √((1 - ω²)² + (2ζω)²)/ω² (Ing and others, Phil. Trans. R. Soc. A

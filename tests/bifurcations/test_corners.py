@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve
+from scipy.optimize import brentq, fsolve
 
 from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
@@ -46,6 +46,9 @@ def amplitude_at_corner(omega: float, spring: float = 1.0, damper: float = 0.2) 
     return math.hypot(spring - omega**2, damper * omega)
 
 
+HARD = [[-3.0, -5.5], [-2.0, -3.0], [-1.0, -1.0], [1.0, 1.0], [2.0, 3.0], [3.0, 5.5]]
+
+
 def corners(points: tuple[Bifurcation, ...]) -> list[Bifurcation]:
     return [point for point in points if point.kind is PointKind.CORNER]
 
@@ -64,7 +67,7 @@ def test_the_corner_is_where_the_linear_motion_comes_to_it() -> None:
     assert point.error < 1e-8
     assert point.stops == "F at 1 and F at -1"
     assert point.stable == (True, True)
-    text = "corner of a law, F at 1 and F at -1, touched by 1-0-0 symmetric at ω = 1.4"
+    text = "corner of a force, F at 1 and F at -1, touched by 1-0-0 symmetric at ω = 1.4"
     assert caption(point, "ω").startswith(text)
     (window,) = all_windows(found)
     assert (window.low.value, window.high.value) == (1.36, 1.7)
@@ -81,6 +84,40 @@ def test_a_corner_of_a_law_of_velocity() -> None:
     (point,) = corners(found.points)
     assert point.value == pytest.approx(0.3 + 0.2 * 0.5, abs=1e-8)
     assert point.stops == "drag at 0.5 and drag at -0.5"
+
+
+HANGING = table("law", name="F", between=list(JOINT), points=[[-1, 0], [0.7, 0], [2, 1]])
+"""No force up to 0.7."""
+
+
+def test_a_corner_of_a_law_that_a_sweep_moves() -> None:
+    """It is touched where it stands at the amplitude of the linear motion, over two parameters
+    where this is so at every force."""
+    over, amplitude = subject(HANGING, 1.0, 0.8, 0.5), 0.5 / amplitude_at_corner(0.8)
+    family = over.family("F.x2")
+    orbit = settle(family.flow(1.5), np.zeros(2))
+    found = survey(family, [(1.5, orbit)], amplitude - 0.1, 1.9, depth=0)
+    (point,) = corners(found.points)
+    assert point.value == pytest.approx(amplitude, rel=1e-9)
+    assert f"at F.x2 = {amplitude:.9g}: stable on both sides" in caption(point, "F.x2")
+    plane, window = over.plane("F.x2", "a.amplitude"), PlaneWindow((0.3, 1.9), (0.1, 0.8))
+    curve = continued(plane, point, 0.5, window)
+    assert curve is not None
+    assert len(curve.points) > 10
+    for place, force in curve.values:
+        assert force == pytest.approx(place * amplitude_at_corner(0.8), rel=1e-7)
+
+
+def test_a_domain_that_another_parameter_bounds() -> None:
+    """A static friction below that of sliding is refused: a branch is followed up to it."""
+    friction = {"force": 0.3, "static": 0.4, "velocity": 0.1, "stribeck": 0.5}
+    over = subject(table("friction", between=list(JOINT), **friction), 1.0, 0.7, 1.0)
+    family = over.family("a-ground.static")
+    assert [family.contains(value) for value in (0.3, 0.299)] == [True, False]
+    orbit = settle(family.flow(0.4), np.zeros(2))
+    found = survey(family, [(0.4, orbit)], 0.3, 0.45, depth=0)
+    (window,) = all_windows(found)
+    assert (window.low.value, window.high.value) == pytest.approx((0.3, 0.45), abs=1e-8)
 
 
 def curve_of_corner(
@@ -144,19 +181,26 @@ def test_a_velocity_that_is_largest_where_a_damped_stop_is_met() -> None:
 
 def test_a_fold_on_the_curve_of_a_corner() -> None:
     """A spring that hardens past ± 1, and once more past ± 2: twice a motion that just comes to 2
-    has a multiplier 1, by another integrator."""
-    points = [[-3.0, -5.5], [-2.0, -3.0], [-1.0, -1.0], [1.0, 1.0], [2.0, 3.0], [3.0, 5.5]]
-    hard = table("law", name="F", between=list(JOINT), points=points)
+    has a multiplier 1, by another integrator. The curve of the fold sees it too."""
+    hard = table("law", name="F", between=list(JOINT), points=HARD)
     over = subject(hard, 0.0, 1.0, 0.8)
     family = over.family("omega")
     orbit = settle(family.flow(1.0), np.zeros(2))
-    (point,) = corners(survey(family, [(1.0, orbit)], 0.98, 1.05, depth=0).points)
+    found = survey(family, [(1.0, orbit)], 0.98, 1.4, depth=0).points
+    point, plane = corners(found)[0], over.plane("omega", "a.amplitude")
     assert point.stops == "F at 2 and F at -2"
     window = PlaneWindow((1.0, 1.4), (0.4, 1.0))
-    curve = continued(over.plane("omega", "a.amplitude"), point, 0.8, window)
+    curve = continued(plane, point, 0.8, window)
     assert curve is not None
     met = curve.codimension_two
     assert [each.name for each in met] == ["corner meets fold"] * 2
+    folds = continued(plane, next(p for p in found if p.kind is PointKind.FOLD), 0.8, window)
+    assert folds is not None
+    seen = [each for each in folds.codimension_two if each.name == "corner meets fold"]
+    assert all(each.other is None for each in seen)
+    for each in seen:
+        assert any(each.values == pytest.approx(same.values, abs=1e-6) for same in met)
+    assert seen
     for each in met:
         omega, amplitude = each.values
 
@@ -177,6 +221,37 @@ def test_a_fold_on_the_curve_of_a_corner() -> None:
         columns = [(image(start + d)[0] - image(start - d)[0]) / 2e-5 for d in steps]
         multipliers = np.linalg.eigvals(np.array(columns).T)
         assert np.abs(multipliers - 1.0).min() < 1e-4
+
+
+def test_where_a_preload_has_risen() -> None:
+    """A stop's push that has come to its end bends the force: by another integrator the motion just
+    reaches there."""
+    gap = clearance("S", *JOINT, upper=0.3, stiffness=2.0, preload=0.4, preload_over=0.25)
+    force = table("force", on="a", amplitude=1.0)
+    text = system_text({"a": 1.0}, {JOINT: 1.0}, {JOINT: 0.2}, gap, force)
+    over, omega = ModelSubject(parse_model_file(text).model, 0.8), 0.8
+    family = over.family("a.amplitude")
+    orbit = settle(family.flow(0.2), np.zeros(2))
+    (point,) = corners(survey(family, [(0.2, orbit)], 0.2, 0.9, depth=0).points)
+    assert point.stops == "S at 0.55"
+    assert caption(point, "P").startswith(
+        "corner of a force, S at 0.55, touched by 1-1-0 asymmetric"
+    )
+
+    def rates(t: float, x: Array) -> Array:
+        depth = max(x[0] - 0.3, 0.0)
+        pushed = 2.0 * depth + 1.6 * min(depth, 0.25)
+        return np.array([x[1], point.value * math.sin(omega * t) - 0.2 * x[1] - x[0] - pushed])
+
+    start, period = point.point.solved.x, 2.0 * math.pi / omega
+    kept = solve_ivp(rates, (0.0, period), start, "DOP853", rtol=1e-11, atol=1e-12, max_step=0.002)
+    assert kept.y[:, -1] == pytest.approx(start, abs=1e-7)
+    assert kept.y[0].max() == pytest.approx(0.55, abs=1e-6)
+    curve = continued(
+        over.plane("a.amplitude", "omega"), point, omega, PlaneWindow((0.2, 1.5), (0.6, 0.9))
+    )
+    assert curve is not None
+    assert set(curve.ends) == {"edge of omega"}
 
 
 def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
@@ -201,6 +276,37 @@ def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
     _, *wanted = fsolve(off, [2.8, 0.37, 2.5], xtol=1e-12)
     (end,) = [each for each in curve.codimension_two if each.name == "degenerate corner"]
     assert end.values == pytest.approx(wanted, rel=1e-5)
+
+
+def test_the_curves_of_two_corners_meet() -> None:
+    """Of laws so weak that both masses move as the linear system does."""
+    masses, springs = {"a": 1.0, "b": 2.0}, {JOINT: 1.0, ("a", "b"): 0.5, ("b", "ground"): 1.5}
+    dampers = {JOINT: 0.2, ("b", "ground"): 0.1}
+    weak = [
+        table(
+            "law", name=name, between=[name.lower(), "ground"], points=[[0, 0], [x, 0], [9, 1e-9]]
+        )
+        for name, x in (("A", 1.0), ("B", 0.7))
+    ]
+    text = system_text(masses, springs, dampers, *weak, table("force", on="a", amplitude=1.0))
+
+    def reached(omega: float) -> Array:
+        K = np.array([[1.5, -0.5], [-0.5, 2.0]]) + 1j * omega * np.diag([0.2, 0.1])
+        moved = np.linalg.solve(K - omega**2 * np.diag([1.0, 2.0]), [1.0, 0.0])
+        return np.asarray(np.abs(moved) / [1.0, 0.7])
+
+    wanted = brentq(lambda w: float(np.subtract(*reached(w))), 0.6, 1.1)
+    over = ModelSubject(parse_model_file(text).model, 0.79)
+    family = over.family("a.amplitude")
+    orbit = settle(family.flow(0.5), np.zeros(4))
+    found = corners(survey(family, [(0.5, orbit)], 0.5, 0.7, depth=0).points)
+    assert [each.stops for each in found] == ["A at 1", "B at 0.7"]
+    window = PlaneWindow((0.5, 0.65), (0.78, 0.82))
+    curve = continued(over.plane("a.amplitude", "omega"), found[0], 0.79, window)
+    assert curve is not None
+    (met,) = curve.codimension_two
+    assert met.name == "two corners"
+    assert met.values == pytest.approx((1.0 / reached(wanted)[0], wanted), rel=1e-6)
 
 
 def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:

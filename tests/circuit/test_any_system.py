@@ -21,8 +21,8 @@ from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
+from designer.laws.force_law import ForceLaw
 from designer.model.clearance import Clearance, Side, combined
-from designer.model.force_law import ForceLaw
 from designer.model.mechanics import SecondOrderSystem
 from tests.shared.exact_circuits import STAGE, Scale, exact_circuit, unit_volts
 

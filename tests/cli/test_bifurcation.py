@@ -175,6 +175,52 @@ def test_bad_input(
     assert not out.exists()
 
 
+BENT = system_text(
+    {"a": "2 kg"},
+    {("a", "ground"): "8 kN/m"},
+    {("a", "ground"): "20 N s/m"},
+    table("law", name="F", between=["a", "ground"], points=[[-1e-3, 0], [1e-3, 0], [3e-3, 40]]),
+    table("friction", between=["a", "ground"], force="1 N", velocity="5 mm/s"),
+    table("force", on="a", amplitude="10 N"),
+)
+
+
+def test_a_point_of_a_law_takes_its_unit(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bent.toml"
+    path.write_text(BENT, encoding="utf-8")
+    ends = ("--from", "0.5 mm", "--to", "2 mm", "--steps", "4", "--no-points")
+    answer = _asked(capfd, path, "--over", "F.x2", "--frequency", "8 Hz", *ends)
+    assert (answer["from"], answer["to"], answer["unit"]) == (5e-4, 2e-3, "m")
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "part"),
+    [
+        ("--over F.x2 --from 0 --to 0.004", "--to", "F.x2: points by rising x, not x2 = 0.004"),
+        ("--over F.x4 --from 0 --to 1", "--over", "F.x3"),
+        ("--over F.f3 --from -60 --to 1", "--from", "F.f3: a slope there"),
+        (
+            "--over F.x2 --from 0 --to 0.002 --map F.x3 0.0015 0.004 5",
+            "--map",
+            "by rising x, not x2 = 0.002 and x3 = 0.0015",
+        ),
+        ("--over F.x2 --from 0 --to 0.002 --and F.x3 0.0015 0.004", "--and", "by rising x"),
+        ("--over F.x2 --from 0 --to 0.002 --and F.f3 50 60", "--and", "about 40"),
+    ],
+)
+def test_what_points_cannot_be_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], options: str, field: str, part: str
+) -> None:
+    path = tmp_path / "bent.toml"
+    path.write_text(BENT, encoding="utf-8")
+    words = (*options.split(), "--steps", "5", "--frequency", "8 Hz")
+    assert entry.status(["bifurcation", str(path), *words]) == 2
+    said = capfd.readouterr().err
+    assert field in said
+    assert part in said
+    assert "Traceback" not in said
+
+
 def test_needs_a_frequency(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "model.toml"
     path.write_text(BASE, encoding="utf-8")

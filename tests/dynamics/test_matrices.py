@@ -58,6 +58,34 @@ constant = 0.05
     return text, {"M": mass, "C": damping, "K": stiffness}, factors, gap, stop, omega
 
 
+def test_entries_of_matrices_are_parameters() -> None:
+    """Of a symmetric matrix both that are one; the file of a place has them."""
+    text, matrices, *_ = drawn(3)
+    file = parse_model_file(text)
+    changes = {"mass.b.b": 3.0, "stiffness.a.c": 0.25, "damping.c.a": 0.125}
+    M, C, K = (matrices[key].copy() for key in "MCK")
+    M[1, 1], C[2, 0], K[0, 2], K[2, 0] = 3.0, 0.125, 0.25, 0.25
+    changed, written = file.model.changed(changes), file.with_(changes).model
+    assert changed == written
+    assert [changed.parameter(name) for name in changes] == list(changes.values())
+    inverse, system = np.linalg.inv(M), changed.second_order()
+    for ours, whole in ((system.damping, C), (system.stiffness, K)):
+        assert system.over_mass(ours) == pytest.approx(inverse @ whole, rel=1e-9, abs=1e-9)
+    assert "stiffness.c.a" not in file.model.parameters
+    with pytest.raises(InputError, match="positive definite"):
+        file.model.changed({"mass.b.b": -1.0})
+    with pytest.raises(InputError, match="found 1 N/m, expected a dimensionless number"):
+        file.with_({"stiffness.a.c": "1 N/m"})
+
+
+def test_a_mass_matrix_that_a_file_gives_by_its_diagonal_may_get_couplings() -> None:
+    text, matrices, *_ = drawn(1)
+    diagonal = np.diag(matrices["M"]).tolist()
+    file = parse_model_file(text.replace(f"mass = {matrices['M'].tolist()}", f"mass = {diagonal}"))
+    assert file.data["matrices"]["mass"] == diagonal
+    assert file.with_({"mass.a.b": 0.1}).data["matrices"]["mass"][1][0] == 0.1
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_any_matrices_against_another_integrator(seed: int) -> None:
     """M x″ + C x′ + K x + row · force(row · x) = P sin ωt, solved with scipy at tight tolerance

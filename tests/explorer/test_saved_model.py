@@ -31,7 +31,16 @@ def file(name: str) -> ModelFile:
     return read_model_file(EXAMPLES / f"{name}.toml")
 
 
-FILES = ("paper", "mechanical", "three-masses", "hammer-base", "backlash", "preloaded", "aberdeen")
+FILES = (
+    "paper",
+    "mechanical",
+    "three-masses",
+    "hammer-base",
+    "backlash",
+    "preloaded",
+    "aberdeen",
+    "two-wells-chaos",
+)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -52,6 +61,8 @@ def test_a_saved_place_is_the_same_system_again(name: str) -> None:
     wanted, found = place.model.second_order(), again.model.second_order()
     for key in ("mass", "damping", "stiffness", "force", "constant"):
         assert getattr(found, key) == pytest.approx(getattr(wanted, key), rel=1e-9), key
+    for law, same in zip(found.laws, wanted.laws, strict=True):
+        assert np.array(law.points) == pytest.approx(np.array(same.points), rel=1e-9)
     for one, other in zip(found.clearances, wanted.clearances, strict=True):
         for a, b in zip(one.sides, other.sides, strict=True):
             assert np.array(a[1].springs) == pytest.approx(np.array(b[1].springs), rel=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from itertools import pairwise
 
@@ -13,9 +14,9 @@ from scipy.optimize import minimize
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.laws.cubic_law import cubic_error, cubic_points, points_for
+from designer.laws.force_law import ForceLaw
 from designer.model.clearance import Side
-from designer.model.cubic_law import cubic_error, cubic_points, points_for
-from designer.model.force_law import ForceLaw
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model_file import parse_model_file
@@ -177,6 +178,38 @@ def test_numbers_of_laws_are_parameters() -> None:
     assert changed.cubic_springs[0].k3 == 2.5
     assert changed.frictions[0].force == 0.0
     assert model(text).places["a-ground.velocity"] == ("friction", 0, "velocity")
+
+
+def test_points_of_laws_are_parameters() -> None:
+    points = [[-1, -2], [1, 2], [3, 3]]
+    system = model(law(points=points), law(name="D", quantity="velocity", points=points))
+    assert system.places["L.f3"] == ("law", 0, "points", 2, 1)
+    units = {name: text for name, text in system.units.items() if name[0] in "LD"}
+    assert units == {
+        **{f"{name}.f{i}": "N" for name in "LD" for i in (1, 2, 3)},
+        **{f"{name}.x{i}": unit for name, unit in (("L", "m"), ("D", "m/s")) for i in (1, 2, 3)},
+    }
+    both = {"L.x2": 3.5, "L.x3": 4.0, "D.f1": -1.5}
+    moved = [[-1, -2], [3.5, 2], [4, 3]], [[-1, -1.5], [1, 2], [3, 3]]
+    again = model(law(points=moved[0]), law(name="D", quantity="velocity", points=moved[1]))
+    assert system.changed(both) == again
+    assert [system.changed(both).parameter(name) for name in both] == list(both.values())
+    low, high = system.parameters["L.x2"]
+    assert system.changed({"L.x2": low}) != system != system.changed({"L.x2": high})
+    assert (low, high) == pytest.approx((-1.0, 3.0), abs=1e-5)
+    for beyond in (-1.0, 3.0, math.nan):
+        with pytest.raises(InputError, match=r"by rising x|a number"):
+            system.changed({"L.x2": beyond})
+    with pytest.raises(InputError, match=r"slope -0\.5 beyond its points"):
+        system.changed({"D.f3": 1.0})
+
+
+def test_a_file_has_the_points_that_it_is_given() -> None:
+    text = ONE + FORCE + law(points=[["-1 mm", -2], ["1 mm", "2 N"], [0.003, 3]])
+    moved = parse_model_file(text).with_({"L.x2": "0.5 mm", "L.f2": 1.5, "L.x3": 0.004})
+    assert moved.data["law"][0]["points"] == [["-1 mm", -2], ["0.5 mm", "1.5 N"], ["0.004 m", 3]]
+    with pytest.raises(InputError, match=r"L\.x2: found None"):
+        moved.with_({"L.x2": None})
 
 
 def law(**keys: object) -> str:

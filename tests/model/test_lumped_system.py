@@ -13,8 +13,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
 
 from designer.base.errors import InputError
+from designer.laws.hertz_law import hertz_pieces
 from designer.model.driven import model_flow
-from designer.model.hertz_law import hertz_pieces
 from designer.model.lumped_elements import Damper, Force, Gap, Mass, Spring
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless

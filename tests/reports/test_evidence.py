@@ -10,12 +10,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
+from designer.base.arrays import Array
 from designer.base.progress import Progress
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
-from reports.makers import example_report, frequency_sweep, grazing_map, persistence, rattle
+from reports.makers import (
+    double_well,
+    example_report,
+    frequency_sweep,
+    grazing_map,
+    instant_impact,
+    persistence,
+    rattle,
+    standing_post,
+)
 from reports.makers.backbone import backbone
 from reports.makers.bilinear import bilinear_frequency
 from reports.makers.chain_modes import chain_frequencies
@@ -142,6 +152,60 @@ def test_bad_input_ends_in_a_message(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert example_report.main([str(tmp_path / "none.toml"), str(tmp_path / "out")]) == 2
     assert "none.toml" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_bounce_that_takes_no_time_repeats_itself() -> None:
+    """Newton's law from one impact to the next by another integrator: back at the seat after a
+    period for the first time, at the speed of which seven tenths were left."""
+    omega, gap = 2.0 * math.pi * 26.0, 1e-3
+    bounce = instant_impact.instant(system("restitution"), omega)
+    lag = math.atan2(0.4 * omega, 800.0 - 0.05 * omega**2)
+    turn = bounce.driven[1] + lag
+
+    def rates(t: float, y: Array) -> Array:
+        force = 1.5 * math.sin(omega * t + turn) - 0.4 * y[1] - 800.0 * y[0]
+        return np.array([y[1], force / 0.05])
+
+    start = bounce.at(0.0)
+    times = np.linspace(0.0, 2.0 * math.pi / omega, 400)
+    ends = 0.0, float(times[-1])
+    kept = solve_ivp(rates, ends, np.array(start), "DOP853", times, rtol=1e-11, atol=1e-13)
+    assert start[0] == pytest.approx(-gap, rel=1e-12)
+    assert kept.y[0, -1] == pytest.approx(-gap, rel=1e-8)
+    assert kept.y[0, 1:-1].min() > -gap
+    assert start[1] == pytest.approx(-0.7 * kept.y[1, -1], rel=1e-8)
+    assert start[1] > 0.0
+
+
+@pytest.mark.parametrize("place", [1.05, 1.3, 1.41, 1.42, 1.6])
+def test_a_swing_takes_the_time_that_energy_takes(place: float) -> None:
+    """Twice the integral of dx/v between its ends, v²/2 the energy that is left."""
+    square = place * place
+    near = math.sqrt(2.0 - square) if square < 2.0 else -place
+    middle, half = 0.5 * (place + near), 0.5 * (place - near)
+
+    def slowness(angle: float) -> float:
+        # x² - x⁴/2 less that at the end is (a² - x²)(x² + a² - 2)/2.
+        x = middle + half * math.sin(angle)
+        return half * math.cos(angle) / math.sqrt((square - x * x) * (x * x + square - 2.0) / 2.0)
+
+    time = 2.0 * quad(slowness, -0.5 * math.pi, 0.5 * math.pi, epsrel=1e-10, limit=200)[0]
+    found = double_well.frequency(system("double-well"), place)
+    assert found == pytest.approx(2.0 * math.pi / time, rel=1e-7)
+
+
+def test_a_small_swing_in_a_well() -> None:
+    model = system("double-well")
+    assert double_well.frequency(model, 1.0 + 1e-6) == pytest.approx(math.sqrt(2.0), rel=1e-5)
+    assert double_well.small(model) == pytest.approx(math.sqrt(2.0))
+
+
+@pytest.mark.parametrize("omega", [30.0, 70.0, 120.0])
+def test_a_post_that_stays_is_touched_by_the_motion_of_the_mass(omega: float) -> None:
+    """M x″ = -K (x - y) - C (x - y)′."""
+    ratio = abs((6e3 + 12j * omega) / (6e3 + 12j * omega - 1.2 * omega**2))
+    wanted = 2e-3 / ratio
+    assert standing_post.touching_amplitude(system("fixed-stop"), omega) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.8, 1.5])

@@ -32,7 +32,7 @@ weight on a moving base."""
 
 
 def test_every_example_is_here() -> None:
-    assert len(FILES) == 10
+    assert len(FILES) == 11
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

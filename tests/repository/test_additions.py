@@ -110,7 +110,7 @@ def test_a_design_rule_touches_two_files(tmp_path: Path) -> None:
 
 
 LAW: Mapping[str, Texts] = {
-    "model/law_elements.py": [
+    "laws/law_elements.py": [
         (
             "KINDS: tuple[type[NonlinearElement], ...] = (Law, CubicSpring, Friction)\n",
             '''@dataclass(frozen=True)

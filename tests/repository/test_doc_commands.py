@@ -43,7 +43,6 @@ SMALLER = {
     "--steps 241": "--steps 5",
     "--steps 111": "--steps 5",
     "--samples 100 --out out/rig": "--samples 4 --out out/rig",
-    "--omega 1.0 --plots": "--omega 1.0 --starts 2 --plots",
     "--shares 200": "--shares 20",
     # how many starts lead where is asked in tests/check/test_coexistence.py
     **{
@@ -55,13 +54,7 @@ SMALLER = {
         )
     },
     # the boards of pages that are routed and asked in ngspice are the paper's and the rig's
-    **{
-        f"run examples/{name}.toml": f"synthesise examples/{name}.toml"
-        for name in ("restitution", "two-shakers")
-    },
-    "run examples/double-well.toml --out out/double-well-board": (
-        "synthesise examples/double-well.toml --out out/double-well-board"
-    ),
+    "run examples/two-shakers.toml": "synthesise examples/two-shakers.toml",
     # the parts of these two are chosen in tests/yields/test_without_period.py and
     # tests/synthesis/test_combinations.py
     "run examples/two-wells-chaos.toml --out out/chaos": (

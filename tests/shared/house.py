@@ -16,6 +16,7 @@ ORDER = (
     "dynamics",
     "bifurcations",
     "catalog",
+    "laws",
     "model",
     "circuit",
     "linear_network",

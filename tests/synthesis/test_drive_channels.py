@@ -21,6 +21,7 @@ from designer.check.deck_runs import FirstRun
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.board_parts_only import Connector
 from designer.circuit.board_values import nominal_board
+from designer.circuit.design import settings
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
@@ -38,8 +39,11 @@ from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
 from designer.synthesis.output_loads import design_loads
 from designer.synthesis.part_checks import unit_circuit
-from designer.workbench.prediction import BoardPrediction
+from designer.workbench.channel_roles import recorded_motion
+from designer.workbench.naming import identify_response
+from designer.workbench.prediction import POINTS, BoardPrediction
 from designer.yields.adjustment import Adjustment
+from tests.shared.simulated_scope import SimulatedScope
 from tests.shared.system_text import clearance, system_text, table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
@@ -376,16 +380,44 @@ def test_the_board_has_a_jack_for_each_channel() -> None:
 
 
 def test_no_record_of_such_a_board_is_named() -> None:
-    """The phase that stops which stay make cannot go."""
-    for name, found, expected in (
-        ("square", "another shape", "one sine of phase 0 drives$"),
-        ("two phases", "a second channel", "one sine of phase 0 drives$"),
-        ("phase", "a phase of its own", "a phase that all forces have may go, but not"),
-        ("stops that stay", "a phase of its own", "dampers to ground beside stops that stay$"),
-    ):
-        with pytest.raises(InputError, match=expected) as refused:
+    for name, found in (("square", "another shape"), ("two phases", "a second channel")):
+        with pytest.raises(InputError, match=r"one sine drives$") as refused:
             check_fits(BoardPrediction(made(name)), fit=False, boards=False, decays=[])
         assert refused.value.found == f"a board whose drive has {found}"
+
+
+@pytest.mark.parametrize("name", ["phase", "stops that stay"])
+def test_a_sine_of_another_phase_is_predicted_from_its_phase_0_on(name: str) -> None:
+    """Against the exact circuit under the drive of the model's phase; its record is named."""
+    result = made(name)
+    prediction, (response,) = BoardPrediction(result), result.model_responses
+    check_fits(prediction, fit=False, boards=False, decays=[])
+    (setting,) = settings(result.design, result.model_responses)
+    ((_, sine, cosine),) = setting.shape
+    assert abs(cosine) > 0.05
+    true = on_circuit(prediction.reduction.system(), result.design, response)
+    waves, (shown,) = prediction.waves(true, setting), prediction.responses
+    grid = np.arange(len(waves["v1"])) / POINTS
+    later = (grid - np.arctan2(cosine, sine) / (2.0 * np.pi)) % true.n
+    for net in prediction.nets:
+        whole = np.append(waves[net], waves[net][0])
+        wanted = np.interp(later, np.arange(len(whole)) / POINTS, whole)
+        assert shown.waves[net] == pytest.approx(wanted, abs=5e-3 * np.ptp(wanted))
+    channels = ("v1", prediction.stops[0].output, prediction.generator)
+    period = 1.0 / setting.frequency_hz
+    time = np.arange(14 * POINTS) * period / POINTS
+    record = SimulatedScope(channels=channels).record(
+        time,
+        {net: np.resize(waves[net], len(time)) for net in channels},
+        period,
+        np.random.default_rng(5),
+    )
+    motion = recorded_motion(
+        record, prediction, stated={n: f"CH{k + 1}" for k, n in enumerate(channels)}
+    )
+    named = identify_response(motion, prediction)
+    assert named.sure
+    assert named.response == true.response == shown.orbit.response
 
 
 THREE = table("force", on="ball", amplitude=1.0, harmonics=[[2, 0.3, 0.0]]) + table(

@@ -17,6 +17,8 @@ from typing import Annotated, ClassVar, Literal
 from designer.base.arrays import Array
 from designer.base.errors import MISSING
 from designer.base.schema import (
+    GREATEST,
+    SMALLEST,
     Accepts,
     FileTable,
     choice,
@@ -26,8 +28,8 @@ from designer.base.schema import (
     such,
 )
 from designer.base.units import has_unit
-from designer.model.cubic_law import MOST_POINTS, cubic_error, cubic_points, points_for
-from designer.model.element_keys import (
+from designer.laws.cubic_law import MOST_POINTS, cubic_error, cubic_points, points_for
+from designer.laws.element_keys import (
     NAME,
     NUMBERS,
     check_joined,
@@ -37,8 +39,7 @@ from designer.model.element_keys import (
     signed,
     two_bodies,
 )
-from designer.model.force_law import Quantity
-from designer.model.model import GREATEST, SMALLEST
+from designer.laws.force_law import Quantity
 
 DEFAULT_ERROR = 0.001
 """Of a cubic spring that states neither its points nor their error."""
@@ -224,6 +225,10 @@ class Law(NonlinearElement):
             refuse(f"{field}.points", text, f"x in {expected}: the law is of a {self.quantity}")
         for value in chain.from_iterable(self.corners):
             check_size(f"{field}.points", value, "numbers")
+        for i, ((x0, _), (x1, _)) in enumerate(pairwise(self.corners), start=1):
+            if not x0 < x1:  # a sweep's: those of a file rise
+                text = f"x{i} = {x0:g} and x{i + 1} = {x1:g}"
+                refuse(f"{field}.points", text, f"points by rising x, not {text}")
         slopes = [(f1 - f0) / (x1 - x0) for (x0, f0), (x1, f1) in pairwise(self.corners)]
         steepest = max(slopes, key=abs)
         if not abs(steepest) <= NUMBERS[1]:
