@@ -33,7 +33,7 @@ from designer.spread.spread import draw_many
 from designer.synthesis.part_checks import stage_refusal
 from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Verdict
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 BOARDS = 64
 """Boards of each stage that are asked."""
