@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from designer.base.frames import table_html
-from designer.base.progress import note, seeking
+from designer.base.progress import doing, note, seeking
 from designer.catalog.design_rule import RuleOutcome
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.circuit.coefficients import EXACT
@@ -118,6 +118,7 @@ def responses_of(
     """
     _checked(modelfile, catalog)
     with errors_in(modelfile):
+        doing("responses of the model")
         found = None if ahead is None else ahead()
         found = found or find(modelfile.model, modelfile.responses)
         if all_found:

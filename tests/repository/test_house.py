@@ -84,7 +84,7 @@ REACH = {
     "export": 59_650,
     "synthesise": 55_800,
     "run": 68_500,
-    "tolerance": 68_550,
+    "tolerance": 68_600,
     "search": 73_600,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
