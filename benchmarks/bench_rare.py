@@ -37,8 +37,8 @@ from designer.spread.spread import Spread
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.rare_losses import rare_losses
-from designer.yields.study import plan_study
 from designer.yields.study_identity import RULES
+from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import check
 
 ROOT = Path(__file__).parent.parent

@@ -39,7 +39,7 @@ from designer.spread.spread import Spread, draw
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.layers import LocalRunner, samples_task
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "tolerance-speed"

@@ -24,7 +24,7 @@ from designer.spice import convergence_aids, equation_check, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_circuit
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 MODEL: dict[str, Any] = {
     "m": 0.5, "k": 0.5, "k0": 0.95, "c": 0.5, "zeta": 0.1, "f20": 0.0, "b": 0.25, "sides": "both",

@@ -21,7 +21,7 @@ from designer.folders import design_files
 from designer.folders.model_source import source
 from designer.model.find_responses import matches
 from designer.verdicts.exact_circuit import block
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 
 def boards(folder: Path, samples: int) -> dict[str, Any]:

@@ -34,6 +34,10 @@ DRAWN_STARTS = 200
 
 CURVE_DEPTH = 1
 """How many times in a row other bifurcation curves are begun where curves meet."""
+COLLECTION = 50_000, 20, 20
+"""Thresholds of ``gc``. A page and a board are some 100,000 objects without circles: at Python's
+own thresholds the collector goes through all libraries' objects again and again, a fifth of a
+study's CPU time."""
 
 
 def cores() -> int:

@@ -74,6 +74,10 @@ if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)
 
 
+CIRCUITS = "circuits-{masses}"
+"""What is noted once the code for circuits of so many masses is stored."""
+
+
 def stored_whole(what: str) -> bool:
     """Whether ``note_stored`` was called for this, by any process; True where nothing is stored."""
     return CACHE is None or (CACHE / f"{what}.whole").exists()

@@ -6,21 +6,51 @@ and their arguments. Whatever goes wrong there is done again here: nothing depen
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, Generic, TypeVar
 
+from designer.base.defaults import COLLECTION
 from designer.base.environment import python_command
 
 Result = TypeVar("Result")
-Ask = Callable[..., Callable[[], Any]]
+
+
+class Awaited(Generic[Result]):
+    """What a function gives, there or here.
+
+    there : its result, in a tuple, or None where that process has none. None: it is called here,
+    when its result is asked for.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Result],
+        arguments: tuple[Any, ...],
+        there: Future[tuple[Result] | None] | None = None,
+    ) -> None:
+        self._function, self._arguments, self._there = function, arguments, there
+
+    def __call__(self) -> Result:
+        """The result, which is waited for; raises what the function raises."""
+        answered = None if self._there is None else self._there.result()
+        return self._function(*self._arguments) if answered is None else answered[0]
+
+    @property
+    def ready(self) -> bool:
+        """Whether nothing has to be waited for."""
+        return self._there is not None and self._there.done()
+
+
+Ask = Callable[..., Awaited[Any]]
 _asked: ContextVar[Ask | None] = ContextVar("asked", default=None)
 """The process whose block this is."""
 CALL = "from designer.base.second_process import serve; serve({modules!r})"
@@ -43,16 +73,10 @@ class OtherProcess:
         )
         self._one_at_a_time = ThreadPoolExecutor(1)
 
-    def __call__(self, function: Callable[..., Result], *arguments: Any) -> Callable[[], Result]:
-        """function(*arguments), there; both must pickle. What is returned waits for the result, and
-        raises what the function raises."""
-        answer = self._one_at_a_time.submit(self._answer, function, arguments)
-
-        def result() -> Result:
-            answered = answer.result()
-            return function(*arguments) if answered is None else answered[0]
-
-        return result
+    def __call__(self, function: Callable[..., Result], *arguments: Any) -> Awaited[Result]:
+        """function(*arguments), there; both must pickle."""
+        there = self._one_at_a_time.submit(self._answer, function, arguments)
+        return Awaited(function, arguments, there)
 
     def _answer(self, function: Callable[..., Result], arguments: object) -> tuple[Result] | None:
         """The result; None where that process has none."""
@@ -81,7 +105,7 @@ def other_process(jobs: int, *modules: str) -> Iterator[Ask]:
     when its result is asked for. It ends with the block; within the block of another one that is
     asked, and no further one is started."""
     if jobs < 2:
-        yield lambda function, *arguments: lambda: function(*arguments)
+        yield lambda function, *arguments: Awaited(function, arguments)
         return
     known = _asked.get()
     if known is not None:
@@ -101,6 +125,7 @@ def serve(modules: Sequence[str]) -> None:
 
     An answer is a tuple with the result, or None where there is none.
     """
+    gc.set_threshold(*COLLECTION)
     answers: BinaryIO = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a function prints is no answer
     for name in modules:

@@ -20,7 +20,7 @@ from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check import checked_design, synthesis_result
-from designer.check.synthesis_result import Synthesis, with_stage
+from designer.check.synthesis_result import Ahead, Synthesis, with_stage
 from designer.circuit.coefficients import LARGE_ERROR
 from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.design_rules import run_rules
@@ -33,7 +33,7 @@ from designer.spread.spread import draw_many
 from designer.synthesis.part_checks import stage_refusal
 from designer.verdicts.exact_circuit import Case, settled
 from designer.verdicts.verdict import Verdict
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 BOARDS = 64
 """Boards of each stage that are asked."""
@@ -94,10 +94,11 @@ def synthesise(
     all_found: bool = True,
     jobs: int = 1,
     other: Ask | None = None,
+    ahead: Ahead | None = None,
 ) -> Synthesis:
     """``check.synthesis_result.synthesise``, with the better stage where the model file states none
     and both make its clearances. other : a process that designs with one of them meanwhile; no
-    choice depends on it.
+    choice depends on it. ahead : as of ``responses_of``.
 
     Raises
     ------
@@ -107,10 +108,14 @@ def synthesise(
     catalog = load_catalog() if catalog is None else catalog
     able = _able(modelfile)
     if modelfile.circuit.dead_zone is not None or len(able) < 2:
-        return synthesis_result.synthesise(modelfile, catalog, all_found=all_found, jobs=jobs)
+        return synthesis_result.synthesise(
+            modelfile, catalog, all_found=all_found, jobs=jobs, ahead=ahead
+        )
     began = time.perf_counter()
     first, second = able
-    met = synthesis_result.responses_of(with_stage(modelfile, first), catalog, all_found=all_found)
+    met = synthesis_result.responses_of(
+        with_stage(modelfile, first), catalog, all_found=all_found, ahead=ahead
+    )
     if other is not None:
         elsewhere = other(_foretold, modelfile, second, catalog, met, jobs)
     refusal = None

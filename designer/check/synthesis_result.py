@@ -6,10 +6,11 @@ Nothing here writes a file or prints; ``jobs.synthesise_job`` does the same with
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from designer.base.frames import table_html
-from designer.base.progress import note, seeking
+from designer.base.progress import doing, note, seeking
 from designer.catalog.design_rule import RuleOutcome
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.circuit.coefficients import EXACT
@@ -21,6 +22,9 @@ from designer.model.model_file import ModelFile, errors_in
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
 from designer.synthesis.part_checks import check_choices, unit_circuit
+
+Ahead = Callable[[], tuple[ModelResponse, ...] | None]
+"""Waits for a model's responses that another process looks for; None where it does not."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +71,14 @@ def synthesise(
     jobs: int = 1,
     announced: bool = True,
     shown: tuple[ModelResponse, ...] | None = None,
+    ahead: Ahead | None = None,
 ) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
 
     all_found : whether there have to be all of them before a part is chosen; one that is not there
     has the swing of what was found instead otherwise. jobs : threads; no part depends on it.
     announced : whether who watches hears that parts stand. shown : the responses, where they are
-    known.
+    known. ahead : as of ``responses_of``.
 
     Raises
     ------
@@ -83,7 +88,7 @@ def synthesise(
     began = time.perf_counter()
     modelfile = with_stage(modelfile)
     catalog = load_catalog() if catalog is None else catalog
-    responses = shown or responses_of(modelfile, catalog, all_found=all_found)
+    responses = shown or responses_of(modelfile, catalog, all_found=all_found, ahead=ahead)
     catalog = _checked(modelfile, catalog)
     with errors_in(modelfile):
         choice = modelfile.model, modelfile.circuit, catalog
@@ -97,9 +102,15 @@ def synthesise(
 
 
 def responses_of(
-    modelfile: ModelFile, catalog: Catalog, *, all_found: bool = False
+    modelfile: ModelFile,
+    catalog: Catalog,
+    *,
+    all_found: bool = False,
+    ahead: Ahead | None = None,
 ) -> tuple[ModelResponse, ...]:
     """The wanted responses on the model, of a file with a stage whose choices can be built.
+
+    ahead : waits for them where they are looked for already.
 
     Raises
     ------
@@ -107,7 +118,9 @@ def responses_of(
     """
     _checked(modelfile, catalog)
     with errors_in(modelfile):
-        found = find(modelfile.model, modelfile.responses)
+        doing("responses of the model")
+        found = None if ahead is None else ahead()
+        found = found or find(modelfile.model, modelfile.responses)
         if all_found:
             need_found(dict(enumerate(found, start=1)), modelfile.si, modelfile.source)
     return found

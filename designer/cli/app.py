@@ -99,7 +99,7 @@ def register(
         given = {key: _plain(value) for key, value in words.items() if value not in (None, [])}
         given |= {} if kind is None else kind.given
         try:
-            with _logged(log), progress_for(quiet) as progress:
+            with _logged(log), progress_for(quiet) as progress, verb.beside(**given):
                 for parameter, word, _ in own:
                     _look(given.get(parameter.name), word.names[-1] if word.names else word.metavar)
                 _refuse_at_once(given.get(SOURCE))

@@ -5,6 +5,7 @@ Worker processes import this module again, so it imports nothing that takes time
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import gc
 import os
@@ -12,6 +13,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
+from designer.base.defaults import COLLECTION
 from designer.base.errors import DesignerError, EnvironmentMissing
 from designer.base.printed import tell
 
@@ -28,9 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # The matrices are small: a second thread for one costs more time than it saves.
     for library in ("OPENBLAS", "MKL", "BLIS"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    # A page and a board are some 100,000 objects without circles: at Python's own thresholds the
-    # collector goes through all libraries' objects again and again, a fifth of a study's CPU time.
-    gc.set_threshold(50_000, 20, 20)
+    gc.set_threshold(*COLLECTION)
+    atexit.register(gc.freeze)  # a last look for circles takes a fifth of a second
     sys.exit(status(sys.argv[1:] if arguments is None else list(arguments)))
 
 

@@ -22,7 +22,7 @@ from designer.explorer.saved_model import PinnedResponse, saved_text
 from designer.explorer.wire import Message
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.verdicts import exact_circuit
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from designer.yields.yield_count import count
 
 PIECE = 10

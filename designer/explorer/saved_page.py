@@ -42,7 +42,7 @@ from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, StudyPlan
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from designer.yields.yield_count import Yield, all_on_one, count
 
 PIECE = 10

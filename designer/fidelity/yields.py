@@ -27,7 +27,7 @@ from designer.verdicts import exact_circuit
 from designer.verdicts.cross_check import Ask, CrossCheck, StartKind, Why
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.verdicts.verdict import Answer, StudyPlan, Verdict
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 REFINEMENTS = 3
 """Rounds of finer steps of ngspice for a board at most, down to a 64th of the gate's: further than

@@ -23,7 +23,7 @@ from designer.model.model_file import ModelFile
 from designer.model.si_units import BASE, base_json
 from designer.yields.start_recipe import Recipe, hertz, volts
 from designer.yields.start_recipe_search import find_recipes
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 
 if TYPE_CHECKING:
     from designer.check.synthesis_result import Synthesis

@@ -33,8 +33,6 @@ from designer.model.mechanics import SecondOrderSystem
 from designer.synthesis.part_checks import unit_circuit
 
 CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits({masses})"
-STORED = "circuits-{masses}"
-"""What is noted of the compiled code once the part for circuits of so many masses is stored."""
 
 
 @contextmanager
@@ -46,7 +44,7 @@ def compiling_ahead(jobs: int, system: SecondOrderSystem) -> Iterator[Callable[[
     compiles the same once more, beside a process that is ahead with it.
     """
     masses = system.size
-    if jobs < 2 or jit.stored_whole(STORED.format(masses=masses)):
+    if jobs < 2 or jit.stored_whole(jit.CIRCUITS.format(masses=masses)):
         yield lambda: None
         return
     process = subprocess.Popen(
@@ -85,7 +83,7 @@ def compile_circuits(masses: int) -> None:
     boards.settle([0], [drive], rest[None])
     boards.swept(0, [(drive, 1)], rest[None])
     Flow(boards.reduction(0).system(), drive).run(rest, 1)
-    jit.note_stored(STORED.format(masses=masses))
+    jit.note_stored(jit.CIRCUITS.format(masses=masses))
 
 
 def grounded(masses: int) -> LumpedSystem:

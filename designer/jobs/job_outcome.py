@@ -13,11 +13,12 @@ from designer.board.bom import bill_of_materials
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.folders.design_source import read_design
-from designer.jobs.study_stage import RANDOM, Place, read_study
-from designer.yields.study import RunResult, Study
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from designer.jobs.study_stage import Place
+    from designer.yields.study import RunResult, Study
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class JobOutcome:
     """The design, where it was made or read; ``synthesis`` has it always."""
     result: RunResult | None = None
     """The study with all that went into it, where it was made now."""
-    place: Place = RANDOM
-    """Where in the folder the study is."""
+    place: Place | None = None
+    """Where in the folder the study is; None: ``study_stage.RANDOM``."""
     shown: bool = False
     """Whether what stands in the answer beside attribution and maps was shown before they were
     worked out."""
@@ -70,7 +71,9 @@ class JobOutcome:
             return self.result.study
         if self.folder is None:
             raise InputError(None, "the study", MISSING, "a verb that makes one, such as tolerance")
-        return read_study(self.folder, self.synthesis, self.place)
+        from designer.jobs.study_stage import RANDOM, read_study
+
+        return read_study(self.folder, self.synthesis, self.place or RANDOM)
 
     def bom(self) -> pd.DataFrame:
         """The bill of materials: a row for each part to buy, as in ``bom.csv``."""

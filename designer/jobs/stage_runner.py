@@ -19,7 +19,7 @@ from designer.base.progress import Progress, Show, quiet
 from designer.base.second_process import Ask
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
-from designer.check.synthesis_result import Synthesis
+from designer.check.synthesis_result import Ahead, Synthesis
 from designer.folders import board_files, design_files, kicad_files
 from designer.folders.design_source import (
     design_answer,
@@ -40,7 +40,7 @@ class StageRunner:
     ----------
     out : the folder, which need not exist. anew : whether a design that was made with another
     catalogue or version is to be chosen anew; it stands otherwise. shown : is given what is known
-    of the design as soon as its parts stand.
+    of the design as soon as its parts stand. ahead : as of ``synthesis_result.responses_of``.
 
     Raises
     ------
@@ -56,10 +56,12 @@ class StageRunner:
         *,
         anew: bool = False,
         shown: Show = quiet,
+        ahead: Ahead | None = None,
     ) -> None:
         options.check()
         self.modelfile, self.options, self.progress = modelfile, options, progress
         self.catalog, self.folder, self.shown = load_catalog(), Folder(out), shown
+        self.ahead = ahead
         self.stages = (
             design_stage(modelfile, design_inputs(modelfile, self.catalog))
             if anew
@@ -100,7 +102,11 @@ class StageRunner:
                 writing_process(jobs) as other,
             ):
                 synthesis = stage_choice.synthesise(
-                    self.modelfile, self.catalog, jobs=jobs, other=other if jobs > 1 else None
+                    self.modelfile,
+                    self.catalog,
+                    jobs=jobs,
+                    other=other if jobs > 1 else None,
+                    ahead=self.ahead,
                 )
                 self.shown(plain(design_files.chosen(synthesis)))
                 compiled()

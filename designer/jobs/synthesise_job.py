@@ -17,7 +17,7 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress, Show, quiet
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
-from designer.check.synthesis_result import Synthesis
+from designer.check.synthesis_result import Ahead, Synthesis
 from designer.folders import design_files
 from designer.folders.design_source import design_answer
 from designer.folders.json_answers import cost_of
@@ -41,10 +41,11 @@ def synthesise_into(
     shown: Show = quiet,
     *,
     compare: bool = False,
+    ahead: Ahead | None = None,
 ) -> JobOutcome:
     """The design in the folder ``out``; with ``compare`` the comparison is a stage of its own.
-    shown : is given what is known of the design as soon as its parts stand."""
-    runner = StageRunner(modelfile, out, options, progress, anew=True, shown=shown)
+    shown, ahead : as of ``StageRunner``."""
+    runner = StageRunner(modelfile, out, options, progress, anew=True, shown=shown, ahead=ahead)
     names = [COMPARISON, *COMPARISON_PICTURES]
     stages: Stages = {"comparison": (runner.design_inputs, names)} if compare else {}
     synthesis = runner.design() if runner.decide(stages) else None

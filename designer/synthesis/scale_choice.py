@@ -271,7 +271,7 @@ class ScaleChoice:
         """Choices near these points."""
         rounding = self._rounding()
         random = np.random.default_rng((seed, len(starts), 1))
-        found: list[tuple[float, Array, Array, Array]] = []
+        kept: list[Array] = []
         broken = []
         draws = [random.random(DRAWS) for _ in starts]
 
@@ -283,17 +283,21 @@ class ScaleChoice:
             sums = self.program.broken(z, KEPT)
             broken += [s.tangent(z) for s in sums]
             if over <= KEPT and not sums:
-                logs = rounding.rows @ z + rounding.constants
-                rounded = self._rounded(logs)
-                errors = _held(rounding, (rounded - logs)[:, None])[:, 0]
-                found.append((float(np.abs(errors).max()), z, rounded, errors))
+                kept.append(z)
         self.box.cuts += broken[: len(self.program.sums)]
-        best = sorted(found, key=lambda own: own[0])[:LOOKED_AT]
-        quiet = self._over(np.array([z for _, z, _, _ in best])) <= -np.log(ROOM) if best else []
+        if not kept:
+            return
+        logs = np.array([rounding.rows @ z + rounding.constants for z in kept])
+        rounded = self._rounded(logs)
+        errors = _held(rounding, (rounded - logs).T).T
+        largest = np.abs(errors).max(axis=1)
+        best = np.argsort(largest, kind="stable")[:LOOKED_AT]
+        quiet = self._over(np.array([kept[k] for k in best])) <= -np.log(ROOM)
         fit = self._fit(rounding)
-        for (error, z, rounded, errors), is_quiet in zip(best, quiet, strict=True):
-            least = error if error <= self.goal else fit.largest(errors)
-            self.candidates.append(self._candidate(z, rounded, least, bool(is_quiet)))
+        for k, is_quiet in zip(best, quiet, strict=True):
+            error = float(largest[k])
+            least = error if error <= self.goal else fit.largest(errors[k])
+            self.candidates.append(self._candidate(kept[k], rounded[k], least, bool(is_quiet)))
 
     def _fit(self, rounding: Rounding) -> LargestFit:
         """At the scales that make the error of the coefficients least; constant forces are read at
@@ -308,9 +312,13 @@ class ScaleChoice:
         return next((c.error for c in ranked if c.quiet), np.inf)
 
     def _rounded(self, logs: Array) -> Array:
-        """(rows,) the values nearest to these logarithms."""
-        pairs = zip(self.program.rows, logs.tolist(), strict=True)
-        return np.array([row.values[np.argmin(np.abs(row.values - log))] for row, log in pairs])
+        """(k, rows) the values nearest to these logarithms (k, rows)."""
+        columns = []
+        for row, own in zip(self.program.rows, logs.T, strict=True):
+            at = np.clip(np.searchsorted(row.values, own), 1, max(len(row.values) - 1, 1))
+            low, high = row.values[at - 1], row.values[np.minimum(at, len(row.values) - 1)]
+            columns.append(np.where(np.abs(low - own) <= np.abs(high - own), low, high))
+        return np.column_stack(columns)
 
     def _candidate(self, z: Array, rounded: Array, error: float, quiet: bool) -> RoundedChoice:
         own = z[[k for k, values in enumerate(self.program.lists) if len(values)]]

@@ -13,6 +13,7 @@ import inspect
 import os
 import shlex
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
@@ -149,6 +150,8 @@ class Verb:
     """How a study's answer is shown while the work goes on, the first time and then, likewise."""
     computes: bool = True
     """Whether it may need the exact engine, whose compilation is then announced."""
+    beside: Callable[..., AbstractContextManager[object]] = lambda **_: nullcontext()
+    """Given the words of the command line, starts a process before anything is imported here."""
     kinds: tuple[Kind, ...] = ()
     """What it does, each by its name, where it does several things."""
     declared: inspect.Signature = field(init=False)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from designer.base.defaults import SEED
+from designer.base.defaults import SEED, cores
 from designer.base.errors import InputError
 from designer.base.progress import Progress, Show, quiet
 from designer.verbs import next_steps
@@ -16,6 +16,7 @@ from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, 
 from designer.verbs.tables import design_written, not_good_enough, synthesised
 
 if TYPE_CHECKING:
+    from designer.base.second_process import Ask
     from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
     from designer.model.model_file import ModelFile
@@ -49,31 +50,50 @@ def synthesise(
     ResponseNotFound : the model does not show a wanted response; no parts are chosen.
     """
     from designer.jobs.options import Options
-    from designer.jobs.writing_process import writing_process
+    from designer.jobs.writing_process import ask_responses
 
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     options.check()
-    with writing_process(options.workers) if out is not None else nullcontext():
+    with _process(out, jobs) as other:
         from designer.folders.model_source import source
-        from designer.jobs import synthesise_job, usual_times
-        from designer.jobs.open_design import design_file
         from designer.model.model_file import ModelFile, read_model_file
 
         progress = Progress() if progress is None else progress
+        folder: Path | None = None
         in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
         if out is None and in_memory:
             modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
-            _check_comparable(modelfile, compare)
+        else:
+            modelfile, folder = source(model, out)
+        _check_comparable(modelfile, compare)
+        ahead = ask_responses(other, modelfile)
+        from designer.jobs import synthesise_job, usual_times
+        from designer.jobs.open_design import design_file
+
+        if folder is None:
             return synthesise_job.synthesise_in_memory(
                 modelfile, catalog, compare, options.workers, progress
             )
-        modelfile, folder = source(model, out)
-        _check_comparable(modelfile, compare)
         with progress.whole(usual_times.of_design(modelfile)):
-            modelfile = design_file(modelfile, folder, options, progress)
+            chosen = design_file(modelfile, folder, options, progress)
             return synthesise_job.synthesise_into(
-                modelfile, folder, options, progress, shown, compare=compare
+                chosen,
+                folder,
+                options,
+                progress,
+                shown,
+                compare=compare,
+                ahead=ahead if chosen is modelfile else None,
             )
+
+
+def _process(
+    out: Path | str | None = None, jobs: int | None = None, **_: object
+) -> AbstractContextManager[Ask]:
+    """The process that finds responses, and writes, beside this one."""
+    from designer.jobs.writing_process import finding_process
+
+    return finding_process(1 if out is None else jobs or cores())
 
 
 def _check_comparable(modelfile: ModelFile, compare: bool) -> None:
@@ -127,5 +147,6 @@ VERB = Verb(
     "designer synthesise model.toml --out out/model",
     show=show,
     parts=synthesised,
+    beside=_process,
     satisfied=lambda result: result.satisfied,
 )

@@ -6,7 +6,9 @@ a person does with a generator.
 from __future__ import annotations
 
 import math
+import os
 import pickle
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -14,7 +16,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from designer.base.progress import doing, part
-from designer.base.second_process import Ask
+from designer.base.second_process import Ask, Awaited
 from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
@@ -57,6 +59,8 @@ ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
 """Share of the amplitude at which an amplitude ramp begins."""
+AHEAD = 2
+"""Questions that another process may be asked for at a time."""
 ABOVE = 1.1
 """Where the long sweep begins, over the highest resonance inside the clearance."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -65,8 +69,8 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter.
 
-    other : a process that takes every other question, or half of the trials of a single one; no
-    recipe depends on it.
+    other : a process that takes questions from the last one on, once it is idle, or half of the
+    trials of a single one; no recipe depends on it.
     """
     count = len(plan.questions)
     if other is None or jobs < 2 or not count:
@@ -76,8 +80,17 @@ def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tu
     if count == 1:
         elsewhere = partial(other, _worked_there, pickled, there)
         return (_named(replace(benches[0], elsewhere=elsewhere), 0, count),)
-    waiting = {n: other(_found_there, pickled, there, n) for n in range(1, count, 2)}
-    mine = {n: _named(benches[n], n, count) for n in range(0, count, 2)}
+    idle, left = other(os.getpid), deque(range(count))
+    waiting: dict[int, Awaited[Recipe]] = {}
+    mine: dict[int, Recipe] = {}
+    while left:
+        busy = sum(not answer.ready for answer in waiting.values())
+        if idle.ready and busy < AHEAD and len(left) > 1:
+            n = left.pop()
+            waiting[n] = other(_found_there, pickled, there, n)
+        else:
+            n = left.popleft()
+            mine[n] = _named(benches[n], n, count)
     return tuple(waiting[n]() if n in waiting else mine[n] for n in range(count))
 
 

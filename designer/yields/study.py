@@ -17,14 +17,12 @@ from designer.circuit.design import Design
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.spice.equation_check import EquationCheck
-from designer.spread.part_rules import spread_of
 from designer.verdicts.cross_check import CrossCheck
-from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
+from designer.verdicts.verdict import Answer, BoardRow, StudyPlan
 from designer.yields import two_engine_yield
 from designer.yields.loss_attribution import Attribution, AttributionStatus
 from designer.yields.power_up import PowerUp
 from designer.yields.rare_losses import AnyLost, RareLosses
-from designer.yields.row_store import Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
@@ -35,43 +33,14 @@ from designer.yields.yield_maps import YieldMap
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.yields.row_store import Row
+
 BOARD_COLUMNS = tuple(
     "sample board number omega expected verdict response reason radius penetration miss "
     "asymmetry periods waveform".split()
 )
 """The columns of the table of boards."""
 _COUNTS = ("ok", "lost", "grazing", "failed", "samples", "rate")
-
-
-def plan_study(
-    modelfile: ModelFile,
-    design: Design,
-    checked: Sequence[CheckedResponse],
-    catalog: Catalog,
-    *,
-    samples: int,
-    seed: int,
-) -> StudyPlan:
-    """The Monte Carlo study of these responses, boards as the model file says.
-
-    Every one of ``checked`` is a question: leave out those on which the nominal circuit does not
-    settle, since there is no nominal orbit to start from.
-    """
-    return StudyPlan(
-        circuit=design.circuit,
-        spread=spread_of(modelfile, design.circuit, catalog),
-        seed=seed,
-        samples=samples,
-        questions=tuple(
-            Question(
-                c.model.spec,
-                c.excitation,
-                c.circuit,
-                c.gate.settings if c.gate is not None and c.gate.passed else None,
-            )
-            for c in checked
-        ),
-    )
 
 
 @dataclass(frozen=True)

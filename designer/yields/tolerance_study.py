@@ -45,8 +45,9 @@ from designer.yields.row_store import BlockStore
 from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.stored_parts import AnswerLog, StoredParts
-from designer.yields.study import Study, plan_study
+from designer.yields.study import Study
 from designer.yields.study_identity import study_hash
+from designer.yields.study_plan import plan_study
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
 from designer.yields.tuned_yield import tuned_block
 from designer.yields.yield_maps import yield_map

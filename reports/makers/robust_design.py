@@ -48,7 +48,8 @@ from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import StudyPlan
 from designer.yields import study_identity
 from designer.yields.loss_attribution import attribute
-from designer.yields.study import Study, plan_study
+from designer.yields.study import Study
+from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.yield_count import Yield, all_on_one, count
 from reports.makers.robust_design_page import lever_chart, robust_design_page, yield_chart

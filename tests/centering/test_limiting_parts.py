@@ -27,7 +27,7 @@ from designer.spread.board_quantities import Quantity, quantities
 from designer.spread.spread import Group
 from designer.verdicts import exact_circuit
 from designer.yields.margins import Limit, Margin
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from tests.shared import bench_plans, paper_cases
 from tests.shared.search_cases import catalog, made
 

@@ -22,7 +22,7 @@ from designer.model.model_file import parse_model_file
 from designer.verbs.simulate import simulate
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Verdict
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.system_text import clearance, system_text, table
 

@@ -20,7 +20,7 @@ from designer.model.clearance import Clearance, Side
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw_many
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.system_text import clearance, system_text, table
 

@@ -28,7 +28,8 @@ from designer.spice.pool import SpicePool
 from designer.verdicts.cross_check import ask_random
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.yields.layers import samples_task
-from designer.yields.study import RunResult, Study, plan_study
+from designer.yields.study import RunResult, Study
+from designer.yields.study_plan import plan_study
 from tests.shared.quick_folders import without_starts
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED

@@ -42,7 +42,8 @@ from designer.verdicts.cross_check import CrossCheck, StartKind, ask_random
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.verdicts.verdict import Verdict
 from designer.yields.layers import samples_task
-from designer.yields.study import RunResult, Study, plan_study
+from designer.yields.study import RunResult, Study
+from designer.yields.study_plan import plan_study
 from tests.shared.blank_figures import blank_figures
 from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.kicad_cases import case_files

@@ -19,7 +19,7 @@ MODELS = "from tests.shared.compile_kernels import use_models; use_models()"
 
 def compile_kernels() -> None:
     """Compile what circuits of two masses and what models need, where that is not stored yet."""
-    if jit.stored_whole(compile_ahead.STORED.format(masses=2)):
+    if jit.stored_whole(jit.CIRCUITS.format(masses=2)):
         return
     processes = [
         subprocess.Popen([sys.executable, "-c", call], cwd=ROOT, stdin=subprocess.DEVNULL)

@@ -9,7 +9,8 @@ from typing import Any
 from designer.check import checked_design
 from designer.report.data import ReportData
 from designer.verdicts.exact_circuit import block
-from designer.yields.study import RunResult, Study, plan_study
+from designer.yields.study import RunResult, Study
+from designer.yields.study_plan import plan_study
 from tests.shared.paper_cases import synthesised
 
 

@@ -35,7 +35,8 @@ from designer.spread.part_grades import better_grades, better_grades_text, bough
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.verbs import tables
-from designer.yields.study import RunResult, Study, plan_study
+from designer.yields.study import RunResult, Study
+from designer.yields.study_plan import plan_study
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.folders.test_stage_files import design_of
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE

@@ -28,7 +28,7 @@ from designer.yields import loss_walks, rare_losses, stored_parts
 from designer.yields.margins import Margin
 from designer.yields.rare_losses import AnyLost, RareLosses, counted_losses
 from designer.yields.stored_parts import AnswerLog, StoredParts
-from designer.yields.study import plan_study
+from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
