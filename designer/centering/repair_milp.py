@@ -128,7 +128,7 @@ def cheapest(program: RepairProgram) -> tuple[int, ...] | None:
     )
     problem = cp.Problem(cp.Minimize(cost), constraints)
     problem.solve(solver=cp.HIGHS, **SOLVER)
-    rows = [chosen_row(x.value) for x in takes]
+    rows = [chosen_row(x) for x in takes]
     pick = tuple(row for row in rows if row is not None)
     if len(pick) < len(rows):
         return None

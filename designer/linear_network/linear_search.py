@@ -3,8 +3,8 @@
 Levels of error grow from below. A level at which no choice can be completed is a lower bound; at
 the first level where one can, the least error among them is the optimum. Two masses with all terms
 are searched by joins (``linear_network.pair_search``), every other pattern of terms by a tree of
-choices (``linear_network.term_search``). Among the choices that reach the optimum, HiGHS
-chooses those with the fewest distinct values and the lowest price. Work is limited by count, never
+choices (``linear_network.term_search``). Among the choices that reach the optimum, cvxpy and HiGHS
+choose those with the fewest distinct values and the lowest price. Work is limited by count, never
 by time; where it runs out, the last empty level is what the certificate says, and the answer of a
 tree is the best that dives into it find (``linear_network.term_dives``).
 """

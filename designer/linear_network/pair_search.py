@@ -1,11 +1,11 @@
 """Two masses with all terms: levels of error searched by joins.
 
 At each level every ratio choice that can reach it is joined (``linear_network.linear_block``) and
-completed to values, best first. Among the choices of least error HiGHS chooses those with
+completed to values, best first. Among the choices of least error cvxpy and HiGHS choose those with
 the fewest distinct values and the lowest price.
 
 The joins leave every choice that reaches the least error, and elementary inequalities those of
-them that can have the fewest distinct values. HiGHS chooses one completion of each mass
+them that can have the fewest distinct values. cvxpy and HiGHS choose one completion of each mass
 that agree, with the four scales as continuous variables. The solver is not believed: its choice
 is rebuilt from the values and its error computed afresh.
 """
@@ -32,13 +32,7 @@ from designer.linear_network.linear_block import (
     slice_from,
 )
 from designer.linear_network.linear_terms import Levels, LinearQuestion
-from designer.linear_network.milp import (
-    PRICE_WEIGHT,
-    MixedProgram,
-    chosen_row,
-    count_values,
-    new_kinds,
-)
+from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 
 if TYPE_CHECKING:
     pass
@@ -202,8 +196,13 @@ def _solve(
     values: Values, rules: Rules, pool: _Pool, limit: float, prices: Array
 ) -> tuple[str, Index | None]:
     """The solver's status and the parts it chose, if it chose any."""
+    import cvxpy as cp  # takes a second
+
     unit = max(limit, LEAST_UNIT)
     first, second = pool.sides
+    z1 = cp.Variable(len(first.group), boolean=True)
+    z2 = cp.Variable(len(second.group), boolean=True)
+    shift = cp.Variable(4, bounds=[-100.0, 100.0])
     # Errors relative to each row's nominal scales, in units of the limit: small numbers only.
     offsets, scales = [], []
     for side in pool.sides:
@@ -218,38 +217,37 @@ def _solve(
     member = [(side.group[None, :] == groups[:, None]).astype(float) for side in pool.sides]
     # Resistors and capacitors are counted together: the latter's indices follow the former's.
     shifted = np.where(np.arange(14) < 10, 0, len(rules.free_r))
-    owners = [(first, k) for k in range(14) if k not in SECOND] + [(second, k) for k in SECOND]
+    uses = [(z1, first.parts[:, k] + shifted[k]) for k in range(14) if k not in SECOND]
+    uses += [(z2, second.parts[:, k] + shifted[k]) for k in SECOND]
     free = np.flatnonzero(np.concatenate([rules.free_r, rules.free_c]))
-    every, members = new_kinds([side.parts[:, k] + shifted[k] for side, k in owners], free)
-    program = MixedProgram()
-    used = program.variables(max(len(every), 1))
-    z1, z2 = (program.binary(len(side.group)) for side in pool.sides)
-    shift = program.variables(4, -100.0, 100.0)
-    count_values(program, used, [z1 if side is first else z2 for side, _ in owners], members)
-    for z in (z1, z2):
-        program.equal(1.0, (z, np.ones(len(z))))
-    program.equal(0.0, (z1, member[0]), (z2, -member[1]))
-    errors = (z1, offsets[0].T), (z2, offsets[1].T), (shift, D)
-    program.within(1.0 + 1e-7, np.zeros(10), *errors)
-    program.equal(pool.fewest, (used, np.ones(len(used))))
+    used, rest = distinct_values(uses, free)
+    kinds = cp.sum(used)
+    rest += [
+        cp.sum(z1) == 1,
+        cp.sum(z2) == 1,
+        member[0] @ z1 == member[1] @ z2,
+        cp.abs(offsets[0].T @ z1 + offsets[1].T @ z2 + D @ shift) <= 1.0 + 1e-7,
+        kinds == pool.fewest,
+    ]
     if np.isfinite(rules.share):
         # ln of x2's peak voltage over x1's: p - q1 + q3.
         above = scales[0][:, 1] - scales[0][:, 2]
         room = rules.share - rules.peaks[2] + rules.peaks[0] + 1e-9
-        program.at_most(room, (z1, above), (z2, scales[1][:, 3]))
+        rest.append(above @ z1 + scales[1][:, 3] @ z2 <= room)
     for i, j in np.argwhere(rules.ties):
         if i not in SECOND and j in SECOND:
-            program.equal(0.0, (z1, first.parts[:, i]), (z2, -second.parts[:, j]))
+            rest.append(first.parts[:, i] @ z1 == second.parts[:, j] @ z2)
     price1 = prices[first.parts[:, [10, 11, 13]]].sum(axis=1)
     price2 = prices[second.parts[:, 12]]
-    costs = (z1, PRICE_WEIGHT * price1), (z2, PRICE_WEIGHT * price2)
-    status, x = program.solve((used, np.ones(len(used))), *costs)
-    row1, row2 = (None if x is None else chosen_row(x[z]) for z in (z1, z2))
+    objective = kinds + PRICE_WEIGHT * (price1 @ z1 + price2 @ z2)
+    problem = cp.Problem(cp.Minimize(objective), rest)
+    problem.solve(solver=cp.HIGHS, **SOLVER)
+    row1, row2 = chosen_row(z1), chosen_row(z2)
     if row1 is None or row2 is None:
-        return status, None
+        return str(problem.status), None
     parts = first.parts[row1].copy()
     parts[SECOND] = second.parts[row2][SECOND]
-    return status, parts
+    return str(problem.status), parts
 
 
 @dataclass(frozen=True)

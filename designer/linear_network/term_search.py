@@ -14,16 +14,18 @@ soon as its states are tied.
 
 A mixed-integer program mixes the values of known choices of a linear block. It is one-hot in
 logarithms: each part has one of the values that it has in some choice, all scales are free, the
-largest error stays within a limit. Fewest distinct values, then the lowest price; HiGHS solves
-it, with a limit on its nodes.
+largest error stays within a limit. Fewest distinct values, then the lowest price; cvxpy states it
+and HiGHS solves it, with a limit on its nodes.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,15 +43,12 @@ from designer.linear_network.linear_terms import (
     scale_columns,
     sums,
 )
-from designer.linear_network.milp import (
-    NODES,
-    PRICE_WEIGHT,
-    MixedProgram,
-    chosen_row,
-    count_values,
-    new_kinds,
-)
+from designer.linear_network.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.linear_network.term_conditions import TermConditions
+
+if TYPE_CHECKING:
+    pass
+
 
 MOST = 12
 """Choices whose values are mixed: the last ones, which are the best."""
@@ -75,53 +74,46 @@ class TermProgram:
     def solve(self, limit: float, most: int) -> tuple[str, Index | None]:
         """HiGHS' status, and the choice of fewest values with an error up to ``limit``, if it has
         one. most : distinct values that are known to do."""
+        import cvxpy as cp  # takes a second
+
         known, terms = self.choices[-1], len(self.targets.entries)
         values = [np.unique(column) for column in self.choices[-MOST:].T]
+        picks = [cp.Variable(len(own), boolean=True) for own in values]
         r, c = self.logs
         # Relative to a choice that is known: small numbers only.
+        logs = [(r if k < terms else c) for k in range(len(picks))]
         moved = [
-            log[own] - log[known[k]]
-            for k, (log, own) in enumerate(
-                zip([r] * terms + [c] * (len(values) - terms), values, strict=True)
-            )
+            (log[own] - log[known[k]]) @ pick
+            for k, (log, own, pick) in enumerate(zip(logs, values, picks, strict=True))
         ]
         states = [a for a, _ in self.targets.entries]
+        change = cp.hstack([-(moved[k] + moved[terms + a]) for k, a in enumerate(states)])
         start = -(r[known[:terms]] + c[known[terms:]][states] + self.targets.wanted)
         columns = scale_columns(self.targets)
         near = np.linalg.lstsq(columns, -start, rcond=None)[0]
-        shifted = [own + (0 if k < terms else len(r)) for k, own in enumerate(values)]
-        every, members = new_kinds(shifted, np.flatnonzero(self.free))
-        program = MixedProgram()
-        used = program.variables(max(len(every), 1))
-        # The order decides which of equal choices HiGHS finds: what the aim names comes first.
-        stored = [program.binary(len(own)) for own in values[terms:]]
-        picks = [*(program.binary(len(own)) for own in values[:terms]), *stored]
-        shift = program.variables(columns.shape[1], -20.0, 20.0)
-        # A resistor is in its own term, a capacitor in all of its integrator.
-        own_terms = [*np.eye(terms), *(np.equal(states, a) for a in range(len(stored)))]
-        change = [
-            (pick, -np.outer(own, logs))
-            for pick, own, logs in zip(picks, own_terms, moved, strict=True)
-        ]
-        count_values(program, used, picks, members)
-        for pick in picks:
-            program.equal(1.0, (pick, np.ones(len(pick))))
-        program.within(limit, start + columns @ near, *change, (shift, columns))
-        program.at_most(most, (used, np.ones(len(used))))
+        shift = cp.Variable(columns.shape[1], bounds=[-20.0, 20.0])
+        errors = start + columns @ near + change + columns @ shift
         G, g = self.conditions.inequalities
-        if len(g):
-            program.at_most(g - G @ start, *((pick, G @ rows) for pick, rows in change))
-        for i, j in self.equal:
-            if i < j:
-                program.equal(0.0, (picks[i], values[i]), (picks[j], -values[j]))
-        prices = [PRICE_WEIGHT * self.prices[own] for own in values[terms:]]
-        costs = ((used, np.ones(len(used))), *zip(stored, prices, strict=True))
-        status, x = program.solve(*costs, mip_max_nodes=NODES)
-        rows = [None if x is None else chosen_row(x[pick]) for pick in picks]
+        shifted = [own + (0 if k < terms else len(r)) for k, own in enumerate(values)]
+        used, rest = distinct_values(
+            list(zip(picks, shifted, strict=True)), np.flatnonzero(self.free)
+        )
+        rest += [cp.sum(pick) == 1 for pick in picks]
+        rest += [cp.abs(errors) <= limit, cp.sum(used) <= most]
+        rest += [G @ start + G @ change <= g] if len(g) else []
+        rest += [values[i] @ picks[i] == values[j] @ picks[j] for i, j in self.equal if i < j]
+        price = sum(
+            self.prices[own] @ pick for own, pick in zip(values[terms:], picks[terms:], strict=True)
+        )
+        problem = cp.Problem(cp.Minimize(cp.sum(used) + PRICE_WEIGHT * price), rest)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an answer at the limit of nodes
+            problem.solve(solver=cp.HIGHS, **SOLVER, mip_max_nodes=NODES)
+        rows = [chosen_row(pick) for pick in picks]
         if any(row is None for row in rows):
-            return status, None
+            return str(problem.status), None
         chosen = [own[row] for own, row in zip(values, rows, strict=True)]
-        return status, np.array(chosen, dtype=np.int64)
+        return str(problem.status), np.array(chosen, dtype=np.int64)
 
 
 NARROW = 2e-5

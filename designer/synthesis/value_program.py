@@ -1,7 +1,7 @@
 """The last step of sizing a dead zone: one row of each table, by a mixed-integer program.
 
 Least error, then the fewest new values, then the lowest price. The tables are reduced before, so
-the program is small; HiGHS solves it.
+the program is small; cvxpy states it and HiGHS solves it.
 """
 
 from __future__ import annotations
@@ -9,19 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.linear_network.milp import (
-    PRICE_WEIGHT,
-    MixedProgram,
-    Term,
-    chosen_row,
-    count_values,
-    new_kinds,
-)
+from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.synthesis.value_tables import ValueTable, new_values
+
+if TYPE_CHECKING:
+    pass
 
 ERROR_WEIGHT = 1e-4
 """Of the error over its limit: it decides where values and price are the same."""
@@ -191,54 +188,40 @@ def _solve(
     tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking, limit: float | None
 ) -> tuple[tuple[int, ...], str] | None:
     """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
-    program, columns = MixedProgram(), [t.table.values.T for t in tables]
-    uses = [column for own in columns for column in own]
-    free = np.array(sorted(ranking.free), dtype=float)
-    every, members = new_kinds(uses, free)
-    prices = [np.sum([_prices(c, ranking) for c in own], axis=0) for own in columns]
-    # The order decides which of equal choices HiGHS finds: what the aim names comes first.
-    aim = limit is not None
-    kinds = max(len(every), 1)
-    used = program.variables(kinds if aim else 0)
-    picks = {k: program.binary(len(t)) for k, t in enumerate(tables) if aim and prices[k].any()}
-    error = program.variables(1)
-    picks |= {k: program.binary(len(t)) for k, t in enumerate(tables) if k not in picks}
-    places = [picks[k] for k in range(len(tables))]
-    for z in places:
-        program.equal(1.0, (z, np.ones(len(z))))
+    import cvxpy as cp  # takes a second
+
+    picks = [cp.Variable(len(t), boolean=True) for t in tables]
+    error = cp.Variable(nonneg=True)
+    constraints: list[object] = [cp.sum(z) == 1 for z in picks]
     keys = np.unique(tables[0].key)
-    own_keys = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
+    members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
     if len(keys) > 1:
-        for member, z in zip(own_keys[1:], places[1:], strict=True):
-            program.equal(0.0, (places[0], own_keys[0]), (z, -member))
+        for member, z in zip(members[1:], picks[1:], strict=True):
+            constraints.append(members[0] @ picks[0] == member @ z)
     for rule in rules:
-        total = list(zip(places, rule.weights, strict=True))
-        if np.isfinite(rule.low):
-            program.at_most(-rule.low, *((z, -w) for z, w in total))
-        if np.isfinite(rule.high):
-            program.at_most(rule.high, *total)
-    for t, z in zip(tables, places, strict=True):
-        program.at_most(0.0, (z, t.error), (error, -np.ones(1)))
-    if ranking.most is not None and not aim:
-        used = program.variables(kinds)
-    if len(used):
-        of_uses = [z for z, own in zip(places, columns, strict=True) for _ in own]
-        count_values(program, used, of_uses, members)
+        total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
+        constraints += [total >= rule.low] if np.isfinite(rule.low) else []
+        constraints += [total <= rule.high] if np.isfinite(rule.high) else []
+    constraints += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
+    objective: Any = error
+    if limit is not None or ranking.most is not None:
+        uses = [(z, c) for t, z in zip(tables, picks, strict=True) for c in t.table.values.T]
+        kinds, at_least = distinct_values(uses, np.array(sorted(ranking.free), dtype=float))
+        constraints += at_least
     if ranking.most is not None:
-        program.at_most(ranking.most, (used, np.ones(len(used))))
-    costs: list[Term] = [(error, np.ones(1))]
+        constraints.append(cp.sum(kinds) <= ranking.most)
     if limit is not None:
-        costs = [(error, np.array([ERROR_WEIGHT / limit])), (used, np.ones(len(used)))]
-        costs += [(z, PRICE_WEIGHT * price) for z, price in zip(places, prices, strict=True)]
-        program.at_most(limit, (error, np.ones(1)))
-    status, x = program.solve(*costs)
-    chosen = [chosen_row(None if x is None else x[z]) for z in places]
+        price: Any = 0.0
+        for z, column in uses:
+            cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
+            price = price + cost @ z if cost.any() else price
+        objective = cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / limit * error
+        constraints.append(error <= limit)
+    problem = cp.Problem(cp.Minimize(objective), constraints)
+    problem.solve(solver=cp.HIGHS, **SOLVER)
+    chosen = [chosen_row(z) for z in picks]
     rows = tuple(row for row in chosen if row is not None)
-    return (rows, status) if len(rows) == len(chosen) else None
-
-
-def _prices(values: Array, ranking: Ranking) -> Array:
-    return np.array([ranking.price.get(float(v), 0.0) for v in values])
+    return (rows, str(problem.status)) if len(rows) == len(chosen) else None
 
 
 def fewest(rows: TableRows, free: frozenset[float], most: int) -> Index:
