@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.sobol import sobol
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
@@ -419,7 +418,9 @@ def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
 def starts(scale: Array, count: int, seed: int = 0, first: Array | None = None) -> Array:
     """(count, n) initial states: rest, or ``first``, then a scrambled Sobol set in the box
     ± scale."""
-    box = sobol(len(scale), count, seed)
+    from scipy.stats import qmc
+
+    box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
     rest = np.zeros(len(scale)) if first is None else first
     return np.vstack([rest, scale * (2.0 * box - 1.0)])[:count]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from designer.base.arrays import Array
-from designer.base.sobol import sobol
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
@@ -195,7 +195,7 @@ class _Advisor:
         """The setting that the largest share shows, after a look around the best of them; of equal
         ones that with the deepest margin on its worst board but one in ten."""
         best = max((self._worth(c), tuple(c.vector)) for c in candidates)
-        box = 2.0 * sobol(3, AROUND, seed=0) - 1.0
+        box = qmc.scale(qmc.Sobol(3, seed=0).random(AROUND), -np.ones(3), np.ones(3))
         for width, some in zip(WIDTHS, np.array_split(box, len(WIDTHS)), strict=True):
             middle = np.array(best[1])
             near = [self._inside(middle + width * step * widths(self.bands)) for step in some]
