@@ -17,9 +17,8 @@ from designer.board.kicad_rules import board_rules
 from designer.board.sexpr import Expression, expression_text, read
 from designer.routing.board_copper import BoardCopper, read_copper
 from designer.routing.board_layers import layer_count, with_layers
-from designer.routing.ground_pour import cut_open
 from designer.routing.net_kinds import kinds_of_nets, net_kinds
-from designer.routing.routed_board import RoutedBoard, route_board
+from designer.routing.routed_board import RoutedBoard, cut_open, route_board
 from tests.shared.kicad_cases import case, case_files
 
 NAME = "one mass"
