@@ -16,8 +16,17 @@ from designer.board.kicad_items import Entry, Item, section_units
 from designer.board.kicad_names import POWER
 from designer.board.kicad_symbols import PART_ROW, REACH
 from designer.board.pins import SUPPLY_UNIT
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, SupplyDiode, TestPoint
-from designer.circuit.netlist import GROUND, Circuit, Diode, Resistor, Section
+from designer.circuit.netlist import (
+    GROUND,
+    Circuit,
+    Connector,
+    Diode,
+    Resistor,
+    Section,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+)
 from designer.schematic.drawing_cells import Amplifier, CellRows, Chain, role_lines
 from designer.schematic.sheet_drawing import (
     SIZES,
