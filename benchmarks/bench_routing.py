@@ -36,8 +36,7 @@ from designer.folders import board_files
 from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
 from designer.model.model_file import parse_model_file
-from designer.routing.board_copper import BACK, FRONT, read_copper
-from designer.routing.board_layers import with_layers
+from designer.routing.board_copper import BACK, FRONT, read_copper, with_layers
 from designer.routing.routed_board import RoutedBoard, route_board
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -15,7 +15,7 @@ from designer.base.arrays import Array
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit
 from designer.dynamics.counts import MAX_PERIOD
-from designer.spice import numerics_gate, settling_periods
+from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
@@ -72,8 +72,8 @@ def warm(subject: GateSubject, result: Read, seconds: float = 0.0) -> WarmStart:
     settled = np.median(strobes[: -last - 1 : -n], axis=0)
     gaps = (np.abs(strobes - settled) / peak).max(axis=1)
     far = np.flatnonzero(gaps > STROBE_TOLERANCE)
-    short = strobes[: settling_periods.PROBE * n + 1]
-    predicted, _ = settling_periods.periods(short, n, subject.orbit.radius, peak)
+    short = strobes[: numerics_gate.PROBE * n + 1]
+    predicted, _ = numerics_gate.settling_periods(short, n, subject.orbit.radius, peak)
     moves = (np.abs(strobes[2 * n] - strobes[n]) / peak).max() / (1.0 - subject.orbit.radius)
     alone = max(np.log(STROBE_TOLERANCE / moves) / np.log(subject.orbit.radius), 0.0)
     return WarmStart(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from typing import Any, ParamSpec
@@ -167,6 +167,19 @@ def shade_stops(
     for side, gap in stops:
         span(gap, limits[1] if side > 0 else limits[0], color=CONTACT, lw=0, zorder=0)
         line(gap, color=MUTED, lw=0.8, zorder=1)
+
+
+def state_plane(
+    axes: Axes, curves: Iterable[Array], stops: Sequence[tuple[int, float]]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The limits of x and of y that show all curves (points, 2) and all stops, and are set; shaded
+    is what lies beyond a stop. stops : as ``shade_stops`` has them."""
+    every = np.concatenate([np.zeros((1, 2)), *curves])
+    xlim, ylim = axis_limits(every[:, 0], [gap for _, gap in stops]), axis_limits(every[:, 1], ())
+    shade_stops(axes, stops, xlim)
+    axes.set_xlim(*xlim)
+    axes.set_ylim(*ylim)
+    return xlim, ylim
 
 
 def plain_numbers(*axis: Axis) -> None:

@@ -21,7 +21,7 @@ from numba.core.event import install_listener, register
 from numba.core.types.misc import unliteral
 
 from designer.base import numba_shortcuts
-from designer.base.compile_watch import CompileWatch
+from designer.base.numba_shortcuts import CompileWatch
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -19,6 +19,7 @@ alone. Elsewhere numba goes its usual way, with the same results.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 from weakref import WeakSet
 
@@ -26,11 +27,31 @@ import numba
 from numba.core.caching import Cache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.environment import lookup_environment
-from numba.core.event import register
+from numba.core.event import Listener, register
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import TargetConfig
 
-from designer.base.compile_watch import CompileWatch
+
+class CompileWatch(Listener):  # type: ignore[misc]
+    """Calls ``tell`` with the name of a function's module when its compilation begins, and with
+    None when it ends; a callee is within its caller. numba compiles on one thread at a time."""
+
+    def __init__(self, tell: Callable[[str | None], None]) -> None:
+        self._tell = tell
+        self._depth = 0
+
+    def on_start(self, event: Any) -> None:
+        """As numba calls it."""
+        self._depth += 1
+        if self._depth == 1:
+            self._tell(str(event.data["dispatcher"].py_func.__module__))
+
+    def on_end(self, event: object) -> None:
+        """As numba calls it."""
+        self._depth -= 1
+        if self._depth == 0:
+            self._tell(None)
+
 
 TESTED = ("0.68.",)
 """Releases of numba."""

@@ -14,20 +14,19 @@ from designer.board.board_parts import (
     driven_nodes,
     fault_current,
     protection_offset,
+    supply_current,
     trim_reach,
     trimmed_clearance,
 )
 from designer.board.component import Component
 from designer.board.kicad_placement import place
-from designer.board.reverse_protection import supply_current
 from designer.board.summing_nodes import node_spans
 from designer.catalog.parts_catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
-from designer.circuit.board_parts_only import Connector, SupplyCapacitor, Trimmer
 from designer.circuit.board_values import nominal_board
-from designer.circuit.netlist import Circuit, Fitting, Section
+from designer.circuit.netlist import Circuit, Connector, Fitting, Section, SupplyCapacitor, Trimmer
 from designer.model.board_table import BoardChoice
 
 CENTRED = 1e-3

@@ -10,24 +10,21 @@ from designer.base.natural_sort import natural_key
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
-from designer.catalog.entries import DiodeEntry, Kind, PartChoice, Rating, Use
+from designer.catalog.entries import DiodeEntry, Kind, PartChoice, Rating, SupplyDiodeEntry, Use
 from designer.catalog.parts_catalog import Catalog
-from designer.catalog.supply_diode import SupplyDiodeEntry
-from designer.circuit.board_parts_only import (
-    Connector,
-    SupplyCapacitor,
-    SupplyDiode,
-    TestPoint,
-    Trimmer,
-)
 from designer.circuit.netlist import (
     Capacitor,
     Circuit,
+    Connector,
     Diode,
     Fitting,
     Reference,
     Resistor,
     Section,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
 )
 from designer.circuit.stage_title import SUPPLY, stage_names
 from designer.model.board_table import BoardChoice, PartArray

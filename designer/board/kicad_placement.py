@@ -25,8 +25,7 @@ from designer.board.board_parts import probed_nets
 from designer.board.component import Component
 from designer.board.footprints import footprint
 from designer.board.placed_component import ROOM, Label, PlacedBox, PlacedComponent, bounds, overlap
-from designer.circuit.board_parts_only import SupplyDiode
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Section
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Section, SupplyDiode
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
 
 STEP = 0.25

@@ -4,8 +4,7 @@ Conditions name nets, not net classes: these vanish with the project file. Of tw
 KiCad takes the later one, so the general rule stands first. A rule goes before a net class as well,
 so what a class asks for beyond the general rule is a rule of its own here. Past a syntax error
 KiCad drops every rule of the file without a word, and a condition that it does not know never
-holds; so ``drc_specimen`` makes a board that breaks each rule, for whoever runs them to see that
-they work.
+holds; so ``design_rules.kicad_drc`` makes a board that breaks each rule and sees whether they work.
 """
 
 from __future__ import annotations

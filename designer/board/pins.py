@@ -9,23 +9,21 @@ from typing import Literal
 from designer.base.errors import InputError
 from designer.catalog.entries import OpAmp
 from designer.catalog.parts_catalog import Catalog
-from designer.circuit.board_parts_only import (
-    Connector,
-    SupplyCapacitor,
-    SupplyDiode,
-    TestPoint,
-    Trimmer,
-)
 from designer.circuit.netlist import (
     NEGATIVE,
     POSITIVE,
     Capacitor,
     Circuit,
+    Connector,
     Diode,
     Fitting,
     Reference,
     Resistor,
     Section,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
 )
 
 Electrical = Literal["passive", "input", "output", "power_in", "no_connect"]

@@ -10,7 +10,16 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import FieldProblems, FileTable, choice, flag, fraction, line, number
+from designer.base.schema import (
+    FieldProblems,
+    FileTable,
+    choice,
+    flag,
+    fraction,
+    line,
+    number,
+    whole_number,
+)
 from designer.base.units import decode_value, encode_value
 from designer.catalog import fields
 from designer.catalog.fields import Figure
@@ -523,3 +532,90 @@ class PartChoice:
     """Power and voltage that it stands."""
     price: int
     """Price class."""
+
+
+Series = Literal["sma", "bnc"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoaxialJack(BoardEntry):
+    """A coaxial jack that is soldered to the board."""
+
+    series: Annotated[Series, choice("sma", "bnc")]
+    """The cables that fit."""
+    rating: Rating = field(default_factory=Rating)
+    """Power and voltage that it stands."""
+    pins: Annotated[Mapping[str, str], fields.pins("signal", "shell")] = field(
+        default_factory=lambda: {"signal": "1", "shell": "2"}, hash=False
+    )
+    """Number of the footprint's pads by name; KiCad's have the inner conductor at 1."""
+    assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
+    """What could not be compared with a data sheet, in words."""
+
+
+_EURO = number("", "a number >= 0, in euro", lambda value: value >= 0.0)
+
+
+@dataclass(frozen=True)
+class BuildCost(FileTable):
+    """What an order of so many boards is charged with, in euro without tax and transport."""
+
+    boards: Annotated[int, whole_number("a whole number of boards, at least 1", 1)]
+    """How many boards are ordered at once."""
+    part_factor: Annotated[float, number("", "a factor > 0", lambda value: value > 0.0)]
+    """A part's price at this size of order, against the one at a hundred pieces."""
+    board_order: Annotated[float, _EURO]
+    """For each order of bare boards."""
+    board_area: Annotated[float, _EURO]
+    """For each dm² of a bare board with two layers."""
+    assembly_order: Annotated[float, _EURO]
+    """For each order that is assembled: set-up and stencil."""
+    assembly_line: Annotated[float, _EURO]
+    """For each line of the bill that the assembler loads, an order."""
+    surface_part: Annotated[float, _EURO]
+    """For each part that is soldered on the surface."""
+    through_part: Annotated[float, _EURO]
+    """For each part that is soldered through holes."""
+    source: Annotated[str, line("where the figures come from")]
+    """Where the figures come from."""
+    assumed: Annotated[bool, flag()] = False
+    """Whether they are assumptions."""
+
+    @property
+    def name(self) -> str:
+        return str(self.boards)
+
+
+@dataclass(frozen=True)
+class ForwardDrop(FileTable):
+    """The most that a diode drops at a current."""
+
+    current: Annotated[float, fields.positive("A")]
+    """The current [A]."""
+    voltage: Annotated[float, fields.positive("V")]
+    """Largest forward voltage there [V]."""
+    source: Annotated[str, line("where the figure comes from")]
+    """Where the figure comes from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupplyDiodeEntry(BoardEntry):
+    """A diode that carries the current of a rail."""
+
+    drops: tuple[ForwardDrop, ...]
+    """Largest forward voltages, in any order of the currents."""
+    reverse_voltage: Annotated[Figure, fields.figure("V")]
+    """Largest reverse voltage [V]."""
+    pins: Annotated[Mapping[str, str], fields.pins("cathode", "anode")] = field(
+        default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
+    )
+    """Number of the footprint's pad by name; KiCad's have the cathode at 1."""
+    assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
+    """What could not be compared with a data sheet, in words."""
+    cases: tuple[PartCase, ...] = ()
+    """Other cases that it is sold in."""
+
+    def drop(self, current: float) -> float | None:
+        """Most that it drops [V] at this current [A] and below: that of the next larger current
+        that the sheet gives, for the drop grows with the current; None past the largest."""
+        return min((d.voltage for d in self.drops if d.current >= current), default=None)

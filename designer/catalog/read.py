@@ -36,10 +36,10 @@ from designer.base.schema import (
 )
 from designer.base.toml_reader import parse_toml
 from designer.base.units import format_quantity, parse_quantity
-from designer.catalog.build_cost import BuildCost
-from designer.catalog.coaxial_jack import CoaxialJack
 from designer.catalog.entries import (
     UNITS,
+    BuildCost,
+    CoaxialJack,
     DiodeEntry,
     FamilyBase,
     Header,
@@ -47,10 +47,10 @@ from designer.catalog.entries import (
     PartFamily,
     Price,
     ReferenceEntry,
+    SupplyDiodeEntry,
     TrimmerEntry,
 )
 from designer.catalog.fields import CODE_TEXT, quantities, quantity
-from designer.catalog.supply_diode import SupplyDiodeEntry
 
 Entry = (
     PartFamily | OpAmp | DiodeEntry | ReferenceEntry | SupplyDiodeEntry | TrimmerEntry | Header

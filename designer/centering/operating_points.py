@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from designer.centering.response_windows import CLEARANCE_STEP, OperatingPoint, Stretch
@@ -69,22 +69,20 @@ def best_points(
     spec: Response,
     stretches: Sequence[Stretch],
     room: OperatingRange,
-    *,
-    progress: Callable[[], None] = lambda: None,
 ) -> tuple[list[Scored], int]:
     """Places of one response, best first, and how many were tried.
 
-    bench : with ``MANY`` boards at least. progress : called every few boards.
+    bench : with ``MANY`` boards at least.
     """
     every = [stretch.at(SHARES) for stretch in stretches]
     scanned = [p for row in itertools.zip_longest(*every) for p in row if p is not None]
-    first = score(bench, spec, scanned, SCAN, SCANNED, progress)
+    first = score(bench, spec, scanned, SCAN, SCANNED)
     # The scan's indices are coarse: among equals the middle of a wide stretch comes first.
-    second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
+    second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER)
     count, scored = len(scanned) + len(second), []
     for start in best(second, STARTS):
         step = _step(stretches, start.place)
-        ways, more = _pattern(bench, spec, start.place, room, step, progress)
+        ways, more = _pattern(bench, spec, start.place, room, step)
         scored += ways
         count += more
     return best(scored, len(scored)), count
@@ -96,12 +94,11 @@ def score(
     wanted: Sequence[OperatingPoint],
     boards: int,
     ladder: Sequence[float] = LADDER,
-    progress: Callable[[], None] = lambda: None,
 ) -> list[Scored]:
     """What the first boards show at these places, in order."""
     operating_orbits = bench.operating_orbits([(spec, place) for place in wanted])
     there = [s for s in operating_orbits if s is not None]
-    counts = iter(bench.ask(there, range(boards), ladder, progress) if there else [])
+    counts = iter(bench.ask(there, range(boards), ladder) if there else [])
     nothing = StretchCounts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
     return [
         Scored(place, operating_orbit, nothing if operating_orbit is None else next(counts))
@@ -128,10 +125,9 @@ def _pattern(
     start: OperatingPoint,
     room: OperatingRange,
     step: float,
-    progress: Callable[[], None],
 ) -> tuple[list[Scored], int]:
     """Places met by a pattern search over (ln ω, ln b)."""
-    scored_at = {(start.omega, start.b): score(bench, spec, [start], MANY, LADDER[1:], progress)[0]}
+    scored_at = {(start.omega, start.b): score(bench, spec, [start], MANY, LADDER[1:])[0]}
     centre, halved, wide = scored_at[start.omega, start.b], 0, 0.5 * CLEARANCE_STEP
     for _ in range(MOST):
         if halved == PATTERN:
@@ -146,7 +142,7 @@ def _pattern(
         )
         new = [pair for pair in dict.fromkeys(pairs) if pair not in scored_at]
         around = [replace(centre.place, omega=omega, b=b) for omega, b in new]
-        for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
+        for scored in score(bench, spec, around, MANY, LADDER[1:]):
             scored_at[scored.place.omega, scored.place.b] = scored
         top = max(scored_at.values(), key=lambda s: s.reliability_index)
         if top.reliability_index > centre.reliability_index:

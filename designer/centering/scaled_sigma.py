@@ -13,7 +13,7 @@ has not settled after 140 drive periods counts as lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,7 +144,6 @@ class ScaledBoards:
         operating_orbits: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float] = LADDER,
-        progress: Callable[[], None] = lambda: None,
     ) -> list[StretchCounts]:
         """What these boards show at each place. stretches : some of ``LADDER``."""
         queries = [
@@ -152,7 +151,7 @@ class ScaledBoards:
         ]
 
         def make(new: list[int]) -> list[tuple[int, ...]]:
-            return self._made([operating_orbits[k] for k in new], boards, stretches, progress)
+            return self._made([operating_orbits[k] for k in new], boards, stretches)
 
         samples = (len(boards),) * len(stretches)
         answers = self._memory.get_all(queries, make, samples)
@@ -163,7 +162,6 @@ class ScaledBoards:
         operating_orbits: Sequence[OperatingOrbit],
         boards: range,
         stretches: Sequence[float],
-        progress: Callable[[], None],
     ) -> list[tuple[int, ...]]:
         """How many boards show the response at each place, by stretch."""
         places = [LADDER.index(s) for s in stretches]
@@ -171,7 +169,7 @@ class ScaledBoards:
         which = [row for row in rows for _ in operating_orbits]
         drives = [s.drive for _ in rows for s in operating_orbits]
         starts = np.array([s.orbit.start for _ in rows for s in operating_orbits])
-        orbits = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
+        orbits = self._boards.quick(which, drives, starts, jobs=self.jobs)
         fine = [
             _shows(orbit, operating_orbits[k % len(operating_orbits)])
             for k, orbit in enumerate(orbits)

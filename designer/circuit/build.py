@@ -12,13 +12,11 @@ from types import MappingProxyType
 
 from designer.catalog.entries import OpAmp
 from designer.catalog.output_stage import output_at
-from designer.circuit.dead_zone_parts import DeadZoneStage
+from designer.circuit.dead_zone_parts import RAILS, DeadZoneStage, ReferenceRails
 from designer.circuit.dead_zone_place import DeadZonePlace
-from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section
+from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section, Stop
 from designer.circuit.packing import packed
-from designer.circuit.reference_rails import RAILS, ReferenceRails
 from designer.circuit.resistors import Composite, Resistors
-from designer.circuit.stop import Stop
 from designer.circuit.terms import Term, inverted_states, terms as input_terms
 from designer.model.clearance import Clearance
 from designer.model.mechanics import MechanicalModel

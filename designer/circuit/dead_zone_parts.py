@@ -1,7 +1,9 @@
 """The parts of both dead-zone stages: one that clips (the paper's Fig. 5), one that rectifies.
 
 Both take the displacement in a clearance and give fv, zero inside it; R50, which turns fv into the
-stop's force, belongs to the integrator. docs/synthesis.md has the formulas.
+stop's force, belongs to the integrator. docs/synthesis.md has the formulas. One shunt reference on
+each polarity serves all thresholds and constant forces, so the ratio of two thresholds does not
+depend on a reference.
 """
 
 from __future__ import annotations
@@ -14,13 +16,72 @@ from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit.dead_zone_place import FEEDBACK, DeadZonePlace, part_of
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode, Part, Section
-from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
+from designer.circuit.netlist import (
+    GROUND,
+    NEGATIVE,
+    POSITIVE,
+    Circuit,
+    Contact,
+    Diode,
+    Part,
+    Reference,
+    Section,
+    Stop,
+)
 from designer.circuit.resistors import Resistors
-from designer.circuit.stop import Contact, Stop
 from designer.model.circuit_table import CircuitSpec, DeadZone
 from designer.model.clearance import Clearance, Side
 from designer.model.mechanics import MechanicalModel
+
+RAILS = {1: "vrp", -1: "vrn"}
+"""Nets that the references hold, by their sign."""
+_NAMES, _SUPPLIES = {1: "VR1", -1: "VR2"}, {1: POSITIVE, -1: NEGATIVE}
+RECTIFIER_FEEDS = {1: "R206", -1: "R207"}
+"""Resistors from the supplies to the references, beside a rectifier: the paper's stage has other
+parts of these names."""
+FEEDS = {1: "R180", -1: "R181"}
+"""The same in other circuits."""
+
+
+class ReferenceRails:
+    """Makes each reference, with its feed, where it is first needed.
+
+    Raises
+    ------
+    InputError : a reference is needed and none was given.
+    """
+
+    def __init__(
+        self, reference: ReferenceEntry | None, resistors: Resistors, feeds: Mapping[int, str]
+    ) -> None:
+        self._reference = reference
+        self._resistors = resistors
+        self._feeds = feeds
+        self._made: set[int] = set()
+
+    def __call__(self, sign: int, role: str, feed_role: str) -> list[Part]:
+        """The reference of this sign and its feed; nothing where they are there already."""
+        if self._reference is None:
+            raise InputError(None, "circuit.reference", "none", "a reference for this circuit")
+        if sign in self._made:
+            return []
+        self._made.add(sign)
+        net, entry = RAILS[sign], self._reference
+        ends = (net, GROUND) if sign > 0 else (GROUND, net)
+        return [
+            Reference(
+                _NAMES[sign],
+                *ends,
+                volts=entry.voltage,
+                grade=entry.grade,
+                model=entry.name,
+                role=role,
+                least=entry.least_current,
+                impedance=entry.dynamic_impedance,
+            ),
+            *self._resistors(self._feeds[sign], _SUPPLIES[sign], net, feed_role),
+        ]
+
 
 _RECTIFIER = 'dead_zone = "rectifier" in [circuit] ("saturation" stands where a file says nothing)'
 

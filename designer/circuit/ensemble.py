@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 
 import numpy as np
@@ -123,24 +123,9 @@ class Ensemble:
         within : steps of a trial, such as `BRIEF`. What the compiled way leaves open and takes
         longer is not settled, and chaos is not watched until it may end. None: no trial.
         """
-        index = np.asarray(which, dtype=np.int64)
-        states = np.ascontiguousarray(starts, dtype=np.float64)
-        size = _chunk(len(index), jobs)
-
-        def chunk(first: int) -> list[SettledBoard]:
-            heed()
-            part = slice(first, first + size)
-            settled = self._compiled(index[part], drives[part], states[part], len(kernel.STAGES))
-            for k, response in enumerate(settled):
-                if response is None:
-                    settled[k] = self._alone(
-                        int(index[first + k]), drives[first + k], states[first + k], within
-                    )
-                progress()
-            return [r for r in settled if r is not None]
-
-        chunks = parallel(chunk, range(0, len(index), size), jobs)
-        return [response for settled in chunks for response in settled]
+        stages, alone = len(kernel.STAGES), partial(self._alone, within=within)
+        every = self._settled(which, drives, starts, stages, alone, jobs, progress)
+        return [response for response in every if response is not None]
 
     def quick(
         self,
@@ -149,30 +134,46 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
-        progress: Callable[[], None] = lambda: None,
     ) -> list[Orbit | None]:
         """``settle`` as far as the compiled way goes: None where it leaves a question open.
 
         For predictions: what has no period after 140 drive periods (``QUICK`` stages), or clips,
         stays open. A drive that is no sine has no compiled way: it is settled briefly.
         """
+
+        def brief(board: int, drive: Drive, start: Array) -> SettledBoard | None:
+            return None if drive.is_sine else self._alone(board, drive, start, BRIEF)
+
+        every = self._settled(which, drives, starts, QUICK, brief, jobs)
+        return [None if response is None else response.orbit for response in every]
+
+    def _settled(
+        self,
+        which: Sequence[int],
+        drives: Sequence[Drive],
+        starts: Array,
+        stages: int,
+        alone: Callable[[int, Drive, Array], SettledBoard | None],
+        jobs: int,
+        progress: Callable[[], None] = lambda: None,
+    ) -> list[SettledBoard | None]:
+        """What each board settles on the compiled way within so many stages, else ``alone``."""
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
         size = _chunk(len(index), jobs)
 
-        def chunk(first: int) -> list[Orbit | None]:
+        def chunk(first: int) -> list[SettledBoard | None]:
             heed()
             part = slice(first, first + size)
-            settled = self._compiled(index[part], drives[part], states[part], QUICK)
-            for k, drive in enumerate(drives[part]):
-                if settled[k] is None and not drive.is_sine:
-                    board, start = int(index[first + k]), states[first + k]
-                    settled[k] = self._alone(board, drive, start, BRIEF)
-            progress()
-            return [None if r is None else r.orbit for r in settled]
+            settled = self._compiled(index[part], drives[part], states[part], stages)
+            for k, response in enumerate(settled, start=first):
+                if response is None:
+                    settled[k - first] = alone(int(index[k]), drives[k], states[k])
+                progress()
+            return settled
 
         chunks = parallel(chunk, range(0, len(index), size), jobs)
-        return [orbit for settled in chunks for orbit in settled]
+        return [response for settled in chunks for response in settled]
 
     def run(
         self,

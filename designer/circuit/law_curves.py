@@ -11,7 +11,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.si_unit import prefixed
 from designer.circuit.board_values import nominal_board
-from designer.circuit.dead_zone_reading import DeadZoneReading
+from designer.circuit.coefficients import DeadZoneReading
 from designer.circuit.design import Design
 from designer.circuit.reduction import Reduction
 from designer.laws.force_law import ForceLaw

@@ -2,7 +2,8 @@
 
 Net "0" is ground. ``Circuit.parts`` are simulated; ``Circuit.fittings`` are on the board or on the
 bill alone, and each part says in which views it stands. Parts carry the names of the paper where it
-has them, and the role they play: the term of Eq. (10) that they realise.
+has them, and the role they play: the term of Eq. (10) that they realise. Resistors, diodes and
+op-amp sections of the board alone differ by their ``views``.
 """
 
 from __future__ import annotations
@@ -22,16 +23,171 @@ from designer.base.views import View
 from designer.catalog.diode_curve import DiodeModel
 from designer.catalog.entries import OpAmp
 from designer.catalog.output_stage import OutputStage
-from designer.circuit.board_parts_only import (
-    Connector,
-    SupplyCapacitor,
-    SupplyDiode,
-    TestPoint,
-    Trimmer,
-)
-from designer.circuit.stop import Contact, Stop
 from designer.dynamics.drive_shape import SINE, Shape, has_harmonics
 from designer.dynamics.piecewise_linear import Drive, SecondDrive
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How one side of a stop shows: a switch leaves its rest position where contact begins."""
+
+    switch: str
+    """Name of the op-amp section or the diode."""
+    position: int
+    """Position in contact: of a section 1 at its upper limit, -1 at its lower, 0 between; of a
+    diode 1 while it conducts, else 0."""
+    others: tuple[tuple[str, int], ...] = ()
+    """Further switches, each with its position while the stop carries."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """How a clearance shows in the circuit."""
+
+    clearance: str
+    """Its name."""
+    state: str
+    """Name of the capacitor whose voltage is the displacement, or of two masses the first's; of a
+    dead zone of velocities that of the velocity."""
+    upper: Contact | None
+    """How the upper stop shows; None where there is none."""
+    lower: Contact | None
+    """How the lower stop shows; None where there is none."""
+    output: str
+    """Net of the dead-zone stage's output."""
+    switches: tuple[str, ...]
+    """Names of the stage's op-amp sections and diodes."""
+    difference: tuple[str, int] | None = None
+    """Between two masses: the net that carries the difference of their displacements, and the sign
+    that it has there, 1 or -1."""
+    bend_of: str = ""
+    """``Clearance.bend_of``."""
+    limits: bool = False
+    """``Clearance.limits``: the output changes between both contacts, and in none of them."""
+    inverse: str = ""
+    """Net of the output's negative, where that is what pushes the first mass; "" where it is the
+    output."""
+
+    @property
+    def driving(self) -> str:
+        """Net that pushes the first mass."""
+        return self.inverse or self.output
+
+    @cached_property
+    def contacts(self) -> tuple[tuple[int, Contact], ...]:
+        """The sides that exist, 1 upper and -1 lower, each with its contact."""
+        pairs = ((1, self.upper), (-1, self.lower))
+        return tuple((side, contact) for side, contact in pairs if contact is not None)
+
+    @property
+    def shared(self) -> bool:
+        """Whether both sides are ends of one switch: then they have one slope."""
+        switches = [contact.switch for _, contact in self.contacts]
+        return len(switches) == 2 and switches[0] == switches[1]
+
+
+@dataclass(frozen=True)
+class SupplyCapacitor:
+    """A capacitor between the rails, or between a rail and ground."""
+
+    name: str
+    plus: str
+    """The higher net."""
+    minus: str
+    """The lower net."""
+    value: float
+    """Capacitance [F]."""
+    role: str
+    package: str = ""
+    """The op-amp package at whose supply pin it stands; "" for the board's bulk."""
+    views: View = View.FITTED
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.plus, self.minus)
+
+
+@dataclass(frozen=True)
+class SupplyDiode:
+    """A diode between the supply's connector and a rail, which blocks the wrong polarity."""
+
+    name: str
+    anode: str
+    """Net of the anode."""
+    cathode: str
+    """Net of the cathode."""
+    source: str
+    """The one of both nets that the connector is on."""
+    model: str
+    """Its name in the catalogue."""
+    drop: float
+    """Most that it drops at the current that the op-amps draw [V]."""
+    role: str
+    views: View = View.FITTED
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.anode, self.cathode)
+
+    @property
+    def positive(self) -> bool:
+        """Whether it stands in the positive rail."""
+        return self.anode == self.source
+
+
+@dataclass(frozen=True)
+class Connector:
+    """A row of pins, or a coaxial jack."""
+
+    name: str
+    ways: tuple[str, ...]
+    """Nets of pins 1, 2, …; of a jack the signal's and the shell's."""
+    role: str
+    series: str = ""
+    """The series of a coaxial jack, "sma" or "bnc"; "" of a row of pins."""
+    views: View = View.FITTED
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return self.ways
+
+
+@dataclass(frozen=True)
+class TestPoint:
+    """A bare pad for a probe: on the board, but nothing to buy."""
+
+    __test__ = False  # no test class, whatever its name begins with
+
+    name: str
+    net: str
+    """The net that it carries."""
+    role: str
+    views: View = View.BOARD
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.net,)
+
+
+@dataclass(frozen=True)
+class Trimmer:
+    """A trimming potentiometer."""
+
+    name: str
+    low: str
+    """Net of the track's lower end."""
+    wiper: str
+    """Net of the wiper."""
+    high: str
+    """Net of the track's upper end."""
+    value: float
+    """Resistance of the track [ohm]."""
+    role: str
+    views: View = View.FITTED
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.low, self.wiper, self.high)
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_values import Board
-from designer.circuit.netlist import GROUND, Circuit, Diode, Section
-from designer.circuit.stop import Stop
+from designer.circuit.netlist import GROUND, Circuit, Diode, Section, Stop
 from designer.dynamics.piecewise_linear import ModeKey
 
 

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from designer.catalog.entries import OpAmp
-from designer.circuit.netlist import Circuit, Section
+from designer.circuit.netlist import Circuit, Contact, Section, Stop
 from designer.circuit.stage_title import dead_zone_titles, section_stages
-from designer.circuit.stop import Contact, Stop
 
 QUAD = "ABCD"
 """Sections of the packages that the paper's names speak of."""

@@ -16,10 +16,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_values import Board
-from designer.circuit.netlist import Circuit
+from designer.circuit.netlist import Circuit, Contact, Stop
 from designer.circuit.nodal import NodalEquations, Solution
 from designer.circuit.nodal_bandwidth import LaggingEquations
-from designer.circuit.stop import Contact, Stop
 from designer.dynamics.piecewise_linear import (
     Guard,
     Mode,

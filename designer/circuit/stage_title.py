@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Fitting, Section
-from designer.circuit.stop import Stop
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Fitting, Section, Stop
 
 SUPPLY, INTERFACE = "supply", "interface"
 """Stages that are no amplifier's own: supply and decoupling; connectors, probes."""

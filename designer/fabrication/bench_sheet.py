@@ -12,14 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.board.board_parts import probed_nets
-from designer.board.reverse_protection import supply_current
+from designer.board.board_parts import probed_nets, supply_current
 from designer.catalog.design_rule import NotRun
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import resting_voltages
-from designer.circuit.board_parts_only import TestPoint
 from designer.circuit.board_values import nominal_board
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, TestPoint
 from designer.design_rules.rule_subject import RuleSubject
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many

@@ -17,7 +17,7 @@ from designer.board.bom import Line, bill
 from designer.board.component import Component, components, to_buy
 from designer.board.footprints import footprint
 from designer.board.kicad_placement import place
-from designer.catalog.build_cost import BuildCost
+from designer.catalog.entries import BuildCost
 from designer.catalog.parts_catalog import Catalog
 
 Assembly = Literal["surface", "mixed", "through hole"]

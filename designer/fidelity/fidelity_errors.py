@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,32 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.fidelity.fidelity_answers import CIRCUIT, MODEL, RK4, TOP, FidelityAnswer, Truths
-from designer.fidelity.label import ResponseLabel
+from designer.model.find_responses import ModelResponse
 from designer.verdicts.exact_circuit import images, waveform_error
+
+
+@dataclass(frozen=True)
+class ResponseLabel:
+    """Which wanted response of the model file."""
+
+    number: int
+    """Number in the order of the model file, from 1."""
+    omega: float
+    """Dimensionless frequency."""
+    b: float
+    """Dimensionless clearance."""
+    expected: str | None
+    """The wanted n-p-q; None where any was."""
+
+    @classmethod
+    def of(cls, number: int, response: ModelResponse) -> ResponseLabel:
+        """The label of response number ``number``."""
+        return cls(number, response.omega, response.b, response.expected)
+
+    def as_dict(self) -> dict[str, Any]:
+        """``number``, ``omega``, ``b`` and ``expected``."""
+        return asdict(self)
+
 
 BOARD, EQUATIONS = "board", "equations"
 

@@ -26,6 +26,8 @@ from designer.spice.deck import SolverSettings
 PIECES = "trade-pieces.json"
 CHUNK = 100
 """Boards of a piece."""
+_NUMBERS = {"seconds", "error", "velocity", "numerical", "convergence"}
+"""Fields of a row that are numbers, or numbers by truth."""
 
 
 class TradePieces:
@@ -110,8 +112,8 @@ def fidelities(
     """The inverse of ``fidelities_json``; numbers that are not finite come back as nan."""
     settings = piece["settings"]
     return (
-        tuple(_compared(row) for row in piece["rows"]),
-        _truth(piece["truth"]),
+        tuple(read_record(FidelityError, _numbers(row)) for row in piece["rows"]),
+        read_record(Truth, _numbers(piece["truth"])),
         None if settings is None else checked_record(SolverSettings, settings),
         _number(piece["seconds"]),
     )
@@ -122,29 +124,14 @@ def tally(piece: Mapping[str, Any]) -> Tally:
     return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
 
 
-def _compared(row: Mapping[str, Any]) -> FidelityError:
-    return read_record(
-        FidelityError,
-        {
-            **row,
-            "seconds": _number(row["seconds"]),
-            "error": {of: _number(v) for of, v in row["error"].items()},
-            "velocity": {of: _number(v) for of, v in row["velocity"].items()},
-            "numerical": _number(row["numerical"]),
-            "convergence": _number(row["convergence"]),
-        },
-    )
-
-
-def _truth(piece: Mapping[str, Any]) -> Truth:
-    return read_record(
-        Truth,
-        {
-            **piece,
-            "error": _number(piece["error"]),
-            "velocity": _number(piece["velocity"]),
-        },
-    )
+def _numbers(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with nan where JSON has none for a number."""
+    out = dict(row)
+    for name in _NUMBERS & row.keys():
+        value = row[name]
+        each = isinstance(value, Mapping)
+        out[name] = {of: _number(v) for of, v in value.items()} if each else _number(value)
+    return out
 
 
 def _number(value: float | None) -> float:

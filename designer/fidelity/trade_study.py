@@ -15,8 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from designer.fidelity.fidelity_answers import CIRCUIT, MODEL, RK4
-from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, FidelityError, Truth
-from designer.fidelity.label import ResponseLabel
+from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, FidelityError, ResponseLabel, Truth
 from designer.fidelity.yields import BoardTrade, LeftOut
 
 IDEAL = "ideal"

@@ -20,7 +20,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
 from designer.fidelity import fidelity_answers
-from designer.fidelity.label import ResponseLabel
+from designer.fidelity.fidelity_errors import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.verdicts import exact_circuit

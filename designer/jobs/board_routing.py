@@ -18,7 +18,7 @@ from designer.board.kicad_rules import board_rules
 from designer.check.synthesis_result import Synthesis
 from designer.folders import kicad_files
 from designer.jobs.options import Options
-from designer.routing.board_layers import layer_count, with_layers
+from designer.routing.board_copper import layer_count, with_layers
 from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
 

@@ -16,8 +16,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.fidelity import fidelity_answers as trade_fidelities, pieces as trade_pieces, yields
 from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.fidelity_answers import LEVELS, ROUNDS, TOP, Truths
-from designer.fidelity.fidelity_errors import compare
-from designer.fidelity.label import ResponseLabel
+from designer.fidelity.fidelity_errors import ResponseLabel, compare
 from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally

@@ -6,7 +6,7 @@ are searched by joins (``linear_network.pair_search``), every other pattern of t
 choices (``linear_network.term_search``). Among the choices that reach the optimum, cvxpy and HiGHS
 choose those with the fewest distinct values and the lowest price. Work is limited by count, never
 by time; where it runs out, the last empty level is what the certificate says, and the answer of a
-tree is the best that dives into it find (``linear_network.term_dives``).
+tree is the best that dives into it find (``linear_network.term_search``).
 """
 
 from __future__ import annotations
@@ -31,8 +31,7 @@ from designer.linear_network.linear_terms import (
     Targets,
 )
 from designer.linear_network.pair_search import PairSearch
-from designer.linear_network.term_dives import TermDives
-from designer.linear_network.term_search import TermSearch
+from designer.linear_network.term_search import TermDives, TermSearch
 from designer.model.circuit_table import CircuitSpec
 
 LAST_LEVEL = 0.1

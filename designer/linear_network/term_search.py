@@ -16,15 +16,20 @@ A mixed-integer program mixes the values of known choices of a linear block. It 
 logarithms: each part has one of the values that it has in some choice, all scales are free, the
 largest error stays within a limit. Fewest distinct values, then the lowest price; cvxpy states it
 and HiGHS solves it, with a limit on its nodes.
+
+First dives: cells of the time scale all over its range, each searched for a limited number of steps
+in a drawn order, at a level that every choice lowers. Then neighbours: all parts of some masses are
+free, the others stay, and what is better than the best so far is sought near its time scale. The
+draws follow from counts, so the same question has the same answer. Nothing is proved.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, combinations, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,9 +37,10 @@ import numpy as np
 from designer.base.arrays import Array, Index, Mask
 from designer.base.progress import best_so_far, doing
 from designer.circuit.coefficients import EXACT
-from designer.circuit.scale_fit import least_largest
-from designer.linear_network.kernel_terms import TermRules, choices
+from designer.circuit.scale_fit import least_largest, minimax
+from designer.linear_network.kernel_terms import CELL, TermRules, choices, dives
 from designer.linear_network.linear_terms import (
+    Bounds,
     Levels,
     LinearQuestion,
     Targets,
@@ -44,10 +50,97 @@ from designer.linear_network.linear_terms import (
     sums,
 )
 from designer.linear_network.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
-from designer.linear_network.term_conditions import TermConditions
 
 if TYPE_CHECKING:
     pass
+
+
+ROUNDING = 1e-9
+"""Allowance for rounding in the comparison of logarithms."""
+
+
+@dataclass(frozen=True)
+class TermConditions:
+    """The conditions of ``Bounds`` for these terms."""
+
+    targets: Targets
+    bounds: Bounds
+
+    def hold(self, offsets: Array) -> bool:
+        """Whether they hold for a choice with these (terms,) offsets of the errors."""
+        G, g = self.inequalities
+        return bool((G @ offsets <= g + ROUNDING).all())
+
+    @cached_property
+    def inequalities(self) -> tuple[Array, Array]:
+        """G (k, terms), g (k,): the conditions are G @ offsets <= g."""
+        constant, matrix = self._nominal
+        pairs = np.argwhere(np.isfinite(self._limits) & ~np.eye(len(self._limits), dtype=bool))
+        rows = [(matrix[1 + i] - matrix[1 + j]) for i, j in pairs]
+        ends = [self._limits[i, j] - constant[1 + i] + constant[1 + j] for i, j in pairs]
+        for sign, end in zip((-1.0, 1.0), self._ends, strict=True):
+            if np.isfinite(end):
+                rows.append(sign * matrix[0])
+                ends.append(sign * (end - constant[0]))
+        return np.array(rows).reshape(-1, matrix.shape[1]), np.array(ends)
+
+    def apart(self, level: float) -> Array:
+        """(2n, 2n) largest ln volts of the row's state over the column's, at an error ``level``."""
+        constant, matrix = self._nominal
+        room = np.abs(matrix[1:, None, :] - matrix[None, 1:, :]).sum(axis=2)
+        apart = self._limits + level * room + ROUNDING
+        for i, j in self._joined:
+            apart[j, i] = min(apart[j, i], constant[1 + j] - constant[1 + i] + ROUNDING)
+            apart[i, j] = min(apart[i, j], constant[1 + i] - constant[1 + j] + ROUNDING)
+        np.fill_diagonal(apart, 0.0)
+        for k in range(len(apart)):
+            apart = np.minimum(apart, apart[:, k : k + 1] + apart[k : k + 1, :])
+        return np.asarray(apart)
+
+    def seconds(self, level: float) -> Array:
+        """(2,) range of ln of the time scale, at an error ``level``."""
+        room = level * np.abs(self._nominal[1][0]).sum() + ROUNDING
+        return np.asarray(self._ends + np.array([-room, room]))
+
+    @cached_property
+    def _ends(self) -> Array:
+        return np.asarray(np.log(np.maximum(self.bounds.seconds, 1e-300)))
+
+    @cached_property
+    def _limits(self) -> Array:
+        """(2n, 2n) largest ln volts of the row's state over the column's; infinite where free."""
+        states, peaks = len(self.targets.coefficients), np.log(self.bounds.peaks)
+        level, reference = np.log(self.bounds.level), 2 * self.bounds.mass
+        ratio = np.full((states, states), np.inf)
+        ratio[1::2, 1::2] = level
+        for i in range(0, states, 2):
+            ratio[i, i + 1] = ratio[i + 1, i] = level
+        ratio[:, reference] = np.minimum(ratio[:, reference], np.log(self.bounds.share))
+        np.fill_diagonal(ratio, 0.0)
+        return np.asarray(ratio - peaks[:, None] + peaks[None, :])
+
+    @cached_property
+    def _joined(self) -> Index:
+        """(j, 2) states that get equal peak voltages: they join what no term joins."""
+        sets = list(range(len(self.targets.coefficients)))
+        for a, b in self.targets.entries:
+            sets = [sets[a] if number == sets[b] else number for number in sets]
+        first = sorted({number: i for i, number in reversed(list(enumerate(sets)))}.values())
+        return np.array([(0, i) for i in first[1:]], dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
+    def _nominal(self) -> tuple[Array, Array]:
+        """The nominal scales, T and the 2n of ln volts, are constant + matrix @ offsets."""
+        terms, states = len(self.targets.entries), len(self.targets.coefficients)
+        columns = np.insert(scale_columns(self.targets), 1, 0.0, axis=1)
+        equal = np.eye(1 + states)[1:]
+        joins = np.array([equal[j] - equal[i] for i, j in self._joined]).reshape(-1, 1 + states)
+        peaks = np.log(self.bounds.peaks)
+        wanted = np.array([peaks[i] - peaks[j] for i, j in self._joined])
+        inverse = np.zeros((1 + states, terms + len(joins)))
+        free = [0, *range(2, 1 + states)]  # the volts of x1 are 1
+        inverse[free] = np.linalg.pinv(np.concatenate([columns, joins])[:, free])
+        return inverse[:, terms:] @ wanted, -inverse[:, :terms]
 
 
 MOST = 12
@@ -439,3 +532,115 @@ class TermSearch:
             if when[there] < when[here] or (when[there] == when[here] and there < here):
                 out[here] = there
         return out
+
+
+FIRST_LEVEL = 0.03
+"""The level of the first dives: twice the half step of E96 and more."""
+LOWER = 0.9
+"""From an error that was reached to the next level."""
+CELLS = 32
+"""Cells of the time scale in one call of the loops."""
+DIVE = 10_000
+"""Candidates in one cell."""
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""Multiples of it, without their whole part, lie evenly in 0 to 1 however many there are."""
+FREE = 3
+"""Masses whose parts are free together, at most."""
+
+
+@dataclass
+class TermDives:
+    """The best choice so far, and the work that it took."""
+
+    search: TermSearch
+    """The choices that there are."""
+    error: float = np.inf
+    """The least error."""
+    parts: Index | None = None
+    """Its (parts,) indices of values."""
+    steps: int = 0
+    """Candidates that were looked at."""
+    number: int = 0
+    """Cells that were begun."""
+
+    def best(self, least: float, patience: int) -> Levels:
+        """The best choice that so many steps find; one with an error of ``least`` ends it."""
+        most = patience // self.search.candidate
+        self._dive(least, most // 2)
+        while self.parts is not None and self.error > least and self.steps < most:
+            if not self._nearer(most) and not self._dive(least, min(self.steps + most // 8, most)):
+                break
+        chosen = np.full(len(self.search.question.targets.parts), -1)
+        chosen = chosen if self.parts is None else self.parts
+        steps = self.steps * self.search.candidate
+        return Levels(self.error, chosen, 0.0, False, -1, self.number, steps)
+
+    @property
+    def _level(self) -> float:
+        return min(FIRST_LEVEL, LOWER * self.error)
+
+    def _dive(self, least: float, most: int) -> bool:
+        """Dives all over the time scale, until so many candidates are looked at; whether one was
+        better."""
+        before = self.error
+        while self.error > least and self.steps < most:
+            level = self._level
+            rules = self.search.rules(level)
+            low, high = rules.seconds
+            shares = ((self.number + np.arange(CELLS)) * GOLDEN) % 1.0
+            doing(f"integrators, dives for an error below {level:.2g}: {self.steps / most:.0%}")
+            self._look(rules, level, low + (high - low) * shares)
+        return self.error < before
+
+    def _nearer(self, most: int) -> bool:
+        """Better choices with all but some masses' parts as they are; whether there was one."""
+        before = self.error
+        for masses in self._sets():
+            if self.steps >= most:
+                break
+            doing(f"integrators, neighbours of an error of {self.error:.2g}")
+            level = LOWER * self.error
+            rules = self.search.rules(level)._replace(fixed=self._fixed(masses))
+            scales = minimax(self.search.offsets(self._known), self.search.columns)
+            near = 2.0 * self.error
+            cells = float(scales[0]) + np.arange(-near, near, CELL * level)
+            self._look(rules, level, cells)
+        return self.error < before
+
+    @property
+    def _known(self) -> Index:
+        assert self.parts is not None
+        return self.parts
+
+    def _sets(self) -> Iterator[tuple[int, ...]]:
+        """Sets of masses, single ones first."""
+        masses = range(len(self.search.question.targets.coefficients) // 2)
+        for size in range(1, min(FREE, len(masses)) + 1):
+            yield from islice(combinations(masses, size), len(masses) ** 2)
+
+    def _fixed(self, masses: tuple[int, ...]) -> Index:
+        """(parts,) in the order of the loops, the values of parts that touch none of the masses."""
+        entries = self.search.order.entries
+        own = [a // 2 in masses or b // 2 in masses for a, b in entries]
+        states = range(len(self.search.question.targets.coefficients))
+        free = np.array(own + [a // 2 in masses for a in states])
+        fixed = np.full(len(free), -1)
+        fixed[self.search.by_name] = self._known
+        return np.where(free, -1, fixed)
+
+    def _look(self, rules: TermRules, level: float, cells: Array) -> None:
+        """A choice of one of these cells, if it is better and keeps the conditions."""
+        row = np.zeros((1, len(self.search.by_name)), dtype=np.int64)
+        most = self.search.question.spec.most_values
+        kinds = row.size if most is None else most
+        begun, any_found, taken = dives(rules, level, cells, DIVE, kinds, self.number, row)
+        self.number += begun
+        self.steps += taken + begun
+        if not any_found:
+            return
+        self.steps += FRESH
+        parts = row[0][self.search.by_name]
+        error = self.search.error(parts)
+        if error < self.error and self.search.allowed(parts):
+            self.error, self.parts = error, parts
+            best_so_far(f"integrators with an error of {error:.2g}", step=True)

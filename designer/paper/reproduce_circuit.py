@@ -3,6 +3,10 @@
 Fig. 7 and Fig. 8 with the paper's values as printed, corrected, and with this tool's own; what each
 misprint and the op-amps' offsets would have cost; and the claim that the circuit takes a third of
 the time. The report is made of pieces of plain data; each is on disk as soon as it is done.
+
+All offsets of a board have the same size, the typical or the largest of the data sheet, and only
+their signs differ. Each of these boards is asked from the nominal circuit's own orbit, as a board
+of a tolerance study is; the other parts are exact.
 """
 
 from __future__ import annotations
@@ -10,8 +14,9 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,11 +30,19 @@ from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__
 from designer.catalog.parts_catalog import Catalog, load_catalog
+from designer.circuit.board_arrays import Boards
+from designer.circuit.board_values import nominal_board
+from designer.circuit.dead_zone_place import OUTPUT
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section
+from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
 from designer.folders.origin import provenance
+from designer.kernels.kernel_boards import POINTS
 from designer.model.find_responses import ModelResponse, find
-from designer.paper import circuit_clock, circuit_ngspice, misprints, offsets
-from designer.paper.circuit_ngspice import FINE
+from designer.model.response_table import Response
+from designer.paper import circuit_clock, misprints
 from designer.paper.circuit_page import circuit_figures, circuit_page
 from designer.paper.circuits import (
     CIRCUITS,
@@ -46,8 +59,204 @@ from designer.paper.circuits import (
     model_with,
 )
 from designer.paper.report_files import README, write_files
+from designer.spice import deck, numerics_gate
+from designer.spice.deck import SolverSettings
+from designer.spice.numerics_gate import GateResult, GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.verdicts.verdict import rounded
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
+from designer.verdicts.verdict import Verdict, judge, rounded
+from designer.yields.yield_count import Yield
+
+PATTERNS = 512
+"""Sign patterns, at most; twelve sections have 4096."""
+
+
+def signs(sections: int, most: int = PATTERNS) -> Array:
+    """(k, sections) of ±1: every pattern, or ``most`` of them drawn without replacement.
+
+    The first is all plus. A pattern and its negative give mirror images of the same board, but
+    for bias currents; both are kept, for they cost little and need no argument.
+    """
+    total = 2**sections
+    numbers = np.arange(total)
+    if total > most:
+        drawn = np.random.default_rng(0).choice(total - 1, most - 1, replace=False) + 1
+        numbers = np.concatenate([[0], np.sort(drawn)])
+    bits = (numbers[:, None] >> np.arange(sections)) & 1
+    return np.asarray(1.0 - 2.0 * bits)
+
+
+def shifts(
+    one: Built,
+    wanted: Sequence[ModelResponse],
+    size: float,
+    *,
+    jobs: int = 1,
+    most: int = PATTERNS,
+) -> list[dict[str, Any]]:
+    """Each response on every board with offsets of ± size [V], a row each.
+
+    there : whether the nominal circuit shows the response; where not, nothing is counted.
+    counted, interval : verdicts over the sign patterns, and the yield's 95 % interval. to : what
+    the boards that lose it show, and on how many patterns, most frequent first.
+    """
+    circuit = one.circuit
+    patterns = signs(len(circuit.sections), most)
+    nominal = Boards.of(circuit, [nominal_board(circuit)])
+    many = nominal.take(np.zeros(len(patterns), dtype=np.intp))
+    offset = {s.name: size * patterns[:, i] for i, s in enumerate(circuit.sections)}
+    ensemble = Ensemble(replace(many, offset=offset), jobs=jobs)
+    system = one.reduction().system()
+    rows = []
+    for r in wanted:
+        drive = one.excitation(r.omega).drive
+        own = settle(Flow(system, drive), r.orbit.start * one.volts)
+        there = judge(own, r.spec, own)[0] is Verdict.OK
+        orbits: Sequence[Orbit] = ()
+        if there:
+            starts = np.tile(own.start, (len(patterns), 1))
+            drives = [drive] * len(patterns)
+            orbits = ensemble.settle(range(len(patterns)), drives, starts, jobs=jobs)
+        row = {"omega": r.omega, "expected": r.expected, "size": size, "there": there}
+        rows.append(row | _counts(orbits, r.spec, own))
+    return rows
+
+
+def _counts(orbits: Sequence[Orbit], wanted: Response, own: Orbit) -> dict[str, Any]:
+    """What became of the boards. own : the nominal circuit's orbit."""
+    verdicts = [judge(orbit, wanted, own)[0] for orbit in orbits]
+    tally = Counter(verdicts)
+    lost = Counter(
+        orbit.response for orbit, v in zip(orbits, verdicts, strict=True) if v is not Verdict.OK
+    )
+    counted = Yield(
+        tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
+    )
+    return {
+        "counted": asdict(counted),
+        "to": sorted(lost.items(), key=lambda item: (-item[1], item[0])),
+        "interval": counted.interval,
+    }
+
+
+FINE = 8 * POINTS
+"""Points of a drive period of a portrait: a contact of p = 8 still is a curve."""
+DISPLACEMENT = "v1"
+"""Net that the stage is fed from."""
+
+
+@dataclass(frozen=True)
+class NgspiceResponse:
+    """One response in ngspice, with the settings that passed the gate."""
+
+    response: str
+    """n-p-q or status that ngspice shows."""
+    passed: bool
+    """Whether settings passed the gate."""
+    reason: str
+    """Why there is no answer, or ""."""
+    steps: int
+    """Steps a drive period."""
+    trace: Array
+    """(n · FINE + 1, 4) states in model units from a strobe on; empty where there is none."""
+
+    @property
+    def displacement(self) -> Array:
+        """(n · POINTS,) of the first mass."""
+        return self.trace[: -1 : FINE // POINTS, 0] if len(self.trace) else np.zeros(0)
+
+
+def stage_curve(pool: SpicePool, circuit: Circuit, reach: float, points: int) -> Array:
+    """(k, 2) v1 and the nonlinear stage's output [V], by ``.dc`` over ± reach.
+
+    The stage is cut out of the circuit and fed by a source; op-amps of the fidelity ``ideal``.
+
+    Raises
+    ------
+    SimulationFailed : ngspice gives no such curve.
+    """
+    step = 2.0 * reach / points
+    board = nominal_board(circuit)
+    stage = replace(
+        circuit,
+        parts=tuple(p for p in circuit.parts if p.name in _stage(circuit)),
+        generator=Generator("VM1", DISPLACEMENT),
+        states=(),
+        state_nets=(),
+    )
+    settings = SolverSettings("trap", 1.0, reltol=1e-6, abstol=1e-14, vntol=1e-9)
+    text = deck.write(
+        stage, board, Excitation(1.0, 1.0), settings, title="nonlinear stage", stop_time=1.0
+    )
+    lines = []
+    for line in text.splitlines():
+        word = line.split(maxsplit=1)[0]
+        if word == "VM1":
+            line = f"VM1 {DISPLACEMENT} 0 DC 0"
+        elif word == ".tran":
+            line = f".dc VM1 {-reach!r} {reach + 0.5 * step!r} {step!r}"
+        lines.append(line)
+    job = SpiceJob("\n".join(lines) + "\n", (OUTPUT,), reach - 0.01 * step, _whole, "dc")
+    for _, answer in pool.map([job]):
+        if isinstance(answer, SimulationFailed):
+            raise answer
+        return np.column_stack([answer.axis, answer.signals[OUTPUT].real])
+    raise SimulationFailed("ngspice gave no answer")
+
+
+def ngspice_responses(
+    pool: SpicePool, one: Built, settled: Sequence[SettledResponse]
+) -> tuple[NgspiceResponse, ...]:
+    """Every response that the exact circuit shows periodically, behind the numerics gate."""
+    reduction = one.reduction()
+    subjects = [
+        GateSubject(reduction, one.excitation(f.omega), f.orbit) for f in settled if f.orbit.n
+    ]
+    results = iter(numerics_gate.check(pool, subjects))
+    return tuple(
+        _response(next(results), one, f)
+        if f.orbit.n
+        else NgspiceResponse("", False, "", 0, np.zeros((0, 4)))
+        for f in settled
+    )
+
+
+def _response(result: GateResult, one: Built, settled: SettledResponse) -> NgspiceResponse:
+    steps = result.tried[-1]
+    if isinstance(result.read, SimulationFailed):
+        return NgspiceResponse("failed", False, result.read.reason, steps, np.zeros((0, 4)))
+    orbit = result.read.orbit
+    trace = np.zeros((0, 4))
+    if orbit.n and result.read.trace is not None:
+        time, states = result.read.trace
+        grid = np.linspace(0.0, time[-1], orbit.n * FINE + 1)
+        trace = np.stack([np.interp(grid, time, column) for column in states.T], axis=1) / one.volts
+    reason = "" if result.passed else "the numerics gate did not pass"
+    return NgspiceResponse(orbit.response, result.passed, reason, steps, trace)
+
+
+def _stage(circuit: Circuit) -> set[str]:
+    """Names of the parts that make the stage's output of v1: what is more going back from the
+    output, but for integrators and what feeds them. A section is more at its output alone."""
+    summing = {c.minus for c in circuit.capacitors}
+    ends = {GROUND, DISPLACEMENT} | {rail.net for rail in circuit.rails}
+    left = [p for p in circuit.parts if not summing & set(p.nets)]
+    nets, names = {OUTPUT}, set[str]()
+    while True:
+        more = [
+            p
+            for p in left
+            if p.name not in names and nets & {*([p.output] if isinstance(p, Section) else p.nets)}
+        ]
+        if not more:
+            return names
+        names |= {p.name for p in more}
+        nets |= {net for p in more for net in p.nets} - ends
+
+
+def _whole(sweep: Waveforms) -> Waveforms:
+    return sweep
+
 
 FORMAT = 1
 COMMAND = "designer reproduce circuit --out reports/paper-circuit"
@@ -66,7 +275,7 @@ class CircuitExtent:
     """p of the responses that are compared."""
     circuits: tuple[str, ...] = CIRCUITS
     """Names of those of ``CIRCUITS`` that are compared."""
-    patterns: int = offsets.PATTERNS
+    patterns: int = PATTERNS
     """Patterns of the offsets' signs."""
     clocked: tuple[int, ...] = (1, 3, 8)
     """p of the responses on which methods are timed."""
@@ -188,8 +397,8 @@ def _circuit(bench: _Bench, name: str) -> dict[str, Any]:
     threshold = one.errors.scales.threshold
     bench.progress.stage(f"{TITLES[name]}: ngspice")
     with SpicePool(bench.jobs, timeout=900.0) as pool:
-        spice = circuit_ngspice.stage_curve(pool, one.circuit, DC_REACH * threshold, DC_POINTS)
-        ngspice = circuit_ngspice.ngspice_responses(pool, one, settled)
+        spice = stage_curve(pool, one.circuit, DC_REACH * threshold, DC_POINTS)
+        ngspice = ngspice_responses(pool, one, settled)
     exact = dc_curve(one, spice[:, 0])
     rows = []
     for r, f, h in zip(bench.wanted, settled, ngspice, strict=True):
@@ -267,7 +476,7 @@ def _offsets(bench: _Bench, name: str) -> dict[str, Any]:
     for kind, size in (("typical", offset.typ), ("maximum", offset.max)):
         assert size is not None
         bench.progress.stage(f"{TITLES[name]}: {kind} offset of {1e3 * size:g} mV")
-        out["sizes"][kind] = offsets.shifts(
+        out["sizes"][kind] = shifts(
             one, bench.wanted, size, jobs=bench.jobs, most=bench.extent.patterns
         )
     return out

@@ -3,13 +3,16 @@
 The folder holds README.md with the command at its top, pictures as PNG and SVG, dynamics.json with
 windows, points, cascades, coexisting attractors and statements, and the followed branches and the
 sweeps as Parquet. A folder that holds anything else is refused.
+
+Both ends of each main window at the paper's parameters are continued over b and over k0: pitchfork
+below, fold or grazing above.
 """
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,15 +26,19 @@ from designer.base.atomic_write import write
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.report_pieces import check_report_folder
-from designer.bifurcations import sweep
+from designer.bifurcations import border_curves, sweep
+from designer.bifurcations.border_curve import BorderCurve
+from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.branch_survey import Survey, survey
-from designer.bifurcations.windows import all_windows, outside
+from designer.bifurcations.plane_curves import PlaneWindow
+from designer.bifurcations.windows import BranchWindow, all_windows, outside
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import settle, starts, twin
 from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.orbit import Orbit
 from designer.folders import origin
+from designer.folders.curve_store import curves_csv
 from designer.folders.sweep_store import write_sweep
 from designer.model import swept_model
 from designer.model.find_responses import scale_of
@@ -46,11 +53,57 @@ from designer.paper.dynamics_page import (
     portrait_sheet,
 )
 from designer.paper.report_files import README, write_files
-from designer.paper.response_borders import SECOND, response_borders
-from designer.paper.response_order import gaps
-from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
-from designer.plots import bifurcation_plots
+from designer.paper.statements import gaps, main_cascades, main_windows, statements, symmetric_mains
+from designer.plots import bifurcation_plots, curve_plots
 from designer.plots.point_captions import caption
+
+OMEGA = (0.15, 1.8)
+"""The range of ω in which borders are followed."""
+SECOND = {"b": (0.15, 0.35), "k0": (0.85, 0.99)}
+"""Second parameters, with where borders are followed over them."""
+
+
+@dataclass(frozen=True)
+class ResponseBorders:
+    """The borders over ω and one other parameter."""
+
+    plan: CurvePlan
+    """What was followed, and where."""
+    curves: tuple[BorderCurve, ...]
+    windows: tuple[tuple[str, float, float], ...]
+    """(response, from, to) of each window along ω."""
+
+    @property
+    def name(self) -> str:
+        """The name of the files: "borders-b"."""
+        return f"borders-{self.plan.second}"
+
+    def figure(self) -> Figure:
+        """The borders in the plane."""
+        return curve_plots.curves(self.curves, self.plan, TITLE, self.windows)
+
+    def table(self) -> str:
+        """CSV, a row a point."""
+        return curves_csv(self.curves, self.plan.first, self.plan.second)
+
+
+def response_borders(
+    windows: Sequence[BranchWindow], second: str, jobs: int = 1, progress: Progress | None = None
+) -> ResponseBorders:
+    """The borders that pass the ends of these windows over ω.
+
+    second : a key of ``SECOND``.
+    """
+    progress = Progress() if progress is None else progress
+    plane_window = PlaneWindow(OMEGA, SECOND[second])
+    at = MODEL.parameter(second)
+    plan = CurvePlan(ModelSubject(MODEL), "omega", second, at, plane_window)
+    points = [end.point for w in windows for end in (w.low, w.high) if end.point is not None]
+    step = progress.stage(f"Borders over ω and {second}", border_curves.BLOCKS * (1 + plan.depth))
+    curves = border_curves.run(plan, points, jobs, progress=step)
+    named = tuple((w.response, w.low.value, w.high.value) for w in windows)
+    return ResponseBorders(plan, tuple(curves), named)
+
 
 FORMAT = 1
 COMMAND = "designer reproduce dynamics --out reports/paper-dynamics"

@@ -188,16 +188,19 @@ def diagram(
     shares: BasinShares | None = None,
 ) -> Figure:
     """The paper's Fig. 2: least displacement of each period, impact velocity on each stop that the
-    subject shows, largest Lyapunov exponent, over the swept parameter; windows named above.
+    subject shows, where any impact is met, largest Lyapunov exponent, over the swept parameter;
+    windows named above.
 
     points : to be marked. name : the model's title. shares : counted basins, as a band below.
     """
     plan = sweep.plan
     strips = list(plan.tracks) if plan.followed else ["starts"]
-    more = len(plan.subject.stops) - 1
+    steps = [step for track in sweep.steps.values() for step in track]
+    met = any(len(v) for step in steps for v in (step.velocities, *step.further))
+    speeds = [2.4, *[STOP_PANEL] * (len(plan.subject.stops) - 1)] if met else []
     band = [] if shares is None else [SHARE_BAND]
-    figure = new_figure(9.6, 7.6 + 0.24 * len(strips) + STOP_PANEL * more + sum(band))
-    heights = [0.24] * len(strips) + [2.4, 2.4, *[STOP_PANEL] * more, 1.6, *band]
+    figure = new_figure(9.6, 5.2 + 0.24 * len(strips) + sum(speeds) + sum(band))
+    heights = [0.24] * len(strips) + [2.4, *speeds, 1.6, *band]
     _head(figure, title(name, plan, 120))
     rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     for axes, track in zip(rows, strips, strict=False):
@@ -242,7 +245,7 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     name = labels.get("displacement", f"{symbol}₁")
     text = f"least {name}\nin each period" if labels else f"least {name} in each period"
     least.set_ylabel(axis_label(_wrapped(text), units.get("x", "")))
-    for speed, stop in zip(speeds, plan.subject.stops, strict=True):
+    for speed, stop in zip(speeds, plan.subject.stops, strict=False):
         text = f"impact velocity {stop.velocity}\non {stop.name}"
         if len(speeds) > 1:  # their panels are too low for the stop's name beside them
             heading, text = f"on {stop.name}", f"impact velocity\n{stop.velocity}"

@@ -23,6 +23,7 @@ from designer.base.figure_style import (
     axis_limits,
     new_figure,
     shade_stops,
+    state_plane,
     styled,
 )
 from designer.check.checked_design import CheckedResponse
@@ -66,22 +67,14 @@ def small_portrait(
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     orbits = _orbits(checked)
-    curves = {
-        name: states[np.isfinite(states).all(axis=1)]
-        for name, trace in _to_draw(traces, orbits).items()
-        if name != "ngspice"
-        for states in [_moved(checked, trace, motion)]
-    }
-    every = np.concatenate([np.zeros((1, 2)), *curves.values()])
-    limits = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
-    shade_stops(axes, list(motion.stops), limits[0])
+    exact = {name: trace for name, trace in traces.items() if name != "ngspice"}
+    curves = _curves(checked, exact, motion)
+    limits = state_plane(axes, curves.values(), motion.stops)
     for name, states in curves.items():
         shares = states / np.ptp(limits, axis=1)
         at = _spaced(shares[:, 0], shares[:, 1], 0.01)
         look = _look(name, orbits[name])
         axes.plot(*states[at].T, **look | {"lw": 0.5 * look["lw"]})
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
     return figure
 
 
@@ -178,25 +171,28 @@ def _moved(checked: CheckedResponse, trace: Trace, motion: RelativeMotion) -> Ar
     return motion.of(trace.time, states, checked.model.omega)
 
 
+def _curves(
+    checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
+) -> dict[str, Array]:
+    """(points, 2) displacement and velocity in a clearance, of each engine that has an orbit."""
+    moved = {
+        name: _moved(checked, trace, motion)
+        for name, trace in _to_draw(traces, _orbits(checked)).items()
+    }
+    return {name: states[np.isfinite(states).all(axis=1)] for name, states in moved.items()}
+
+
 def _portrait(
     axes: Axes,
     checked: CheckedResponse,
     traces: Mapping[str, Trace],
     motion: RelativeMotion,
 ) -> None:
-    orbits = _orbits(checked)
-    curves = {
-        name: states[np.isfinite(states).all(axis=1)]
-        for name, trace in _to_draw(traces, orbits).items()
-        for states in [_moved(checked, trace, motion)]
-    }
-    every = np.concatenate([np.zeros((1, 2)), *curves.values()])
-    xlim = axis_limits(every[:, 0], motion.gaps)
-    ylim = axis_limits(every[:, 1], ())
-    shade_stops(axes, list(motion.stops), xlim)
+    orbits, curves = _orbits(checked), _curves(checked, traces, motion)
+    limits = state_plane(axes, curves.values(), motion.stops)
     for name, states in curves.items():
         if name == "ngspice":
-            scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
+            scaled = states / np.ptp(limits, axis=1)
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
     for side, place, entry in motion.impacts(checked.model.orbit):
@@ -209,8 +205,6 @@ def _portrait(
             zorder=5,
             clip_on=False,
         )
-    axes.set_xlim(*xlim)
-    axes.set_ylim(*ylim)
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))
     x_label, y_label = motion.axes

@@ -36,6 +36,7 @@ from designer.base.figure_style import (
     picture,
     plain_numbers,
     shade_stops,
+    state_plane,
     styled,
 )
 from designer.base.si_unit import Unit
@@ -81,14 +82,15 @@ def _section_panel(axes: Axes, response: Simulated, number: int, sections: list[
     motion = response.motions[number]
     # At drive phase 0 the base is at 0 and moves fastest.
     planes = [motion.of(np.zeros(len(s)), s, response.omega) for s in sections]
-    every = np.concatenate(planes)
-    xlim, ylim = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
-    shade_stops(axes, motion.stops, xlim)
+    _plane(axes, motion, planes)
     for plane, colour in zip(planes, (BLACK, RED), strict=False):
         size = 5.0 if len(plane) <= MANY else 1.6
         axes.plot(*plane.T, ls="", marker="o", ms=size, mew=0, color=colour, zorder=3)
-    axes.set_xlim(*xlim)
-    axes.set_ylim(*ylim)
+
+
+def _plane(axes: Axes, motion: RelativeMotion, curves: Sequence[Array]) -> None:
+    """The plane of displacement and velocity in one clearance."""
+    state_plane(axes, curves, motion.stops)
     axes.set_xlabel(motion.label)
     axes.set_ylabel(motion.rate)
 
@@ -288,18 +290,12 @@ def _portrait(axes: Axes, response: Simulated, number: int, units: Mapping[str, 
     period = 2.0 * np.pi / response.omega
     last = MOST_PORTRAIT * period * (1.0 + 1e-9)
     curves = [_curve(motion, response.omega, t, t.time <= last) for t in response.traces]
-    every = np.concatenate(curves)
-    xlim, ylim = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
-    shade_stops(axes, motion.stops, xlim)
+    _plane(axes, motion, curves)
     for orbit, curve, look in zip(_traced_orbits(response), curves, _LOOKS, strict=False):
         axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
         for side, gap in motion.stops:
             speeds = orbit.impact_velocities[_at_stop(orbit, number, side)]
             _impacts(axes, np.full(len(speeds), gap), speeds, side, look)
-    axes.set_xlim(*xlim)
-    axes.set_ylim(*ylim)
-    axes.set_xlabel(motion.label)
-    axes.set_ylabel(motion.rate)
     si_x(axes, units.get("x1"))
     si_y(axes, units.get("x1'"))
 

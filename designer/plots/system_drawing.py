@@ -7,19 +7,24 @@ Displacements count to the right, so upper stops stand at the right.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from types import MappingProxyType
+from typing import Any, TypeVar
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
-from designer.base.figure_style import INK, MUTED, styled
+from designer.base.figure_style import CONTACT, INK, MUTED, new_figure, styled
+from designer.base.units import spaced_quantity
 from designer.laws.element_keys import GROUND
 from designer.laws.law_elements import CubicSpring, NonlinearElement
-from designer.model.lumped_elements import Damper, Gap, Spring, words_of
+from designer.model.lumped_elements import Damper, Elements, Force, Gap, Mass, Spring, words_of
 from designer.model.lumped_system import LumpedSystem
+from designer.model.model import Dimensionless, Mechanical
 from designer.model.relative_motion import subscripted
-from designer.plots.mechanical_symbols import MechanicalSheet
+from designer.model.si_units import MECHANICAL_UNITS
 from designer.plots.system_equations import (
     drive_terms,
     element_rows,
@@ -28,8 +33,98 @@ from designer.plots.system_equations import (
     law_variable,
 )
 
+INCH = 0.4
+"""Inches of one unit of a drawing."""
+_SIZE = 8.5
+
+
+class MechanicalSheet:
+    """A figure of one pair of axes without a frame, in units of its own."""
+
+    def __init__(self, width: float, height: float, low: float = 0.0) -> None:
+        self.figure = new_figure(width * INCH, (height - low) * INCH)
+        self.figure.set_layout_engine("none")
+        self.axes: Axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self.axes.set_axis_off()
+        self.axes.set_xlim(0.0, width)
+        self.axes.set_ylim(low, height)
+
+    def box(self, left: float, right: float, low: float, high: float) -> None:
+        """A mass."""
+        body = Rectangle((left, low), right - left, high - low, fc=CONTACT, ec=INK, lw=1.2)
+        self.axes.add_patch(body)
+
+    def spring(self, x0: float, x1: float, y: float) -> None:
+        turns, lead = 6, 0.18 * (x1 - x0)
+        step = (x1 - x0 - 2.0 * lead) / (2 * turns)
+        xs = [x0, x0 + lead]
+        ys = [y, y]
+        for i in range(2 * turns):
+            xs.append(x0 + lead + (i + 0.5) * step)
+            ys.append(y + (0.28 if i % 2 == 0 else -0.28))
+        self.line([*xs, x1 - lead, x1], [*ys, y, y], INK, 1.2)
+
+    def damper(self, x0: float, x1: float, y: float) -> None:
+        middle, half = 0.5 * (x0 + x1), 0.7
+        self.line([x0, middle - half], [y, y], INK, 1.2)
+        self.line(
+            [middle + half, middle - half, middle - half, middle + half],
+            [y + 0.35, y + 0.35, y - 0.35, y - 0.35], INK, 1.2,
+        )  # fmt: skip
+        self.line([middle + 0.15, middle + 0.15], [y + 0.26, y - 0.26], INK, 1.8)
+        self.line([middle + 0.15, x1], [y, y], INK, 1.2)
+
+    def friction(self, x0: float, x1: float, y: float) -> None:
+        """A rod between two pads that rub on it."""
+        middle, half = 0.5 * (x0 + x1), 0.6
+        self.line([x0, middle + half], [y, y], INK, 1.2)
+        for pad in (y + 0.14, y - 0.14):
+            self.line([middle - half, middle + half], [pad, pad], INK, 1.8)
+        end = middle + half + 0.25
+        self.line([middle + half, end, end, middle + half], [y + 0.3] * 2 + [y - 0.3] * 2, INK, 1.2)
+        self.line([end, x1], [y, y], INK, 1.2)
+
+    def slash(self, x0: float, x1: float, y: float) -> None:
+        """An arrow across a spring or a damper that is not linear."""
+        middle = 0.5 * (x0 + x1)
+        self.axes.annotate(
+            "", (middle + 0.55, y + 0.42), (middle - 0.55, y - 0.42),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.1, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+
+    def wall(self, x: float, low: float, high: float, side: int) -> None:
+        """Ground, hatched on the side away from the system."""
+        self.line([x, x], [low, high], INK, 1.2)
+        y = low + 0.25
+        while y <= high + 1e-9:
+            self.line([x, x + 0.25 * side], [y, y - 0.25], MUTED, 0.8)
+            y += 0.35
+
+    def arrow(self, x0: float, x1: float, y: float, colour: str = MUTED) -> None:
+        self.axes.annotate(
+            "", (x1, y), (x0, y),
+            arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.1, "shrinkA": 0,
+                        "shrinkB": 0},
+        )  # fmt: skip
+
+    def line(self, xs: list[float], ys: list[float], colour: str, width: float) -> None:
+        self.axes.plot(xs, ys, color=colour, lw=width, solid_joinstyle="round")
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        ha: str = "center",
+        va: str = "bottom",
+        size: float = _SIZE,
+    ) -> None:
+        self.axes.text(x, y, text, ha=ha, va=va, color=INK, size=size)
+
+
 Joint = Spring | Damper | NonlinearElement
 T = TypeVar("T", Spring, Damper)
+NO_TEXTS: Mapping[str, str] = MappingProxyType({})
 _WALL, _FIRST, _WIDTH, _PITCH = 0.9, 5.3, 2.6, 7.0
 """Abscissae of the wall and of the first mass, the width of a mass, and from one to the next."""
 _ROW = 1.6
@@ -47,13 +142,69 @@ _GAP, _STOP = 1.3, 2.3
 @styled
 def system_drawing(model: LumpedSystem, *, si: bool) -> Figure:
     """The whole system with its values. si : whether they are SI values, shown with units."""
-    return _Page(model, si=si).figure
+    values = {symbol: value for symbol, value, _ in element_rows(model, si=si)}
+    return _Page(model, values).figure
+
+
+@styled
+def pair_drawing(model: Dimensionless | Mechanical | None = None) -> Figure:
+    """The paper's two masses as a system, each part by the paper's symbol with its value.
+
+    model : ``Dimensionless`` values are in units of M1, K1 and P1 + P2. None : every part, by its
+    symbol alone.
+    """
+    plain = isinstance(model, Dimensionless)
+    alike: dict[str, Any] = dict.fromkeys(_PAPER, 1.0)
+    pair = Mechanical(**alike) if model is None else model
+    if isinstance(pair, Dimensionless):
+        pair = Mechanical.from_dimensionless(pair, M1=1.0, K1=1.0, force=1.0)
+    sizes = {name: float(getattr(pair, name)) for name in _PAPER}
+
+    def text(name: str) -> str:
+        symbol = "b" if plain and name == "B" else subscripted(name)
+        size = sizes[name]
+        value = f"{size:.4g}" if plain else spaced_quantity(size, MECHANICAL_UNITS[name])
+        return symbol if model is None else f"{symbol} = {value}"
+
+    ends = ("M1", "M2"), ("M2", GROUND)
+    upper, lower = (None if pair.sides == other else pair.B for other in ("lower", "upper"))
+    stops = Gap("A", ("M1", GROUND), upper, lower, pair.K0) if pair.K0 else None
+    elements = Elements(
+        masses=(Mass("M1", pair.M1), Mass("M2", pair.M2)),
+        springs=(Spring(ends[0], pair.K1), Spring(ends[1], pair.K2)),
+        dampers=tuple(Damper(e, c) for e, c in zip(ends, (pair.C1, pair.C2), strict=True) if c),
+        gaps=() if stops is None else (stops,),
+        forces=tuple(Force(f"M{k}", p) for k, p in ((1, pair.P1), (2, pair.P2)) if p),
+    )
+    texts = {symbol: text(name) for name, symbol in _PAPER.items()}
+    texts |= {name: texts[name].replace(" = ", "\n") for name in elements.names}
+    texts |= {"A": "", "A.upper": texts["B"], "A.lower": texts["B"]}
+    for number in "12":
+        wave = subscripted(f"P{number}") + (" sin ωt" if plain else " sin ΩT")
+        more = "" if model is None else f", {texts[f'P{number}']}"
+        texts[f"force M{number}"] = wave + more
+        texts[subscripted(f"x{number}")] = subscripted(f"{'x' if plain else 'X'}{number}")
+    return _Page(elements, texts, texts).figure
+
+
+_PAPER = {
+    **{name: name for name in ("M1", "M2", "B", "P1", "P2")},
+    "K1": "k₁",
+    "K2": "k₂",
+    "C1": "c₁",
+    "C2": "c₂",
+    "K0": "A.stiffness",
+}
+"""The paper's parameters, and what the drawing has their texts for."""
 
 
 class _Page(MechanicalSheet):
-    def __init__(self, model: LumpedSystem, *, si: bool) -> None:
-        self.model = model
-        self.values = {symbol: value for symbol, value, _ in element_rows(model, si=si)}
+    def __init__(
+        self, model: Elements, values: Mapping[str, str], texts: Mapping[str, str] = NO_TEXTS
+    ) -> None:
+        """values : by symbol, as ``element_rows`` has them. texts : what is written instead of a
+        mass's name and value, a joint's symbol and value, a force, a clearance's name."""
+        self.model, self.values, self.texts = model, values, texts
         self.row = (GROUND, *model.row)
         self.between: list[list[str]] = [[] for _ in self.row]
         self.below: list[str] = []
@@ -107,6 +258,9 @@ class _Page(MechanicalSheet):
 
     def _force(self, name: str) -> str:
         """The forces on a mass as text."""
+        if f"force {name}" in self.texts:
+            on = [force.on for force in self.model.forces]
+            return self.texts[f"force {name}"] if name in on else ""
         terms = []
         for i, force in enumerate(self.model.forces, start=1):
             constant = subscripted(f"G{i}")
@@ -160,12 +314,13 @@ class _Page(MechanicalSheet):
         number = self.model.names.index(name) + 1
         self.box(left, left + _WIDTH, 0.0, self.top)
         entry = f"m{number}" if self.model.matrices is None else f"m{number}{number}"
-        text = f"{name}\n{self.values.get(subscripted(entry), '')}"
+        text = self.texts.get(name, f"{name}\n{self.values.get(subscripted(entry), '')}")
         self.text(left + 0.5 * _WIDTH, 0.5 * self.top, text, va="center", size=9.5)
         x = left + 0.5 * _WIDTH
         self.line([x, x], [0.0, -0.55], MUTED, 0.8)
         self.arrow(x, x + 0.9, -0.4)
-        self.text(x + 1.05, -0.4, subscripted(f"x{number}"), "left", "center")
+        symbol = subscripted(f"x{number}")
+        self.text(x + 1.05, -0.4, self.texts.get(symbol, symbol), "left", "center")
 
     def _neighbours(self, place: int, y: float, symbol: str) -> None:
         """A spring, a damper or a force at the right of a place of the row."""
@@ -189,6 +344,8 @@ class _Page(MechanicalSheet):
         self.text(0.5 * (x0 + x1), y + 0.4, self._label(symbol, joint))
 
     def _label(self, symbol: str, joint: Joint) -> str:
+        if symbol in self.texts:
+            return self.texts[symbol]
         if isinstance(joint, CubicSpring):
             linear = f"{self.values[f'{symbol}.k1']} x, " if joint.k1 else ""
             return f"{symbol}: {linear}{self.values[f'{symbol}.k3']} x³"
@@ -225,10 +382,11 @@ class _Page(MechanicalSheet):
         middle = self._middle(self.row.index(mass))
         rod = middle + shift
         self.line([rod, rod], [self.top, y + 0.6], INK, 2.0)
+        name = self.texts.get(gap.name, gap.name)
         if self._alone(gap):
-            self.text(rod, y + 0.95, gap.name, size=9.5)
+            self.text(rod, y + 0.95, name, size=9.5)
         else:  # beside the rods, which go on to the lanes above
-            self.text(middle - _SHIFT - 0.2, y + 0.95, gap.name, "right", size=9.5)
+            self.text(middle - _SHIFT - 0.2, y + 0.95, name, "right", size=9.5)
         ends = []
         sides = ((1, gap.upper, "upper"), (-1, gap.lower, "lower"))
         turned = -1 if gap.between[0] == GROUND else 1
@@ -251,7 +409,7 @@ class _Page(MechanicalSheet):
         stiffness = side_stiffness or self.values.get(f"{gap.name}.stiffness", "Hertz")
         preload = self.values.get(f"{gap.name}.preload")
         text = stiffness if preload is None else f"{stiffness}, preload {preload}"
-        self.text(0.5 * (plate + end), y - 0.95, text)
+        self.text(0.5 * (plate + end), y - (1.2 if self.texts else 0.95), text)
         place = self.values[f"{gap.name}.{word}"].replace("-", "−")
         self.text(plate, y + 0.5, place, "left" if side > 0 else "right")
         return side, end

@@ -15,7 +15,7 @@ from designer.base.si_unit import quantity_text
 from designer.base.units import ACCELERATIONS
 from designer.laws.element_keys import GROUND
 from designer.laws.law_elements import CubicSpring, Friction, Law, NonlinearElement
-from designer.model.lumped_elements import Force, Gap, MovingBase, words_of
+from designer.model.lumped_elements import Elements, Force, Gap, MovingBase, words_of
 from designer.model.lumped_system import LumpedSystem
 from designer.model.relative_motion import subscripted
 
@@ -70,7 +70,7 @@ def element_rows(model: LumpedSystem, *, si: bool) -> list[tuple[str, str, str]]
     ]
 
 
-def law_symbols(model: LumpedSystem) -> dict[str, str]:
+def law_symbols(model: Elements) -> dict[str, str]:
     """What each element whose force is a law is called in equations, by its name: a [[law]] by that
     name, the others F₁, F₂, …"""
     laws = {law.name: law.name for law in model.laws}
@@ -275,7 +275,7 @@ def _x(mass: int, prime: str) -> str:
     return subscripted(f"x{mass + 1}") + prime
 
 
-def _place(model: LumpedSystem, name: str, prime: str, *, moves: bool = True) -> str:
+def _place(model: Elements, name: str, prime: str, *, moves: bool = True) -> str:
     """The displacement of a mass or of the ground; "" of a ground that rests."""
     if name != GROUND:
         return _x(model.names.index(name), prime)
@@ -297,13 +297,13 @@ def _motion(model: LumpedSystem, gap: Gap) -> str:
     return f"{first} − {second}" if first and second else first or f"−{second}"
 
 
-def law_variable(model: LumpedSystem, element: NonlinearElement) -> str:
+def law_variable(model: Elements, element: NonlinearElement) -> str:
     """What the force of an element depends on."""
     prime = "" if element.quantity == "displacement" else "′"
     return _sum_of(model, element.factors, prime)
 
 
-def _sum_of(model: LumpedSystem, factors: Mapping[str, float], prime: str) -> str:
+def _sum_of(model: Elements, factors: Mapping[str, float], prime: str) -> str:
     """A sum of displacements or velocities."""
     terms = []
     for name, factor in factors.items():

@@ -20,7 +20,6 @@ from designer.model.relative_motion import different_motions
 from designer.plots import (
     attribution_plots,
     map_plots,
-    model_drawing,
     orbit_plots,
     study_plots,
     system_drawing,
@@ -79,7 +78,7 @@ def pictures(data: ReportData) -> Pictures:
     parameters = data.parameters
     out: dict[str, Picture | Gallery] = {}
     if isinstance(parameters, Dimensionless | Mechanical):
-        draw = partial(model_drawing.model_drawing, parameters)
+        draw = partial(system_drawing.pair_drawing, parameters)
         drawing = once("model", draw, _drawing_label(data))
         out["model"] = Picture(svg=drawing)
     elif isinstance(parameters, LumpedSystem):

@@ -15,24 +15,22 @@ from types import MappingProxyType
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import SUPPLY_UNIT
-from designer.circuit.board_parts_only import (
-    Connector,
-    SupplyCapacitor,
-    SupplyDiode,
-    TestPoint,
-    Trimmer,
-)
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
     POSITIVE,
     Capacitor,
     Circuit,
+    Connector,
     Diode,
     Fitting,
     Reference,
     Resistor,
     Section,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
 )
 from designer.circuit.stage_title import dead_zone_titles, section_stages, stage_names
 

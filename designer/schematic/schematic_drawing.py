@@ -15,8 +15,15 @@ import schemdraw.elements as elm
 
 from designer.base.units import format_quantity
 from designer.board.component import Numbers, designator
-from designer.circuit.board_parts_only import SupplyCapacitor, SupplyDiode
-from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor
+from designer.circuit.netlist import (
+    Capacitor,
+    Circuit,
+    Diode,
+    Reference,
+    Resistor,
+    SupplyCapacitor,
+    SupplyDiode,
+)
 from designer.schematic.drawing_cells import (
     Amplifier,
     Cell,

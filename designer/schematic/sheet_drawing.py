@@ -20,8 +20,6 @@ Wire = tuple[Point, Point]
 TextKind = Literal["title", "role", "line"]
 SIZES: Mapping[TextKind, float] = {"title": 1.8, "role": 0.9, "line": TEXT}
 """Heights of the letters of each kind of text [mm]."""
-LINE_STEP = 1.62
-"""Distance from a line of text to the next one, in heights of its letters, as KiCad sets them."""
 _TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}
 _WIDTHS = {
     **dict.fromkeys("iIlj.,:;'|!", 0.6),

@@ -17,14 +17,16 @@ from designer.board.kicad_items import Entry
 from designer.board.kicad_names import PAPERS
 from designer.board.kicad_symbols import GRID
 from designer.circuit.netlist import Circuit
-from designer.schematic.amplifier_cells import SheetParts, amplifier_cell, node_cell
-from designer.schematic.board_cells import (
+from designer.schematic.drawing_cells import Amplifier, Cell, circuit_cells
+from designer.schematic.sheet_cells import (
+    SheetParts,
+    amplifier_cell,
     flow_cell,
+    node_cell,
     node_fittings,
     probe_cells,
     supply_cells,
 )
-from designer.schematic.drawing_cells import Amplifier, Cell, circuit_cells
 from designer.schematic.sheet_drawing import Point, Sheet, SheetCell
 
 GAP, CHANNEL = 4, 2

@@ -23,7 +23,6 @@ from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
     MODELS,
     NOISE_FREQUENCY,
-    headroom,
     instance,
     recovery,
     subcircuit,
@@ -156,18 +155,6 @@ class OpAmpBench:
         """Current [A] that the output drives into ground, driven hard down and up."""
         plot = self._run(["VIN inp 0 0", "VG inn 0 0", "VSHORT out 0 0", *self._driven()])
         return float(plot["vshort#branch"][0]), float(plot["vshort#branch"][1])
-
-    def below_range(self) -> tuple[float, float]:
-        """Output [V] of a follower whose input falls from zero to 0.5 V beyond the lower end of
-        its common-mode range: at 0.5 V inside that end, and at the last."""
-        end = -self.supply + headroom(self.opamp)[0]
-        slow = 200.0 * self.supply / self.opamp.slew.nominal
-        plot = self._run([
-            f"VIN inp 0 PWL(0 0 {slow!r} {end - 0.5!r} {2 * slow!r} {end - 0.5!r})",
-            "RF out inn 1", "RL out 0 1e6", f".tran {slow / 100!r} {2 * slow!r} 0 {slow / 100!r}",
-        ])  # fmt: skip
-        inside = slow * (end + 0.5) / (end - 0.5)
-        return float(np.interp(inside, plot["time"], plot["out"])), float(plot["out"][-1])
 
     def supply_current(self, load: float = 1e9) -> tuple[float, float]:
         """Current [A] into the positive and out of the negative supply pin, as a follower of half

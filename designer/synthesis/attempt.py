@@ -16,9 +16,8 @@ from designer.catalog.entries import Kind, OpAmp
 from designer.catalog.output_stage import OutputStage, output_at
 from designer.catalog.parts_catalog import Catalog
 from designer.circuit import build
-from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
+from designer.circuit.coefficients import CoefficientErrors, CutShort, coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
-from designer.circuit.dead_zone_reading import CutShort
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.circuit.terms import entry_resistor

@@ -102,7 +102,7 @@ def export(
     from designer.folders.model_source import source
     from designer.jobs import export_job
     from designer.jobs.options import Options
-    from designer.routing.board_layers import INNER
+    from designer.routing.board_copper import INNER
 
     options = Options(overwrite=overwrite, resume=resume)
     progress = Progress() if progress is None else progress

@@ -20,9 +20,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from designer.base.arrays import Array, Mask
-from designer.circuit.netlist import Circuit
+from designer.circuit.netlist import Circuit, Stop
 from designer.circuit.noise_gains import conductance
-from designer.circuit.stop import Stop
 from designer.workbench.drive_estimate import spectrum_tops, tuned
 from designer.workbench.prediction import BoardPrediction, PredictedStop
 

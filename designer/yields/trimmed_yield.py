@@ -19,9 +19,8 @@ from designer.base.views import View
 from designer.board.board_parts import board_circuit, trimmed_clearance
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
-from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import nominal_board
-from designer.circuit.netlist import Circuit, Resistor
+from designer.circuit.netlist import Circuit, Resistor, Trimmer
 from designer.spread.spread import draw_many
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, rounded

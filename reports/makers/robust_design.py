@@ -41,7 +41,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
 from designer.paper.report_files import README, make_report, write_files
-from designer.paper.tolerance_cases import TITLES, cases
+from designer.paper.reproduce_tolerance import TITLES, cases
 from designer.report import comparison
 from designer.verbs.search import VERB
 from designer.verdicts import exact_circuit

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from designer.base.design_folder import Folder
+from designer.base.design_folder import MOST, Folder, differences
 from designer.base.errors import InputError
-from designer.base.input_differences import MOST, differences
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.seal import sha256

@@ -25,24 +25,22 @@ from designer.board.board_parts import (
 from designer.board.component import Component, components, joined
 from designer.catalog.diode_curve import card
 from designer.catalog.entries import mounting_of
-from designer.circuit.board_parts_only import (
-    Connector,
-    SupplyCapacitor,
-    SupplyDiode,
-    TestPoint,
-    Trimmer,
-)
 from designer.circuit.board_values import nominal_board
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
     POSITIVE,
     Circuit,
+    Connector,
     Diode,
     Fitting,
     Generator,
     Resistor,
     Section,
+    SupplyCapacitor,
+    SupplyDiode,
+    TestPoint,
+    Trimmer,
 )
 from designer.circuit.reduction import Reduction
 from designer.circuit.stage_title import stage_names

@@ -10,7 +10,7 @@ import pytest
 from designer.base.errors import Unreachable
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit, fitted, trim_reach
-from designer.circuit.board_parts_only import Trimmer
+from designer.circuit.netlist import Trimmer
 from designer.circuit.paper_values import MODEL, OPAMP, circuit, corrected, rounded
 from designer.design_rules import run_rules
 from designer.design_rules.rule_subject import RuleSubject

@@ -27,7 +27,7 @@ from designer.board.kicad_rules import CustomRule, rules_text, spacing
 from designer.board.sexpr import Expression, expression, expression_text, read, read_all
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
-from designer.design_rules import drc_specimen, kicad_drc, on_board, on_fab
+from designer.design_rules import kicad_drc, on_board, on_fab
 from designer.design_rules.kicad_drc import DesignRuleCheck
 from designer.design_rules.kicad_program import KicadFailed
 from designer.folders import kicad_files
@@ -770,7 +770,7 @@ def test_places_are_said_in_printable_words() -> None:
 def examples(*, breaking: bool, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board whose examples break them, or just keep them."""
     folder.mkdir(exist_ok=True)
-    board = board_of(drc_specimen.specimen(custom(), breaking=breaking), folder)
+    board = board_of(kicad_drc.specimen(custom(), breaking=breaking), folder)
     listed: list[Component] = []
     return by_id(
         on_board.on_board(board, listed, custom(), {}, kicad_drc.check(board, custom()), generic())
@@ -806,7 +806,7 @@ def test_one_syntax_error_drops_every_rule_and_is_noticed(
     def damaged(rules: Any) -> str:
         return rules_text(rules).replace("(constraint track_width", "(constraint track_wide", 1)
 
-    text = drc_specimen.specimen(custom(), breaking=True)
+    text = kicad_drc.specimen(custom(), breaking=True)
     clean = kicad_drc.report(text, damaged(custom()), tmp_path / "damaged")
     assert kicad_drc.violations(clean, custom()) == ()
     monkeypatch.setattr(kicad_drc, "rules_text", damaged)

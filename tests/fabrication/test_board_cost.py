@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from designer.board.bom import Line, bill
-from designer.catalog.build_cost import BuildCost
+from designer.catalog.entries import BuildCost
 from designer.catalog.stock_list import StockRow
 from designer.fabrication.board_cost import (
     BoardSize,

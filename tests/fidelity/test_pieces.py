@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from designer.fidelity.fidelity_errors import FidelityError, Truth
-from designer.fidelity.label import ResponseLabel
+from designer.fidelity.fidelity_errors import FidelityError, ResponseLabel, Truth
 from designer.fidelity.pieces import (
     CHUNK,
     TradePieces,

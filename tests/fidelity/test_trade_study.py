@@ -32,8 +32,14 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity import fidelity_answers, pieces, yields
 from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.fidelity_answers import FidelityAnswer
-from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, alike, compare, difference
-from designer.fidelity.label import ResponseLabel
+from designer.fidelity.fidelity_errors import (
+    BOARD,
+    EQUATIONS,
+    ResponseLabel,
+    alike,
+    compare,
+    difference,
+)
 from designer.fidelity.trade_files import front, sheet, trade_json
 from designer.fidelity.trade_study import (
     IDEAL,

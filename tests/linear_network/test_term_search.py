@@ -26,9 +26,7 @@ from designer.linear_network.linear_terms import (
     Shortfall,
     Targets,
 )
-from designer.linear_network.term_conditions import TermConditions
-from designer.linear_network.term_dives import LOWER, TermDives
-from designer.linear_network.term_search import TermSearch
+from designer.linear_network.term_search import LOWER, TermConditions, TermDives, TermSearch
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.attempt import _in_ratio
 from designer.synthesis.dead_zone_target import slope_interval

@@ -23,7 +23,6 @@ from designer.fidelity.cpu_clock import Entrant, here, rounds
 from designer.model.find_responses import ModelResponse, find
 from designer.model.model import Dimensionless
 from designer.paper import misprints, reproduce_circuit
-from designer.paper.circuit_ngspice import _stage, stage_curve
 from designer.paper.circuit_page import _between
 from designer.paper.circuits import (
     CORRECTED,
@@ -36,8 +35,15 @@ from designer.paper.circuits import (
     model_with,
 )
 from designer.paper.misprints import MISPRINTS, apply
-from designer.paper.offsets import shifts, signs
-from designer.paper.reproduce_circuit import CircuitExtent, names, reproduce
+from designer.paper.reproduce_circuit import (
+    CircuitExtent,
+    _stage,
+    names,
+    reproduce,
+    shifts,
+    signs,
+    stage_curve,
+)
 from designer.spice.pool import SpicePool
 
 CATALOG = load_catalog()
@@ -275,13 +281,13 @@ def test_it_goes_on_where_it_was(made: Path, monkeypatch: pytest.MonkeyPatch) ->
     (made / "cases" / "offsets-corrected.json").unlink()
     worked: list[float] = []
     real = shifts
-    from designer.paper import offsets
+    from designer.paper import reproduce_circuit
 
     def counted(*args: object, **rest: object) -> object:
         worked.append(args[2])  # type: ignore[arg-type]
         return real(*args, **rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(offsets, "shifts", counted)
+    monkeypatch.setattr(reproduce_circuit, "shifts", counted)
     reproduce(made, jobs=1, extent=SMALL, resume=True)
     assert worked == [3e-3, 10e-3]
     for name, content in before.items():

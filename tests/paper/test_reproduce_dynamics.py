@@ -33,16 +33,18 @@ from designer.model.model_file import read_model_file
 from designer.paper import reproduce_dynamics
 from designer.paper.dynamics_page import Dynamics
 from designer.paper.reproduce_dynamics import DynamicsExtent, measure, reproduce
-from designer.paper.response_order import WindowGap, faults, gaps
 from designer.paper.statements import (
     AGREES,
     DISAGREES,
     IN_PART,
+    WindowGap,
     _dying,
     _each,
     _grazing,
     _grazings,
     _order,
+    faults,
+    gaps,
     main_windows,
 )
 from designer.plots import bifurcation_plots

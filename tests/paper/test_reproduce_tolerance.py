@@ -13,8 +13,7 @@ from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.paper import reproduce_tolerance
 from designer.paper.circuits import OMEGA
-from designer.paper.reproduce_tolerance import KINDS, reproduce
-from designer.paper.tolerance_cases import YieldRow, cases
+from designer.paper.reproduce_tolerance import KINDS, YieldRow, cases, reproduce
 from designer.verdicts.exact_circuit import block
 from designer.yields.yield_count import count
 

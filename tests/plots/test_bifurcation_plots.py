@@ -84,3 +84,14 @@ def test_a_long_label_of_a_panel_takes_several_lines() -> None:
     assert (clipped(figure), overlapping(figure)) == ([], [])
     label = figure.axes[1].get_ylabel()
     assert " ".join(label.split()) == f"least {subject.labels['displacement']} in each period"
+
+
+@pytest.mark.parametrize(("example", "panels"), [("dry-friction", 3), ("gears", 4)])
+def test_impacts_have_panels_where_any_is_met(example: str, panels: int) -> None:
+    """Beside the strip of the track, the least displacement and the Lyapunov exponent."""
+    subject = ModelSubject(read_model_file(ROOT / f"examples/{example}.toml").model)
+    quick = TransientSettings(4, 2, 8)
+    figure = diagram(sweep.run(SweepPlan(subject, "omega", np.linspace(1.1, 1.2, 3), course=quick)))
+    assert (len(figure.axes), clipped(figure), overlapping(figure)) == (panels, [], [])
+    assert figure.axes[1].get_ylabel().startswith("least")
+    assert figure.axes[-1].get_ylabel().startswith("largest Lyapunov")

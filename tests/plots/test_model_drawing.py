@@ -16,7 +16,7 @@ from designer.jobs.template import TEXT
 from designer.model.ascii_sketch import sketch
 from designer.model.clearance import Sides
 from designer.model.model import Dimensionless, Mechanical
-from designer.plots.model_drawing import model_drawing
+from designer.plots.system_drawing import pair_drawing
 from designer.report.equations import (
     dimensionless_equations,
     equations_with_numbers,
@@ -119,16 +119,16 @@ def _texts(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize("name", [*MODELS, "names"])
 def test_no_text_of_the_drawing_is_cut_off_or_covered(name: str) -> None:
-    figure = model_drawing(MODELS.get(name))
+    figure = pair_drawing(MODELS.get(name))
     assert (clipped(figure), overlapping(figure)) == ([], [])
-    assert figure_style.to_svg(figure) == figure_style.to_svg(model_drawing(MODELS.get(name)))
+    assert figure_style.to_svg(figure) == figure_style.to_svg(pair_drawing(MODELS.get(name)))
 
 
 def test_the_drawing_shows_the_values() -> None:
     assert {"M₂\n0.25", "K₂ = 1.5", "C₂ = 0.1", "C₁ = 0.1", "K₀ = 9", "b = 0.3"} <= set(
-        _texts(model_drawing(MODEL))
+        _texts(pair_drawing(MODEL))
     )
-    shown = _texts(model_drawing(SI))
+    shown = _texts(pair_drawing(SI))
     assert {"M₂\n750 g", "K₁ = 20 kN/m", "C₂ = 12.5 N s/m", "B = 0.15 mm"} <= set(shown)
     assert "P₁ sin ΩT, P₁ = 50.25 N" in shown
 
@@ -139,7 +139,7 @@ def test_the_drawing_shows_the_values() -> None:
 def test_only_the_stops_that_there_are_stand_on_their_side(
     name: Sides, right: int, left: int
 ) -> None:
-    axes = model_drawing(MODELS[name]).axes[0]
+    axes = pair_drawing(MODELS[name]).axes[0]
     (mass,) = [t.get_position()[0] for t in axes.texts if t.get_text().startswith("M₁")]
     stops = [t.get_position()[0] for t in axes.texts if t.get_text().startswith("K₀")]
     assert (sum(x > mass for x in stops), sum(x < mass for x in stops)) == (right, left)
@@ -150,7 +150,7 @@ def test_only_the_stops_that_there_are_stand_on_their_side(
 
 
 def test_what_a_model_does_not_have_is_not_drawn() -> None:
-    for text in (" ".join(_texts(model_drawing(BARE))), sketch(BARE).translate(ASCII)):
+    for text in (" ".join(_texts(pair_drawing(BARE))), sketch(BARE).translate(ASCII)):
         for name in ("C₂", "K₀", "P₂", "B", "C2", "K0", "P2"):
             assert name not in text
     assert "f(x₁)" not in " ".join(dimensionless_equations(BARE))

@@ -15,9 +15,7 @@ from designer.base import figure_style
 from designer.base.arrays import Array
 from designer.base.page import markdown
 from designer.paper.circuits import OMEGA
-from designer.paper.reproduce_tolerance import KINDS
-from designer.paper.tolerance_cases import TITLES, YieldRow
-from designer.paper.tolerance_page import tolerance_page, yield_sheet
+from designer.paper.reproduce_tolerance import KINDS, TITLES, YieldRow, tolerance_page, yield_sheet
 from designer.plots.attribution_plots import avoided_chart, index_chart
 from designer.plots.map_plots import map_chart
 from designer.yields.loss_attribution import ResponseAttribution

@@ -21,7 +21,7 @@ from designer.fabrication.plotted_copper import plotted
 from designer.folders import board_files
 from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
-from designer.routing.board_layers import with_layers
+from designer.routing.board_copper import with_layers
 from designer.routing.routed_board import route_board
 from tests.shared.exploring import EXPLORING
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written

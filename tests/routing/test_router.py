@@ -15,11 +15,9 @@ from designer.base.errors import InputError
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_rules import board_rules
 from designer.board.sexpr import Expression, expression_text, read
-from designer.routing.board_copper import BoardCopper, read_copper
-from designer.routing.board_layers import layer_count, with_layers
-from designer.routing.ground_pour import cut_open
+from designer.routing.board_copper import BoardCopper, layer_count, read_copper, with_layers
 from designer.routing.net_kinds import kinds_of_nets, net_kinds
-from designer.routing.routed_board import RoutedBoard, route_board
+from designer.routing.routed_board import RoutedBoard, cut_open, route_board
 from tests.shared.kicad_cases import case, case_files
 
 NAME = "one mass"

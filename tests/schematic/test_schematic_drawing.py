@@ -12,8 +12,7 @@ from matplotlib import pyplot
 
 from designer.board.board_parts import fitted
 from designer.board.component import Numbers, components, designator, pin_numbers
-from designer.circuit.board_parts_only import Connector, TestPoint
-from designer.circuit.netlist import Circuit, Section
+from designer.circuit.netlist import Circuit, Connector, Section, TestPoint
 from designer.model.board_table import BoardChoice
 from designer.schematic import schematic_drawing
 from designer.schematic.drawing_cells import Amplifier, Chain, board_cells, circuit_cells

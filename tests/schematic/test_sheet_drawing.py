@@ -17,7 +17,6 @@ from designer.board.kicad_symbols import GRID, TEXT
 from designer.schematic.drawing_cells import Amplifier, circuit_cells
 from designer.schematic.kicad_project import Project
 from designer.schematic.sheet_drawing import (
-    LINE_STEP,
     SIZES,
     Placed,
     Sheet,
@@ -27,6 +26,8 @@ from designer.schematic.sheet_drawing import (
 from designer.schematic.sheet_layout import arranged, layout
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
 
+LINE_STEP = 1.62
+"""Distance from a line of text to the next one, in heights of its letters, as KiCad sets them."""
 SLIM = 0.05
 """Half the width of a wire."""
 

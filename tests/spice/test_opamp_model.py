@@ -19,6 +19,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
+from designer.spice.batch_backend import BatchNgspice
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
 from designer.spice.opamp_model import FIDELITIES, recovery, second_pole
@@ -125,9 +126,16 @@ def test_an_input_below_the_common_mode_range(name: str) -> None:
     wrong rail; any other stays at the end of the range, or at its output limit before that."""
     opamp = CATALOG.opamp(name)
     bench = OpAmpBench.of(opamp, "full")
-    inside, beyond = bench.below_range()
     end = opamp.common_mode.min
     assert end is not None
+    slow = 200.0 * bench.supply / opamp.slew.nominal
+    deck = bench.deck([
+        f"VIN inp 0 PWL(0 0 {slow!r} {end - 0.5!r} {2 * slow!r} {end - 0.5!r})",
+        "RF out inn 1", "RL out 0 1e6", f".tran {slow / 100!r} {2 * slow!r} 0 {slow / 100!r}",
+    ])  # fmt: skip
+    plot = BatchNgspice().analyse(deck)[-1].vectors
+    inside = np.interp(slow * (end + 0.5) / (end - 0.5), plot["time"], plot["out"])
+    beyond = plot["out"][-1]
     limit = bench.swing(1e6)[0]
     assert inside == pytest.approx(max(end + 0.5, limit), abs=0.01)
     if opamp.phase_reversal:

@@ -12,10 +12,9 @@ from benchmarks.ngspice_figures import SETTLED, memory, warm, warm_job
 from designer.base.defaults import Fidelity
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import MOST_DISCARDED
+from designer.spice.numerics_gate import MOST_DISCARDED, PROBE, settling_periods
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
-from designer.spice.settling_periods import PROBE, periods
 from tests.shared.paper_cases import subject
 
 STEPS = {1: 200, 2: 400, 3: 600, 4: 800, 5: 900, 6: 2200, 7: 2500, 8: 2900}
@@ -41,7 +40,7 @@ def way(c: float, rho: float, n: int = 1, noise: float = 0.0, laps: int = PROBE)
 def test_the_prediction_is_the_first_strobe_that_is_near_enough(
     rho: float, c: float, n: int
 ) -> None:
-    found, _ = periods(way(c, rho, n), n, rho, PEAK)
+    found, _ = settling_periods(way(c, rho, n), n, rho, PEAK)
     assert found % n == 0
     assert c * rho ** (found / n) <= STROBE_TOLERANCE * 1.001
     least = max(np.log(STROBE_TOLERANCE / c) / np.log(rho), 1.0)
@@ -49,21 +48,21 @@ def test_the_prediction_is_the_first_strobe_that_is_near_enough(
 
 
 def test_a_fidelity_that_is_slower_than_the_exact_circuit_is_seen() -> None:
-    found, rho = periods(way(0.05, 0.97), 1, 0.2, PEAK)
+    found, rho = settling_periods(way(0.05, 0.97), 1, 0.2, PEAK)
     assert rho == pytest.approx(0.97, abs=1e-6)
     assert 0.05 * 0.97**found <= STROBE_TOLERANCE
     assert 0.05 * 0.97 ** (found - 2) > STROBE_TOLERANCE
 
 
 def test_noise_is_no_slow_way() -> None:
-    found, rho = periods(way(0.01, 0.3, noise=1e-5), 1, 0.3, PEAK)
+    found, rho = settling_periods(way(0.01, 0.3, noise=1e-5), 1, 0.3, PEAK)
     assert rho == 0.3
     assert found <= 4
-    assert periods(way(1e-4, 0.5, noise=1e-5), 1, 0.5, PEAK)[0] == 1
+    assert settling_periods(way(1e-4, 0.5, noise=1e-5), 1, 0.5, PEAK)[0] == 1
 
 
 def test_a_way_without_a_multiplier() -> None:
-    assert periods(way(0.3, 0.6), 1, float("nan"), PEAK)[1] == pytest.approx(0.6, abs=0.01)
+    assert settling_periods(way(0.3, 0.6), 1, float("nan"), PEAK)[1] == pytest.approx(0.6, abs=0.01)
 
 
 @pytest.fixture(scope="module")

@@ -19,11 +19,10 @@ from designer.board.kicad_sim import models
 from designer.catalog.parts_catalog import load_catalog
 from designer.check.deck_runs import FirstRun
 from designer.check.synthesis_result import Synthesis, synthesise
-from designer.circuit.board_parts_only import Connector
 from designer.circuit.board_values import nominal_board
 from designer.circuit.design import settings
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Resistor
+from designer.circuit.netlist import Connector, Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.drive_shape import SINE, wave

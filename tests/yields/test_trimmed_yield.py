@@ -17,10 +17,9 @@ from designer.board.board_parts import drive_resistance, driven_nodes
 from designer.centering.repair_upgrade import with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import at_rest
-from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.board_values import Board, nominal_board
 from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Resistor
+from designer.circuit.netlist import Resistor, Trimmer
 from designer.circuit.reduction import Reduction
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
