@@ -351,22 +351,10 @@ class Ensemble:
         )
         room = working_modes.driven(modes.modes, drives[0])
         kernel.answer_all(
-            modes.modes,
-            rows,
-            drives,
-            starts,
-            stages,
-            laps,
-            working_modes.ANCHORS,
-            room.data,
-            room.ints,
-            room.width,
-            room.far,
-            bool(self.boards.circuit.dependent_capacitors),
-            closely,
-            room.unit,
-            answers,
-        )
+            modes.modes, rows, drives, starts, stages, laps, working_modes.ANCHORS, room.data,
+            room.ints, room.width, room.far, bool(self.boards.circuit.dependent_capacitors),
+            closely, room.unit, answers,
+        )  # fmt: skip
         return answers
 
     def _responses(

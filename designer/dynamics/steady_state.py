@@ -303,19 +303,9 @@ def _by_kernel(
         )
         at = np.array(x, dtype=float)
         growth, code = kernel.motion(
-            model,
-            at,
-            course.settle,
-            course.tangents,
-            strobes,
-            watch,
-            cursor,
-            rates,
-            course.patience,
-            orbit,
-            facts,
-            counted,
-        )
+            model, at, course.settle, course.tangents, strobes, watch, cursor, rates,
+            course.patience, orbit, facts, counted,
+        )  # fmt: skip
         entries = int(watch.entries[0])
     spent = course.settle + course.keep
     if code == kernel.UNNAMED:
@@ -378,19 +368,8 @@ def exponents(model: kernel.DrivenModel, x: Array, blocks: int) -> Array:
     place, counted = np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64)
     watch = Watch(none, none, none, np.zeros(1, dtype=np.int64))
     kernel.motion(
-        model,
-        x,
-        periods,
-        periods,
-        np.empty((1, 4)),
-        watch,
-        place,
-        room,
-        0,
-        none,
-        none,
-        counted,
-    )
+        model, x, periods, periods, np.empty((1, 4)), watch, place, room, 0, none, none, counted,
+    )  # fmt: skip
     return room if place[1] == kernel_orbit.DONE else room[:0]
 
 

@@ -246,21 +246,10 @@ def _draw(board: DrivenBoard, x: Float, n: int, peak: Float, facts: Float, trace
 
 @callee
 def _respond_all(
-    modes: Modes,
-    which: Int,
-    drives: Float,
-    starts: Float,
-    stages: int,
-    anchors: Anchors,
-    data: Float,
-    ints: Int,
-    width: int,
-    far: int,
-    leaps: bool,
-    closely: bool,
-    unit: Unit,
+    modes: Modes, which: Int, drives: Float, starts: Float, stages: int, anchors: Anchors,
+    data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool, unit: Unit,
     answers: Answers,
-) -> None:
+) -> None:  # fmt: skip
     """Each of E questions: board which[e] under drives[e] from starts[e]."""
     n = len(unit)
     trail = RunTrail(
@@ -292,21 +281,10 @@ def _respond_all(
 
 @callee
 def _sweep_all(
-    modes: Modes,
-    board: int,
-    drives: Float,
-    laps: Int,
-    states: Float,
-    anchors: Anchors,
-    data: Float,
-    ints: Int,
-    width: int,
-    far: int,
-    leaps: bool,
-    closely: bool,
-    unit: Unit,
+    modes: Modes, board: int, drives: Float, laps: Int, states: Float, anchors: Anchors,
+    data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool, unit: Unit,
     answers: Answers,
-) -> None:
+) -> None:  # fmt: skip
     """One board from each of E states through drives that follow each other, without settling."""
     n, columns = len(unit), 2 * modes.side.shape[1]
     trail = RunTrail(
@@ -345,22 +323,10 @@ def _sweep_all(
 
 @compiled
 def answer_all(
-    modes: Modes,
-    which: Int,
-    drives: Float,
-    starts: Float,
-    stages: int,
-    laps: Int,
-    anchors: Anchors,
-    data: Float,
-    ints: Int,
-    width: int,
-    far: int,
-    leaps: bool,
-    closely: bool,
-    unit: Unit,
-    answers: Answers,
-) -> None:
+    modes: Modes, which: Int, drives: Float, starts: Float, stages: int, laps: Int,
+    anchors: Anchors, data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool,
+    unit: Unit, answers: Answers,
+) -> None:  # fmt: skip
     """Where boards settle, or what a sweep leads to: the flow in it is compiled for both at once.
 
     Without ``laps`` each of E questions: board which[e] under drives[e] from starts[e] settles in

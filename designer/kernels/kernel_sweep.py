@@ -111,15 +111,9 @@ def _exponent(model: DrivenModel, x: Float, cursor: Int, periods: int, rates: Fl
 
 @callee
 def _travel(
-    model: DrivenModel,
-    x: Float,
-    settle: int,
-    tangents: int,
-    strobes: Float,
-    watch: Watch,
-    cursor: Int,
-    rates: Float,
-) -> float:
+    model: DrivenModel, x: Float, settle: int, tangents: int, strobes: Float, watch: Watch,
+    cursor: Int, rates: Float,
+) -> float:  # fmt: skip
     """The run of ``motion``, and the growth of a tangent vector in it."""
     cursor[0], cursor[1] = -1, DONE
     free, growth = settle - tangents, np.nan
@@ -223,19 +217,9 @@ def _classify(
 
 @compiled
 def motion(
-    model: DrivenModel,
-    x: Float,
-    settle: int,
-    tangents: int,
-    strobes: Float,
-    watch: Watch,
-    cursor: Int,
-    rates: Float,
-    patience: int,
-    orbit: Float,
-    facts: Float,
-    counted: Int,
-) -> tuple[float, int]:
+    model: DrivenModel, x: Float, settle: int, tangents: int, strobes: Float, watch: Watch,
+    cursor: Int, rates: Float, patience: int, orbit: Float, facts: Float, counted: Int,
+) -> tuple[float, int]:  # fmt: skip
     """From x (4,), written, over ``settle`` periods, the last ``tangents`` of them with a tangent
     vector; then watch those of ``strobes`` (keep + 1, 4). Returns the growth per period (nan where
     the flow stopped), and what the motion at the end is: PERIODIC … STOPPED.

@@ -72,7 +72,7 @@ REACH = {
     "catalog": 6_150,
     "new": 11_500,
     "simulate": 27_950,
-    "bifurcation": 34_600,
+    "bifurcation": 34_650,
     "reproduce": 56_750,
     "rules": 60_150,
     "explore": 58_900,
