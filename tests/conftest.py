@@ -30,7 +30,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples in each run: a failure that one run shows, the next shows too.
-settings.register_profile("ci", deadline=None, derandomize=True)
+settings.register_profile("ci", deadline=None, derandomize=True, max_examples=30)
 # New examples in each run, to look for failures: HYPOTHESIS_PROFILE=explore. Other populations are
 # larger under it too (tests/shared/exploring.py).
 settings.register_profile("explore", deadline=None, max_examples=1000)

@@ -215,39 +215,24 @@ class Ensemble:
         neighbours : boards that are asked about the same drives. Modes that this one enters are
         solved for them too; no state depends on it.
         """
-        ends, codes = np.array(starts, dtype=np.float64), np.zeros(len(starts), dtype=np.int64)
+        starts = np.array(starts, dtype=np.float64)
         sines = all(drive.is_sine for drive, _ in stages)
-        if self._modes is None or not self._modes.good[board] or not len(ends) or not sines:
-            return ends, np.zeros(len(ends), dtype=bool)
+        if self._modes is None or not self._modes.good[board] or not len(starts) or not sines:
+            return starts, np.zeros(len(starts), dtype=bool)
         modes = self._modes_of(board)
-        missing, closely = np.zeros(2, dtype=np.int64), False
         drives = np.array([working_modes.drive_of(drive, MAX_EVENTS) for drive, _ in stages])
-        periods = np.array([count for _, count in stages], dtype=np.int64)
+        laps, closely = np.array([count for _, count in stages], dtype=np.int64), False
+        rows = np.zeros(len(starts), dtype=np.int64)
         while True:
             heed()
-            ends[:], room = starts, working_modes.driven(modes.modes, drives[0])
-            kernel.sweep_all(
-                modes.modes,
-                0,
-                drives,
-                periods,
-                ends,
-                working_modes.ANCHORS,
-                room.data,
-                room.ints,
-                room.width,
-                room.far,
-                closely,
-                room.unit,
-                codes,
-                missing,
-            )
+            answers = self._answers(modes, rows, drives, starts, 0, closely, laps)
+            codes = answers.whole[:, kernel.CODE]
+            mode, guard = answers.whole[0, kernel.MISSING :][:2].tolist()
             before = len(modes.targets.keys)
-            if missing[0] >= 0:
-                target = modes.targets.beyond(int(missing[0]), int(missing[1]))
-                modes = self._further(board, [target], neighbours)
+            if mode >= 0:
+                modes = self._further(board, [modes.targets.beyond(mode, guard)], neighbours)
             elif not (codes == LEFT).any() or closely:
-                return ends, np.asarray(codes == DONE)
+                return answers.start, np.asarray(codes == DONE)
             else:  # all modes first: a proof step by step takes longer
                 modes = self._further(board, None, neighbours)
                 closely = len(modes.targets.keys) == before
@@ -317,11 +302,14 @@ class Ensemble:
         boards, number = np.unique(which[good], return_inverse=True)
         modes = self._modes.take(boards)
         given = np.array([working_modes.drive_of(d, MAX_EVENTS) for d in drives]).reshape(-1, 4)
+        settling = np.zeros(0, dtype=np.int64)
         for closely in (False, True):
             open_ = np.array([out[k] is None for k in good], dtype=bool)
             asked, rows = good[open_], number[open_]
             while len(asked):
-                answers = self._answers(modes, rows, given[asked], starts[asked], stages, closely)
+                answers = self._answers(
+                    modes, rows, given[asked], starts[asked], stages, closely, settling
+                )
                 code = answers.whole[:, kernel.CODE]
                 closed = np.flatnonzero(code == FOUND)
                 periods = [drives[k].period for k in asked[closed]]
@@ -344,9 +332,10 @@ class Ensemble:
         starts: Array,
         stages: int,
         closely: bool,
+        laps: Index,
     ) -> kernel.Answers:
         """What the compiled code says of boards ``rows`` of these modes. closely : as of
-        ``DrivenModes``."""
+        ``DrivenModes``; laps : as of ``answer_all``."""
         count, (_, _, clearances, wide) = len(rows), modes.modes.past.shape
         n, watched = wide - 2, len(modes.modes.watched)
         answers = kernel.Answers(
@@ -362,22 +351,11 @@ class Ensemble:
             trace=np.zeros((count, MAX_PERIOD * kernel.POINTS)),
         )
         room = working_modes.driven(modes.modes, drives[0])
-        kernel.respond_all(
-            modes.modes,
-            rows,
-            drives,
-            starts,
-            stages,
-            working_modes.ANCHORS,
-            room.data,
-            room.ints,
-            room.width,
-            room.far,
-            bool(self.boards.circuit.dependent_capacitors),
-            closely,
-            room.unit,
-            answers,
-        )
+        kernel.answer_all(
+            modes.modes, rows, drives, starts, stages, laps, working_modes.ANCHORS, room.data,
+            room.ints, room.width, room.far, bool(self.boards.circuit.dependent_capacitors),
+            closely, room.unit, answers,
+        )  # fmt: skip
         return answers
 
     def _responses(

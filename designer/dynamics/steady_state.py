@@ -294,6 +294,7 @@ def _by_kernel(
     model = kernel.DrivenModel(tables, period, MAX_EVENTS)
     strobes, cursor = np.empty((course.keep + 1, 4)), np.zeros(2, dtype=np.int64)
     rates = np.empty(max(course.tangents - kernel.ALIGN, 0) // kernel.RENEWAL)
+    orbit, facts, counted = np.empty(4), np.full(3, np.nan), np.zeros(4, dtype=np.int64)
     room, entries = 0, ROOM * course.keep
     while entries > room:  # more impacts than room: again, with room for all
         room = entries
@@ -301,27 +302,14 @@ def _by_kernel(
             np.empty(course.keep), np.empty(room), np.zeros(4), np.zeros(1, dtype=np.int64)
         )
         at = np.array(x, dtype=float)
-        growth = kernel.travel(
-            model, at, course.settle, course.tangents, strobes, watch, cursor, rates
-        )
+        growth, code = kernel.motion(
+            model, at, course.settle, course.tangents, strobes, watch, cursor, rates,
+            course.patience, orbit, facts, counted,
+        )  # fmt: skip
         entries = int(watch.entries[0])
     spent = course.settle + course.keep
-    if cursor[1] != kernel_orbit.DONE:
+    if code == kernel.UNNAMED:
         return _nothing(_STOPPED[int(cursor[1])], np.array(x, dtype=float), spent)
-    peak = np.maximum(watch.peak, max(1e-9 * float(watch.peak.max()), 1e-300))
-    orbit, facts, counted = np.empty(4), np.full(3, np.nan), np.zeros(4, dtype=np.int64)
-    code = kernel.classify(
-        model,
-        strobes,
-        course.patience,
-        growth,
-        course.tangents,
-        peak,
-        orbit,
-        facts,
-        counted,
-        cursor,
-    )
     extremes = watch.minima, watch.velocities[:entries].copy()
     spent += int(counted[kernel_orbit.SPENT])
     if code == kernel.NOT_SETTLED and course.patience:  # a long period, or none, but settled
@@ -346,7 +334,7 @@ def _by_kernel(
         n=n,
         p=p,
         q=q,
-        symmetric=_symmetric(flow, facts[1], orbit, n, peak) if n else None,
+        symmetric=_symmetric(flow, facts[1], orbit, n, watch.peak) if n else None,
         lyapunov=exponent[0],
         lyapunov_error=exponent[1],
         radius=float(facts[0]) if n else float("nan"),
@@ -363,16 +351,26 @@ def _swept_exponent(
 ) -> tuple[LyapunovExponent, Array | None]:
     """Exponent of the chaos through x (4,), of which some rates are known; also the state that it
     was left in, if it was a transient."""
-    x, place = x.copy(), np.array([-1, kernel_orbit.DONE])
+    x = x.copy()
 
     def further(blocks: int) -> Array:
-        room = np.empty(blocks)
-        kernel.exponent(model, x, place, kernel.ALIGN + blocks * kernel.RENEWAL, room)
-        return room if place[1] == kernel_orbit.DONE else room[:0]
+        return exponents(model, x, blocks)
 
     known = until(SWEPT, rates, further)
     growth = LyapunovExponent(known, model.period, x, ())
     return growth, x if _faded(known) else None
+
+
+def exponents(model: kernel.DrivenModel, x: Array, blocks: int) -> Array:
+    """Growth of a tangent vector per period over so many blocks of periods from x (4,), which is
+    carried along; none where the flow stopped."""
+    room, periods, none = np.empty(blocks), kernel.ALIGN + blocks * kernel.RENEWAL, np.zeros(0)
+    place, counted = np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    watch = Watch(none, none, none, np.zeros(1, dtype=np.int64))
+    kernel.motion(
+        model, x, periods, periods, np.empty((1, 4)), watch, place, room, 0, none, none, counted,
+    )  # fmt: skip
+    return room if place[1] == kernel_orbit.DONE else room[:0]
 
 
 def _symmetric(flow: Callable[[], Flow], half: float, x: Array, n: int, peak: Array) -> bool:

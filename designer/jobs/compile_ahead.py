@@ -82,7 +82,6 @@ def compile_circuits(masses: int) -> None:
     boards = Ensemble(Boards.of(circuit, [nominal_board(circuit)]))
     boards.settle([0], [drive], rest[None])
     boards.swept(0, [(drive, 1)], rest[None])
-    Flow(boards.reduction(0).system(), drive).run(rest, 1)
     jit.note_stored(jit.CIRCUITS.format(masses=masses))
 
 

@@ -47,7 +47,7 @@ ASYMMETRY, UNDECIDED = range(2)
 
 
 class Answers(NamedTuple):
-    """What ``respond_all`` writes for each of E questions."""
+    """What ``answer_all`` writes for each of E questions."""
 
     whole: Int
     """(E, COUNTED + 2 + 2 C) ints, see the places above; C clearances."""
@@ -244,29 +244,13 @@ def _draw(board: DrivenBoard, x: Float, n: int, peak: Float, facts: Float, trace
     return True
 
 
-@compiled
-def respond_all(
-    modes: Modes,
-    which: Int,
-    drives: Float,
-    starts: Float,
-    stages: int,
-    anchors: Anchors,
-    data: Float,
-    ints: Int,
-    width: int,
-    far: int,
-    leaps: bool,
-    closely: bool,
-    unit: Unit,
+@callee
+def _respond_all(
+    modes: Modes, which: Int, drives: Float, starts: Float, stages: int, anchors: Anchors,
+    data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool, unit: Unit,
     answers: Answers,
-) -> None:
-    """Each of E questions: board which[e] under drives[e] from starts[e].
-
-    which : (E,); drives : (E, 4) as ``DrivenModes.drive``; starts : (E, n). stages : of settling,
-    after which a question is left to the caller. data, ints, width, far, leaps, closely, unit : as
-    of ``DrivenModes``.
-    """
+) -> None:  # fmt: skip
+    """Each of E questions: board which[e] under drives[e] from starts[e]."""
     n = len(unit)
     trail = RunTrail(
         np.zeros((n + len(modes.watched), 2)),
@@ -295,30 +279,13 @@ def respond_all(
         answers.whole[e, MISSING], answers.whole[e, MISSING + 1] = missing[0], missing[1]
 
 
-@compiled
-def sweep_all(
-    modes: Modes,
-    board: int,
-    drives: Float,
-    periods: Int,
-    states: Float,
-    anchors: Anchors,
-    data: Float,
-    ints: Int,
-    width: int,
-    far: int,
-    closely: bool,
-    unit: Unit,
-    codes: Int,
-    missing: Int,
-) -> None:
-    """One board from each of E states through drives that follow each other, without settling.
-
-    drives : (S, 4) as ``DrivenModes.drive``; periods : (S,) of each. states : (E, n) at drive phase
-    0; at the end of the last drive afterwards. data … unit : room for tables, which all states
-    share. codes : (E,) as of ``advance``, written. missing : as of ``DrivenBoard``; where a mode
-    is, nothing that was written counts.
-    """
+@callee
+def _sweep_all(
+    modes: Modes, board: int, drives: Float, laps: Int, states: Float, anchors: Anchors,
+    data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool, unit: Unit,
+    answers: Answers,
+) -> None:  # fmt: skip
+    """One board from each of E states through drives that follow each other, without settling."""
     n, columns = len(unit), 2 * modes.side.shape[1]
     trail = RunTrail(
         np.zeros((0, 2)),
@@ -330,19 +297,55 @@ def sweep_all(
         np.zeros(1, dtype=np.int64),
     )
     cursor, nothing = np.zeros(CURSOR, dtype=np.int64), np.zeros((0, 0))
-    missing[0], codes[:] = -1, DONE
+    missing, whole, ends = np.zeros(2, dtype=np.int64), answers.whole, answers.start
+    missing[0] = -1
+    for e in range(len(states)):
+        whole[e, CODE], whole[e, MISSING] = DONE, -1
+        for i in range(n):
+            ends[e, i] = states[e, i]
     for s in range(len(drives)):
         ints[:, FILLED] = 0
-        driven = DrivenModes(modes, board, drives[s], data, ints, width, far, False, closely, unit)
+        driven = DrivenModes(modes, board, drives[s], data, ints, width, far, leaps, closely, unit)
         driven_board = DrivenBoard(driven, 2.0 * np.pi / drives[s, 0], anchors, trail, missing)
-        strobes = np.zeros((periods[s] + 1, n))
-        impacts = np.zeros((periods[s], columns), dtype=np.int64)
+        strobes = np.zeros((laps[s] + 1, n))
+        impacts = np.zeros((laps[s], columns), dtype=np.int64)
         for e in range(len(states)):
-            if codes[e] != DONE:
+            if whole[e, CODE] != DONE:
                 continue
             cursor[MODE] = -1
-            codes[e] = _lap(driven_board, states[e], cursor, nothing, strobes, impacts)
+            whole[e, CODE] = _lap(driven_board, ends[e], cursor, nothing, strobes, impacts)
             if missing[0] >= 0:
+                whole[0, MISSING], whole[0, MISSING + 1] = missing[0], missing[1]
                 return
             for i in range(n):
-                states[e, i] = strobes[periods[s], i]
+                ends[e, i] = strobes[laps[s], i]
+
+
+@compiled
+def answer_all(
+    modes: Modes, which: Int, drives: Float, starts: Float, stages: int, laps: Int,
+    anchors: Anchors, data: Float, ints: Int, width: int, far: int, leaps: bool, closely: bool,
+    unit: Unit, answers: Answers,
+) -> None:  # fmt: skip
+    """Where boards settle, or what a sweep leads to: the flow in it is compiled for both at once.
+
+    Without ``laps`` each of E questions: board which[e] under drives[e] from starts[e] settles in
+    at most so many ``stages``, after which the question is left to the caller. With ``laps`` (S,),
+    periods of each of S drives that follow each other: board which[0] goes through all of them from
+    each of starts; answers.start gets where it ends, and the place CODE the code of ``advance``;
+    where a mode is MISSING in the first answer, nothing else that was written counts.
+
+    which : (E,); drives : (E, 4) or (S, 4) as ``DrivenModes.drive``; starts : (E, n) at drive phase
+    0. data, ints, width, far, leaps, closely, unit : as of ``DrivenModes``; all questions share the
+    room for tables.
+    """
+    if len(laps) > 0:
+        _sweep_all(
+            modes, which[0], drives, laps, starts, anchors, data, ints, width, far, leaps, closely,
+            unit, answers,
+        )  # fmt: skip
+    else:
+        _respond_all(
+            modes, which, drives, starts, stages, anchors, data, ints, width, far, leaps, closely,
+            unit, answers,
+        )  # fmt: skip

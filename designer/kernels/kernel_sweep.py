@@ -41,8 +41,8 @@ RENEWAL = 5
 """Periods between two normalisations of the tangent vector."""
 ALIGN = 10
 """Periods in which the tangent vector turns towards the leading direction; they do not count."""
-PERIODIC, APERIODIC, NOT_SETTLED, STOPPED = 0, 1, 2, 3
-"""What ``classify`` answers; STOPPED: the flow came to no end."""
+PERIODIC, APERIODIC, NOT_SETTLED, STOPPED, UNNAMED = 0, 1, 2, 3, 4
+"""What ``motion`` answers; STOPPED: the flow came to no end."""
 SPAN = 200
 """Periods that an exponent has to be taken over before it is believed to be chaos."""
 MORE = 300
@@ -72,8 +72,8 @@ def _lap(
     )
 
 
-@compiled
-def exponent(model: DrivenModel, x: Float, cursor: Int, periods: int, rates: Float) -> float:
+@callee
+def _exponent(model: DrivenModel, x: Float, cursor: Int, periods: int, rates: Float) -> float:
     """Carry x (4,), written, over ``periods``; the growth of a tangent vector per period.
 
     cursor : (2,) mode, -1 for the one that holds at x, and on return the flow's code. rates ← of
@@ -109,22 +109,12 @@ def exponent(model: DrivenModel, x: Float, cursor: Int, periods: int, rates: Flo
     return float(growth / max(counted, 1))
 
 
-@compiled
-def travel(
-    model: DrivenModel,
-    x: Float,
-    settle: int,
-    tangents: int,
-    strobes: Float,
-    watch: Watch,
-    cursor: Int,
-    rates: Float,
-) -> float:
-    """From x (4,) over ``settle`` periods, the last ``tangents`` of them with a tangent vector;
-    then watch those of ``strobes`` (keep + 1, 4). Returns the growth per period.
-
-    rates ← its parts, as of ``exponent``. cursor : (2,) on return the mode and the flow's code.
-    """
+@callee
+def _travel(
+    model: DrivenModel, x: Float, settle: int, tangents: int, strobes: Float, watch: Watch,
+    cursor: Int, rates: Float,
+) -> float:  # fmt: skip
+    """The run of ``motion``, and the growth of a tangent vector in it."""
     cursor[0], cursor[1] = -1, DONE
     free, growth = settle - tangents, np.nan
     if free > 0:
@@ -133,7 +123,7 @@ def travel(
         for i in range(4):
             x[i] = passed[free, i]
     if tangents > 0 and cursor[1] == DONE:
-        growth = exponent(model, x, cursor, tangents, rates)
+        growth = _exponent(model, x, cursor, tangents, rates)
     if cursor[1] != DONE:
         return growth
     keep = strobes.shape[0] - 1
@@ -191,19 +181,13 @@ def _periodic(
     return True
 
 
-@compiled
-def classify(
+@callee
+def _classify(
     model: DrivenModel, strobes: Float, patience: int, growth: float, span: int, peak: Float,
     orbit: Float, facts: Float, counted: Int, cursor: Int,
 ) -> int:  # fmt: skip
-    """What the motion at the end of strobes (k, 4) is: PERIODIC … STOPPED.
-
-    growth : of a tangent vector per period over ``span`` periods. patience : periods that may be
-    added where it is neither periodic nor chaotic. orbit : (4,) a strobe of it, or where the motion
-    was left. facts : (3,) spectral radius, asymmetry half a period later, growth per period.
-    counted : (4,) as ``kernels.kernel_orbit`` has it. cursor : (2,) mode and code at the
-    end.
-    """
+    """What the motion at the end of strobes (k, 4) is; growth : of a tangent vector per period over
+    ``span`` periods."""
     if _periodic(model, strobes, peak, orbit, facts, counted):
         return PERIODIC
     x = strobes[strobes.shape[0] - 1].copy()
@@ -218,7 +202,7 @@ def classify(
             return APERIODIC
         if turn == turns - 1:
             break
-        growth = exponent(model, x, cursor, MORE, np.zeros(0))
+        growth = _exponent(model, x, cursor, MORE, np.zeros(0))
         if cursor[1] == DONE:
             cursor[1] = _lap(model, x, cursor, np.zeros((0, 0)), tail, impacts)
         if cursor[1] != DONE:
@@ -229,3 +213,34 @@ def classify(
         for i in range(4):
             x[i] = tail[2 * MAX_PERIOD, i]
     return NOT_SETTLED
+
+
+@compiled
+def motion(
+    model: DrivenModel, x: Float, settle: int, tangents: int, strobes: Float, watch: Watch,
+    cursor: Int, rates: Float, patience: int, orbit: Float, facts: Float, counted: Int,
+) -> tuple[float, int]:  # fmt: skip
+    """From x (4,), written, over ``settle`` periods, the last ``tangents`` of them with a tangent
+    vector; then watch those of ``strobes`` (keep + 1, 4). Returns the growth per period (nan where
+    the flow stopped), and what the motion at the end is: PERIODIC … STOPPED.
+
+    rates ← growth of the whole blocks of ``RENEWAL`` periods that count, as many as there is room
+    for. cursor ← (2,) mode and the flow's code. Where that is not DONE, ``counted`` is empty, or
+    there were more impacts than room, the motion is UNNAMED, and nothing below is written.
+
+    watch.peak is never 0 afterwards. patience : periods that may be added where it is neither
+    periodic nor chaotic. orbit : (4,) a strobe of it, or where the motion was left. facts : (3,)
+    spectral radius, asymmetry half a period later, growth per period. counted : (4,) as
+    ``kernels.kernel_orbit`` has it.
+    """
+    growth = _travel(model, x, settle, tangents, strobes, watch, cursor, rates)
+    if cursor[1] != DONE or len(counted) == 0 or watch.entries[0] > len(watch.velocities):
+        return growth, UNNAMED
+    peak, top = watch.peak, 0.0
+    for i in range(4):
+        top = max(top, peak[i])
+    for i in range(4):
+        peak[i] = max(peak[i], max(1e-9 * top, 1e-300))
+    return growth, _classify(
+        model, strobes, patience, growth, tangents, peak, orbit, facts, counted, cursor
+    )

@@ -15,6 +15,7 @@ from benchmarks.bench_strangers import ANSWERED, INEXACT, REFUSED, SILENT
 from benchmarks.stranger_systems import LAWS, SHAPES, draw
 from designer.model.find_responses import find
 from designer.model.model_file import parse_model_file
+from tests.shared.exploring import seeds
 
 ROW: dict[str, Any] = {
     "number": 0, "masses": 2, "clearances": 1, "kinds": ["base"], "size": "mm, kg", "exit": 0,
@@ -27,7 +28,7 @@ SAID: dict[str, Any] = {
 } | {"exit": 2, "said": "circuit: no choice of parts"}
 
 
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", seeds(4))
 def test_each_file_is_read_and_shows_its_response(number: int) -> None:
     stranger = draw(7, number)
     modelfile = parse_model_file(stranger.text)

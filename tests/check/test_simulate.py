@@ -183,14 +183,16 @@ def test_chattering_ends_with_a_status(
 
     monkeypatch.setattr(Flow, "run", nervous)
     model, out = _model(tmp_path), tmp_path / "p"
-    answer = _answer(["simulate", model, "--omega", "0.3", "--plots", str(out)], capfd, 1)
+    answer = _answer(
+        ["simulate", model, "--omega", "0.3", "--starts", "1", "--plots", str(out)], capfd, 1
+    )
     (r,) = answer["responses"]
     assert r["response"] == r["status"] == "not settled"
     assert r["reason"] == "too many events"
     assert r["x1_max"] is None
     assert r["found"] is False
     assert answer["files"] == []
-    assert entry.status(["simulate", model, "--omega", "0.3"]) == 1
+    assert entry.status(["simulate", model, "--omega", "0.3", "--starts", "1"]) == 1
     assert "not settled: too many events" in capfd.readouterr().err
 
 

@@ -274,11 +274,12 @@ def test_simulate_says_it(
         f"format = 1\n[model]\nm = 0.5\nk = 0.5\nk0 = {k0!r}\nc = 0.5\nzeta = 0.2\nf20 = 0.0\n"
         'b = 0.5\nsides = "upper"\n'
     )
-    assert entry.status(["simulate", str(path), "--omega", "0.9", "--json"]) == int(not trusted)
+    words = ["simulate", str(path), "--omega", "0.9", "--starts", "1"]
+    assert entry.status([*words, "--json"]) == int(not trusted)
     said = capfd.readouterr()
     (row,) = json.loads(said.out)["responses"]
     assert row["trust"]["trusted"] is trusted
-    assert entry.status(["simulate", str(path), "--omega", "0.9"]) == int(not trusted)
+    assert entry.status(words) == int(not trusted)
     assert ("not to be trusted here" in capfd.readouterr().err) is not trusted
 
 

@@ -334,8 +334,8 @@ def test_fidelities_of_op_amps_in_ngspice(
     finished: tuple[Path, subprocess.CompletedProcess[str]], capfd: pytest.CaptureFixture[str]
 ) -> None:
     out, _ = finished
-    words = ["simulate", str(out), "--engine", "ngspice", "--rung", "dynamic", "--json"]
-    assert entry.status(words) == 0
+    words = ["simulate", str(out), "--engine", "ngspice", "--rung", "dynamic", "--starts", "1"]
+    assert entry.status([*words, "--json"]) == 0
     answer = _strict(capfd.readouterr().out)
     (response,) = answer["responses"]
     assert response["response"] == "1-2-2"
@@ -353,7 +353,8 @@ def test_simulate_a_folder(
     engine: str,
 ) -> None:
     out, _ = finished
-    assert entry.status(["simulate", str(out), "--engine", engine, "--json"]) == 0
+    words = ["simulate", str(out), "--engine", engine, "--starts", "1", "--json"]
+    assert entry.status(words) == 0
     (response,) = _strict(capfd.readouterr().out)["responses"]
     keys = (
         "omega response status symmetric x1_max x1_min impact_velocities multipliers lyapunov "
@@ -380,7 +381,7 @@ def test_a_response_that_is_not_there_is_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     model = _model(tmp_path, BASE + WANTED.replace("1-2-2", "1-7-7") + COARSE_RECTIFIER)
-    assert entry.status(["simulate", str(model), "--json"]) == 1
+    assert entry.status(["simulate", str(model), "--starts", "1", "--json"]) == 1
     assert _strict(capfd.readouterr().out)["responses"][0]["found"] is False
     out = tmp_path / "out"
     for _ in range(2):  # made, then read again
@@ -397,9 +398,8 @@ def test_synthesis_without_responses_or_stops(
     assert answer["dead_zone"] is None
     assert answer["knobs"] == []
     assert answer["scales"]["threshold"] is None
-    assert (
-        entry.status(["simulate", str(out), "--omega", "1", "--engine", "circuit", "--json"]) == 0
-    )
+    words = ["simulate", str(out), "--omega", "1", "--engine", "circuit", "--starts", "1"]
+    assert entry.status([*words, "--json"]) == 0
     assert _strict(capfd.readouterr().out)["responses"][0]["response"] == "1-0-0"
     done = subprocess.run(["ngspice", "-b", out / "circuit.cir"], capture_output=True, check=False)
     assert done.returncode == 0
@@ -476,26 +476,25 @@ def test_import_is_light() -> None:
 def test_a_wrong_model_file_is_told_before_the_engine_is_imported(tmp_path: Path) -> None:
     (tmp_path / "wrong.toml").write_text("format = 2\nfoo = 1\n")
     code = (
-        "import sys; from designer.cli import entry; status = entry.status(sys.argv[1:]);"
-        "print(status, sorted({'numba', 'scipy', 'pandas', 'cvxpy'} & set(sys.modules)))"
+        "import sys; from designer.cli import entry\n"
+        "for verb in (['run', '--out', 'out'], ['simulate'], ['bifurcation']):\n"
+        "    print(entry.status([verb[0], 'wrong.toml', *verb[1:]]))\n"
+        "print(sorted({'numba', 'scipy', 'pandas', 'cvxpy'} & set(sys.modules)))"
     )
-    for verb in ("run", "simulate", "bifurcation"):
-        command = [sys.executable, "-c", code, verb, str(tmp_path / "wrong.toml")]
-        command += ["--out", str(tmp_path / "out")] if verb == "run" else []
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-        assert done.stdout.split("\n")[0] == "2 []", done.stderr
-        assert "unknown key 'foo'" in done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split("\n") == ["2", "2", "2", "[]", ""], done.stderr
+    assert done.stderr.count("unknown key 'foo'") == 3
 
 
 def test_every_verb_is_registered() -> None:
-    code = (
-        "from designer.cli import command_line;"
-        "print(*(n for n in command_line.application().commands if ' ' not in n))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert sorted(done.stdout.split()) == sorted(VERBS)
+    assert sorted(n for n in application().commands if " " not in n) == sorted(VERBS)
 
 
 def test_public_names_exist() -> None:

@@ -64,7 +64,9 @@ def call(folder: Path, *words: str, **variables: str) -> subprocess.CompletedPro
 
 def test_workers_of_the_command(folder: Path) -> None:
     done = call(
-        folder, script(folder), *"simulate paper.toml --omega 1.55 --engine ngspice".split()
+        folder,
+        script(folder),
+        *"simulate paper.toml --omega 1.55 --engine ngspice --starts 1".split(),
     )
     assert (done.returncode, ran(folder)) == (0, ""), done.stderr
 
@@ -72,7 +74,7 @@ def test_workers_of_the_command(folder: Path) -> None:
 def test_python_m(folder: Path) -> None:
     for name in BEFORE:
         (folder / f"{name}.py").unlink()
-    done = call(folder, *"-m designer simulate paper.toml --omega 1.55".split())
+    done = call(folder, *"-m designer simulate paper.toml --omega 1.55 --starts 1".split())
     assert (done.returncode, ran(folder)) == (0, ""), done.stderr
 
 

@@ -38,7 +38,7 @@ VERBS = (
     ["export", "{}", "--deck", "portable"],
     ["export", "{}", "--dsn", "{}/board.dsn"],
     ["rules", "{}"],
-    ["simulate", "{}", "--omega", "0.85", "--engine", "circuit"],
+    ["simulate", "{}", "--omega", "0.85", "--engine", "circuit", "--starts", "1"],
     ["bifurcation", "{}", "--circuit", "--from", "1", "--to", "0.9", "--steps", "3"],
     ["search", "{}", "--yield", "0.9"],
 )

@@ -32,7 +32,7 @@ from tests.shared.exploring import EXPLORING
 
 EACH = 10
 """Files of one run."""
-FEW, MANY = 1, 500 if EXPLORING else 10
+FEW, MANY = 1, 500 if EXPLORING else 5
 """Runs of the quick test, and of the slow one."""
 SOUND = 0.4
 """Least share of the files that are no error: the test is of models."""

@@ -99,8 +99,7 @@ def test_it_compiles_what_a_circuit_of_so_many_masses_needs(
     kernels: list[Any] = [
         kernel_nodal.solve_all,
         kernel_propagators.advance,
-        kernel_boards.respond_all,
-        kernel_boards.sweep_all,
+        kernel_boards.answer_all,
     ]
     assert all(kernel.signatures for kernel in kernels)
     assert 2 in {len(types[-2]) for types in kernels[2].signatures}

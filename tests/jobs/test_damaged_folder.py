@@ -33,7 +33,7 @@ VERBS = {
     "another layer": ["tolerance", "{}", *EXACT, "--map", "grade"],
     "export": ["export", "{}"],
     "rules": ["rules", "{}"],
-    "simulate": ["simulate", "{}", "--omega", "0.85", "--engine", "circuit"],
+    "simulate": ["simulate", "{}", "--omega", "0.85", "--engine", "circuit", "--starts", "1"],
     "bifurcation": ["bifurcation", "{}", "--circuit", "--from", "1", "--to", "0.9", "--steps", "3"],
     "search": ["search", "{}", "--yield", "0.9"],
 }

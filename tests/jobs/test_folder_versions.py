@@ -28,7 +28,7 @@ STUDY = "--rung exact --map grade"
 VERBS = {
     "export": "export {}",
     "rules": "rules {}",
-    "simulate": "simulate {} --engine circuit",
+    "simulate": "simulate {} --engine circuit --starts 1",
     "sweep of the circuit": "bifurcation {} --circuit --from 1 --to 0.9 --steps 3",
     "sweep of the model": "bifurcation {} --from 1 --to 0.9 --steps 3",
     "search": "search {} --yield 0.9",

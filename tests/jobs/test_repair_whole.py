@@ -20,13 +20,20 @@ from designer.folders.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.repair_job import repair_into
 from designer.jobs.study_job import run_into
-from designer.jobs.synthesise_job import synthesise_into
-from designer.model.model_file import parse_model_file, read_model_file
+from designer.model.model_file import read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
+from tests.shared.quick_folders import quick_folder, without_starts
 
-FRESH = Options(seed=4242, samples=400, rung="exact")
+pytestmark = pytest.mark.usefixtures("figures_are_blank", "quick_reports", "nothing_beside")
+FRESH = Options(seed=4242, samples=400, rung="exact", blame=False)
 """Of the study by which a repair is judged."""
+
+
+@pytest.fixture
+def nothing_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither starts nor findings, which no repair asks for."""
+    without_starts(monkeypatch)
 
 
 def text(omega: float, expect: str, b: float = 0.25, dead_zone: str = "saturation") -> str:
@@ -64,7 +71,7 @@ class Whole:
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     """The repair of this model file's design by this kind alone."""
     design, repaired = where / "design", where / "cured"
-    synthesise_into(parse_model_file(model), design, Options(), Progress())
+    quick_folder(model, design)
     found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
     return Whole(design, repaired, found.answer)

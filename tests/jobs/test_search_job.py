@@ -333,7 +333,7 @@ def test_a_search_from_end_to_end(
 
     # The folder is a design folder like any other.
     capsys.readouterr()
-    assert run("simulate", whole, "--engine", "circuit", "-q", "--json") == 0
+    assert run("simulate", whole, "--engine", "circuit", "--starts", 1, "-q", "--json") == 0
     assert json.loads(capsys.readouterr().out)["responses"][0]["response"] == "1-2-2"
     moved = whole.rename(tmp_path / "moved")
     assert run("tolerance", moved, "--samples", 40, "--rung", "exact", "--jobs", 2, "-q") == 0

@@ -157,7 +157,17 @@ def test_quiet_is_quiet_and_the_log_has_it(
     _silent(monkeypatch)
     model, log = tmp_path / "m.toml", tmp_path / "log"
     model.write_text(TEXT, encoding="utf-8")
-    words = ["simulate", str(model), "--engine", "circuit", "-q", "--log", str(log)]
+    words = [
+        "simulate",
+        str(model),
+        "--engine",
+        "circuit",
+        "--starts",
+        "1",
+        "-q",
+        "--log",
+        str(log),
+    ]
     assert entry.status(words) == 0
     assert capfd.readouterr() == ("", "")
     line = re.compile(r"so far: with the \w+ stage, integrators with errors up to")

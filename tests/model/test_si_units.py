@@ -191,7 +191,7 @@ def test_hertz_need_a_mechanical_model() -> None:
 
 def test_simulate_takes_hertz_and_answers_in_si_too(drill: Path, capfd: Captured) -> None:
     hertz = 340.0 / (2.0 * math.pi)
-    answer = asked(capfd, "simulate", drill, "--frequency", f"{hertz!r} Hz")
+    answer = asked(capfd, "simulate", drill, "--frequency", f"{hertz!r} Hz", "--starts", "1")
     (found,) = answer["responses"]
     assert found["omega"] == pytest.approx(340.0 * TIME, rel=1e-14)
     assert found["frequency_hz"] == pytest.approx(hertz, rel=1e-12)
@@ -201,12 +201,13 @@ def test_simulate_takes_hertz_and_answers_in_si_too(drill: Path, capfd: Captured
         assert one["impact_velocities_m_s"] == pytest.approx(
             [v * SPEED for v in one["impact_velocities"]], rel=1e-13
         )
-    (same,) = asked(capfd, "simulate", drill, "--frequency", "340 rad/s")["responses"]
+    words = ("--frequency", "340 rad/s", "--starts", "1")
+    (same,) = asked(capfd, "simulate", drill, *words)["responses"]
     assert same["x1_max"] == pytest.approx(found["x1_max"], rel=1e-9)
 
 
 def test_a_dimensionless_model_has_no_si_keys(paper: Path, capfd: Captured) -> None:
-    (found,) = asked(capfd, "simulate", paper, "--omega", "0.85")["responses"]
+    (found,) = asked(capfd, "simulate", paper, "--omega", "0.85", "--starts", "1")["responses"]
     assert not [key for key in found if key.endswith(("_hz", "_m", "_m_s"))]
 
 

@@ -27,8 +27,9 @@ DEMO = ["run", "examples/paper.toml", "--samples", "4", "--out", "out/paper"]
 SMALLER = {
     # in a command: instead
     "--out out/paper200": "--out out/paper200 --samples 2 --no-blame",
-    "--rung exact --samples 2000": "--rung exact --samples 20",
-    "--rung exact --samples 1000": "--rung exact --samples 20",
+    # what is blamed for losses is asked in tests/yields/test_loss_attribution.py
+    "--rung exact --samples 2000": "--rung exact --samples 20 --no-blame",
+    "--rung exact --samples 1000": "--rung exact --samples 20 --no-blame",
     "--from 0.5 --to 0.95 --steps 121 --and b 0.15 0.35 --region": (
         "--from 0.84 --to 0.86 --steps 3 --and b 0.24 0.26 --region"
     ),
@@ -42,7 +43,9 @@ SMALLER = {
     """--steps 300 --map 'x2'"'"'' -1 1 300""": """--steps 4 --map 'x2'"'"'' -1 1 4""",
     "--steps 241": "--steps 5",
     "--steps 111": "--steps 5",
-    "--samples 100 --out out/rig": "--samples 4 --out out/rig",
+    "--samples 100 --out out/rig": "--samples 4 --out out/rig --no-blame",
+    "tolerance out/rig --tuned": "tolerance out/rig --tuned --no-blame",
+    "--omega 1.0 --plots": "--omega 1.0 --starts 2 --plots",
     "--shares 200": "--shares 20",
     # how many starts lead where is asked in tests/check/test_coexistence.py
     **{
