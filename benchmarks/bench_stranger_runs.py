@@ -167,8 +167,11 @@ def _causes(row: Row) -> Iterator[str]:
         elif not response["engines_agree"]:
             yield "engines disagree on the nominal circuit"
         agreement = response["agreement"] or {}
-        if agreement.get("asked", 0) > agreement.get("agreed", 0) + agreement.get("undecided", 0):
+        counted = [agreement.get(each, 0) for each in ("agreed", "undecided", "failed")]
+        if agreement.get("asked", 0) > sum(counted):
             yield "engines disagree on boards"
+        if agreement.get("failed"):
+            yield "ngspice has no answer on boards"
         if response["rate"] is None:
             yield "no yield"
     for rule in row.get("rules", ()):

@@ -73,6 +73,7 @@ def write(
     fidelity: Fidelity = "ideal",
     kept_from: float = 0.0,
     stage: bool = True,
+    also: Sequence[str] = (),
     bounded: bool = False,
     notes: Sequence[str] = (),
 ) -> str:
@@ -81,8 +82,9 @@ def write(
     initial : (states,) capacitor voltages at t = 0; discharged where None. fidelity : the op-amps'
     model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
     time [s] before which ngspice keeps no point; what it computes is the same. stage : whether it
-    keeps the nonlinear stage's output, beside the states and the generator. bounded : whether the
-    steps of Newton's method are (``newton_bounds``). notes : lines of a comment at the top.
+    keeps the nonlinear stage's output, beside the states and the generator. also : nets that it
+    keeps besides. bounded : whether the steps of Newton's method are (``newton_bounds``). notes :
+    lines of a comment at the top.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def write(
     )
     lines += [
         f"{options(settings)} noopiter{newton_bounds(circuit, board, fidelity) if bounded else ''}",
-        f".save {voltages(circuit, stage=stage)}",
+        f".save {voltages(circuit, stage=stage, also=also)}",
         f".tran {literal(settings.max_step)} {literal(stop_time)} "
         f"{literal(kept_from) if kept_from else 0} {literal(settings.max_step)} uic",
         ".end",
@@ -341,10 +343,11 @@ def newton_bounds(circuit: Circuit, board: Board, fidelity: Fidelity) -> str:
     return f" convlimit convstep=1 convabsstep={literal(limit / open_loop_gain(board))}"
 
 
-def voltages(circuit: Circuit, *, stage: bool = True) -> str:
-    """The voltages that a run saves: states, outputs of the dead zones (``stage``), generator."""
+def voltages(circuit: Circuit, *, stage: bool = True, also: Sequence[str] = ()) -> str:
+    """The voltages that a run saves: states, outputs of the dead zones (``stage``), generator, and
+    other nets."""
     nets = circuit.outputs if stage else circuit.state_nets
-    return " ".join(f"v({net})" for net in (*nets, *circuit.generator_nets))
+    return " ".join(f"v({net})" for net in dict.fromkeys((*nets, *circuit.generator_nets, *also)))
 
 
 def title_line(text: str) -> str:

@@ -41,10 +41,12 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
+from designer.spice.opamp_model import LIMIT_RANGE
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import (
     BRIEF,
     STROBE_TOLERANCE,
+    LinearOutput,
     Read,
     Reading,
     clearance_rows,
@@ -256,21 +258,44 @@ def job(
         shift=subject.shift,
         clearances=clearance_rows(subject.system),
         generator=subject.circuit.generator.net,
+        outputs=linear_outputs(subject),
         keep=keep,
         brief=subject.brief and not subject.orbit.n,
     )
     # A period before the first strobe, for the points around it: a long way takes no memory.
     kept = 0.0 if whole else max(subject.discard - 1, 0) * subject.period
-    text = deck_of(subject, settings, (1.0 + nudge) * capacitors, stop, kept)
-    signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
+    also = [output.net for output in reading.outputs]
+    text = deck_of(subject, settings, (1.0 + nudge) * capacitors, stop, kept, also)
+    nets = (*subject.circuit.state_nets, subject.circuit.generator.net, *also)
+    signals = tuple(dict.fromkeys(nets))
     return SpiceJob(text, signals, stop, partial(read, reading=reading), patience=patience)
 
 
+def linear_outputs(subject: GateSubject) -> tuple[LinearOutput, ...]:
+    """The outputs that ought to be linear, and from where on they are not; none on ``full``, where
+    limits move with the current."""
+    if subject.fidelity == "full":
+        return ()
+    circuit, out = subject.circuit, []
+    for section in circuit.sections:
+        low, high = subject.board.rails[section.name]
+        low = -math.inf if circuit.may_limit(section, -1) else low + LIMIT_RANGE
+        high = math.inf if circuit.may_limit(section, 1) else high - LIMIT_RANGE
+        if math.isfinite(low) or math.isfinite(high):
+            out.append(LinearOutput(section.output, low, high))
+    return tuple(out)
+
+
 def deck_of(
-    subject: GateSubject, settings: SolverSettings, capacitors: Array, stop: float, kept: float
+    subject: GateSubject,
+    settings: SolverSettings,
+    capacitors: Array,
+    stop: float,
+    kept: float,
+    also: Sequence[str] = (),
 ) -> str:
     """The deck of a subject from capacitor voltages (states,) at t = 0 until ``stop`` [s]; what
-    comes before ``kept`` [s] is not stored."""
+    comes before ``kept`` [s] is not stored. also : nets that are, besides states and generator."""
     return deck.write(
         subject.circuit,
         subject.board,
@@ -282,6 +307,7 @@ def deck_of(
         fidelity=subject.fidelity,
         kept_from=kept,
         stage=False,
+        also=also,
         bounded=True,
     )
 

@@ -60,6 +60,18 @@ def clearance_rows(system: PiecewiseLinearSystem) -> tuple[ClearanceRows, ...]:
 
 
 @dataclass(frozen=True)
+class LinearOutput:
+    """An op-amp's output that ought to stay between its limits."""
+
+    net: str
+    """Net of the output."""
+    low: float
+    """Voltage [V] below which it is at a limit; -inf where it may be."""
+    high: float
+    """Voltage [V] above which it is at a limit; inf where it may be."""
+
+
+@dataclass(frozen=True)
 class Reading:
     """How to read a run."""
 
@@ -80,6 +92,8 @@ class Reading:
     brief: bool = False
     """Whether `BRIEF` periods may show that there is no period, instead of four times the longest;
     for a board that has none on the exact circuit."""
+    outputs: tuple[LinearOutput, ...] = ()
+    """Outputs that are looked at; beyond its limits one makes the orbit clipped."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +160,10 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
     impacts = _impacts(t, y, u, reading.clearances, inside, laps, first, n * reading.period)
     status, reason = OrbitStatus.PERIODIC, ""
     doubt = next((each.doubt for each in impacts if each.doubt), "")
-    if doubt:
-        status, reason = OrbitStatus.GRAZING, doubt
+    clipping = _clipping(waveforms, reading.outputs, first - slack, marks[-1] + slack)
+    if clipping or doubt:
+        status = OrbitStatus.CLIPPED if clipping else OrbitStatus.GRAZING
+        reason = clipping or doubt
     times = np.concatenate([np.zeros(0), *(each.times for each in impacts)])
     order = np.argsort(times, kind="stable")
     which = [np.full(len(each.times), k) for k, each in enumerate(impacts)]
@@ -199,6 +215,18 @@ class _Impacts:
     @property
     def pair(self) -> tuple[int, int]:
         return round(self.counts[1]), round(self.counts[-1])
+
+
+def _clipping(
+    waveforms: Waveforms, outputs: tuple[LinearOutput, ...], first: float, last: float
+) -> str:
+    """Which output is at a limit between two times; nothing where none is."""
+    inside = (waveforms.axis >= first) & (waveforms.axis <= last)
+    for output in outputs:
+        volts = waveforms.signals[output.net][inside]
+        if ((volts < output.low) | (volts > output.high)).any():
+            return f"the output at {output.net} is at its limit"
+    return ""
 
 
 def name_in_ngspice(response: str) -> str:

@@ -57,8 +57,9 @@ TANGENTS, CUTS = 12, 3
 """Tangents of it at the best point, at most; and at corners of each range of thresholds."""
 STEP = 1e-4
 """Of a logarithm: for the slope of a tangent."""
-TRIED, MOST_TRIED = 6, 30
-"""Choices of which a circuit is made, until one can be; with those whose offsets are too large."""
+TRIED, DECLINED, MOST_TRIED = 6, 12, 30
+"""Choices of which no circuit can be made, or not as it is meant, until the search ends; circuits
+that may be asked for; choices with those whose offsets are too large."""
 GOAL, ENOUGH = 0.1, 0.5
 """Of the resistors' grade: an error up to the first is worth nothing more; one up to the second is
 worth no lower thresholds."""
@@ -243,11 +244,10 @@ class ScaleChoice:
         of its candidate, or whose offsets are too large, comes last."""
         why = Shortfall("coefficients", False)
         worse: list[tuple[bool, float, ScaleAttempt]] = []
-        there = False
-        tried = 0
+        given = tried = 0
         best = self.box.best()
         for candidate in list(self._ranked())[:MOST_TRIED]:
-            if tried == TRIED:
+            if tried == TRIED or given == DECLINED:
                 break
             made = self.circuit_of(candidate)
             if isinstance(made, Shortfall):
@@ -257,14 +257,14 @@ class ScaleChoice:
             noisy = bool(self._over_limit(made.circuit, made.errors.scales.volts) > 0.0)
             error = made.errors.max_error
             as_meant = error <= max(self.goal, CLOSE * candidate.error)
-            tried += not noisy
             if as_meant and not noisy:
-                there = True
+                given += 1
                 yield own
             else:
+                tried += not noisy
                 worse.append((noisy, 0.0 if as_meant else error, own))
         yield from (own for *_, own in sorted(worse, key=lambda each: each[:2]))
-        if not (there or worse):
+        if not (given or worse):
             yield why
 
     def _descend(self, starts: Sequence[Array], seed: int) -> None:

@@ -16,14 +16,14 @@ from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 3,
-    "ngspice": 4,
+    "ngspice": 5,
     "tuned": 3,
     "reached": 3,
     "trimmed": 2,
     "blame": 2,
     "maps": 1,
     "rare": 6,
-    "checks": 1,
+    "checks": 2,
 }
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
 the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of

@@ -289,7 +289,7 @@ def _explain(answer: Answer, check: CrossCheck, question: Question, stayed: bool
     grazes = OrbitStatus.GRAZING in (answer.response, check.response)
     if grazes or min(answer.penetration, answer.miss) < STROBE_TOLERANCE * peak:
         return Explanation.GRAZING
-    if answer.response == OrbitStatus.CLIPPED:
+    if OrbitStatus.CLIPPED in (answer.response, check.response):
         return Explanation.CLIPPED
     if check.kind is StartKind.NOMINAL and stayed:
         return Explanation.BASIN

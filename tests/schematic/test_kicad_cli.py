@@ -195,7 +195,7 @@ def test_kicads_own_deck_shows_the_same_responses(tmp_path: Path) -> None:
             cir = deck.write(
                 made.design.circuit, nominal_board(made.design.circuit), answer.excitation,
                 answer.gate.settings, title="circuit.cir", stop_time=own.stop,
-                initial=answer.circuit.start,
+                initial=answer.circuit.start, also=own.signals,
             )  # fmt: skip
             texts = (cir, spice(folder))
             jobs += [SpiceJob(t, own.signals, own.stop, own.reduce) for t in texts]

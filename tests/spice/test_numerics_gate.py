@@ -11,6 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from designer.circuit.netlist import Excitation
+from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
@@ -129,6 +130,23 @@ def test_what_passes(passed: dict[int, GateResult], p: int) -> None:
     # Tighter where the orbit is slow: 1e-2 (1 - ρ).
     assert said["rms_bound"] == pytest.approx(min(2e-3, 1e-2 * (1.0 - who.orbit.radius)))
     assert said["steps_a_period"] == pytest.approx(who.period / result.settings.max_step)
+
+
+@pytest.mark.parametrize("net", ["v1", "v1n"])
+def test_ngspice_sees_an_op_amp_clip(pool: SpicePool, net: str) -> None:
+    """An integrator's, or an inverter's, limit is moved to just beyond what it needs, and to just
+    within: on the exact circuit's word."""
+    who = subject(1)
+    (name,) = (s.name for s in who.circuit.sections if s.output == net)
+    low, _ = who.board.rails[name]
+    for share, status in ((1.02, OrbitStatus.PERIODIC), (0.98, OrbitStatus.CLIPPED)):
+        rails = {**who.board.rails, name: (low, share * float(who.orbit.extremes[0, 1]))}
+        reduction = Reduction(who.circuit, replace(who.board, rails=rails))
+        orbit = settle(Flow(reduction.system(), who.excitation.drive), who.orbit.start)
+        assert orbit.status is status
+        clipping = replace(who, reduction=reduction, orbit=orbit)
+        found = heard(pool, clipping, SolverSettings("trap", who.period / 800.0, 1e-5))
+        assert found.response == orbit.response, found.reason
 
 
 @pytest.mark.parametrize("p", P)

@@ -22,6 +22,7 @@ from designer.spice.read_orbit import (
     BRIEF,
     ENGINE_ERROR,
     ClearanceRows,
+    LinearOutput,
     Read,
     Reading,
     clearance_rows,
@@ -216,6 +217,22 @@ def test_one_sided_clearance() -> None:
     full = reading_of(0.85)
     only = replace(full, clearances=(replace(full.clearances[0], lower=None),))
     assert read(waveforms(flow, orbit.start, 10), only).orbit.response == "1-2-0"
+
+
+def test_an_output_at_its_limit_makes_the_orbit_clipped() -> None:
+    """An inverter of the first state, read over the last laps alone."""
+    orbit, flow = orbit_at(0.85, 1), flow_at(0.85)
+    waves, reading = waveforms(flow, orbit.start, 10), reading_of(0.85)
+    volts = -waves.signals["v1"]
+    volts[waves.axis < 1.9 * reading.period] = 9.0  # on the way, which is not judged
+    signals = {**waves.signals, "inverted": volts}
+    low, high = -orbit.extremes[0, 1], -orbit.extremes[0, 0]
+    for scale, status in ((1.001, OrbitStatus.PERIODIC), (0.999, OrbitStatus.CLIPPED)):
+        for ends in ((scale * low, np.inf), (-np.inf, scale * high)):
+            output = LinearOutput("inverted", *ends)
+            got = read(replace(waves, signals=signals), replace(reading, outputs=(output,))).orbit
+            assert got.status is status
+            assert (got.n, got.p, got.q) == (orbit.n, orbit.p, orbit.q)
 
 
 def test_a_trace_is_kept_on_request_over_n_periods() -> None:

@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,7 +23,7 @@ from designer.jobs.export_job import deck_text
 from designer.model.find_responses import find
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, simulator_decks
-from designer.spice.read_orbit import Read
+from designer.spice.read_orbit import read
 from designer.spice.simulator import Waveforms
 from designer.spice.worker import open_simulator
 from tests.folders.test_stage_files import made
@@ -95,8 +95,10 @@ def named(name: str, number: int, found: Waveforms) -> str:
     reduction = nominal_reduction(whole.design)
     orbit = on_circuit(reduction.system(), whole.design, whole.model_responses[number - 1])
     subject = numerics_gate.GateSubject(reduction, run.excitation, orbit)
-    answer = numerics_gate.job(subject, run.settings).reduce(found)
-    assert isinstance(answer, Read)
+    reduce = numerics_gate.job(subject, run.settings).reduce
+    assert isinstance(reduce, partial)
+    # Of the op-amps' outputs these decks save the states alone.
+    answer = read(found, replace(reduce.keywords["reading"], outputs=()))
     assert answer.orbit.response == orbit.response
     return str(answer.orbit.response)
 

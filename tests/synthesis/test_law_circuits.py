@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.exact_records import drawn_records
-from benchmarks.stranger_systems import draw
+from benchmarks.stranger_systems import Family, draw
 from designer.base.errors import InputError
 from designer.catalog.parts_catalog import load_catalog
 from designer.check.coexistence import of_flow
@@ -80,11 +80,13 @@ def test_the_curve_of_a_law_is_that_of_the_board() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [11, 12, 16, 17, 19, 26])
-def test_drawn_systems_that_a_search_gave_up_on_have_circuits(number: int) -> None:
+@pytest.mark.parametrize(
+    ("family", "number"), [*(("laws", k) for k in (11, 12, 16, 17, 19, 26)), ("plain", 22)]
+)
+def test_drawn_systems_that_a_search_gave_up_on_have_circuits(family: Family, number: int) -> None:
     """Bends that no response reaches, bends between masses, a swing that was lowered in steps too
-    small: each of these was refused once."""
-    shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, "laws").text), jobs=2))
+    small: each of these was refused once. Of the last the first circuits show another response."""
+    shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, family).text), jobs=2))
 
 
 def test_a_swing_is_lowered_from_where_the_design_is() -> None:

@@ -132,7 +132,10 @@ def test_agreement_and_survival() -> None:
         assert replace(HEARD, response=said).agrees(BLANK) is False
         assert replace(HEARD, response=said).survives(question()) is False
     near = replace(HEARD, response="grazing")
-    assert near.agrees(BLANK) is False
+    assert near.agrees(BLANK) is None
+    assert near.agrees(replace(BLANK, response="grazing")) is True
+    for exact in ("clipped", "aperiodic"):
+        assert near.agrees(replace(BLANK, response=exact)) is False
     assert near.survives(question()) is None
     for either, shown in (
         ("1-1-1 or aperiodic", False),
@@ -147,6 +150,7 @@ def test_agreement_and_survival() -> None:
         ("1-2-2", "agreed"),
         ("1-1-1", "differed"),
         ("undecided", "undecided"),
+        ("grazing", "undecided"),
         ("failed", "failed"),
         ("not settled", "failed"),
     ):
