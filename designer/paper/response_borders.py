@@ -27,7 +27,7 @@ from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.windows import BranchWindow, window
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import settle
-from designer.folders.curve_store import curves_csv
+from designer.folders.sweep_tables import curves_csv
 from designer.model.swept_model import ModelSubject
 from designer.paper.dynamics_page import shown
 from designer.paper.report_files import README, make_report
