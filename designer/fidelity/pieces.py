@@ -110,8 +110,8 @@ def fidelities(
     """The inverse of ``fidelities_json``; numbers that are not finite come back as nan."""
     settings = piece["settings"]
     return (
-        tuple(_compared(row) for row in piece["rows"]),
-        _truth(piece["truth"]),
+        tuple(read_record(FidelityError, row, null=math.nan) for row in piece["rows"]),
+        read_record(Truth, piece["truth"], null=math.nan),
         None if settings is None else checked_record(SolverSettings, settings),
         _number(piece["seconds"]),
     )
@@ -120,31 +120,6 @@ def fidelities(
 def tally(piece: Mapping[str, Any]) -> Tally:
     """Counts of a piece of boards."""
     return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
-
-
-def _compared(row: Mapping[str, Any]) -> FidelityError:
-    return read_record(
-        FidelityError,
-        {
-            **row,
-            "seconds": _number(row["seconds"]),
-            "error": {of: _number(v) for of, v in row["error"].items()},
-            "velocity": {of: _number(v) for of, v in row["velocity"].items()},
-            "numerical": _number(row["numerical"]),
-            "convergence": _number(row["convergence"]),
-        },
-    )
-
-
-def _truth(piece: Mapping[str, Any]) -> Truth:
-    return read_record(
-        Truth,
-        {
-            **piece,
-            "error": _number(piece["error"]),
-            "velocity": _number(piece["velocity"]),
-        },
-    )
 
 
 def _number(value: float | None) -> float:
