@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import DRAWN_STARTS, SEED, at_least
-from designer.base.errors import InputError
+from designer.base.defaults import DRAWN_STARTS, SEED, check_count
 from designer.base.proportion import wilson
 from designer.dynamics import step_budget
 from designer.dynamics.attractors import mirrored_strobes, same, settle
@@ -106,9 +105,7 @@ def _reach(orbit: Orbit) -> tuple[float | None, float | None]:
 
 def check(starts: int) -> None:
     """Raises InputError for a number of starts that cannot be."""
-    at_least("--starts", starts, 0)
-    if starts > MOST_STARTS:
-        raise InputError(None, "--starts", starts, f"at most {MOST_STARTS}")
+    check_count("--starts", starts, 0, MOST_STARTS)
 
 
 def random_starts(box: Array, count: int, seed: int) -> Array:

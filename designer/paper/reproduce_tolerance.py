@@ -21,7 +21,7 @@ from typing import Any
 import pandas as pd
 
 from designer.base.atomic_write import write
-from designer.base.defaults import at_least, check_seed, cores
+from designer.base.defaults import check_count, check_seed, cores
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.catalog.parts_catalog import load_catalog
@@ -74,7 +74,7 @@ def reproduce(
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     for name, value in (("--samples", samples), ("--jobs", jobs)):
-        at_least(name, value, 1)
+        check_count(name, value, 1)
     check_seed(seed)
     store = CaseStore(out, FILES, resume=resume, note=progress.note)
     catalog = load_catalog()

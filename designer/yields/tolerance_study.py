@@ -14,7 +14,7 @@ from designer.base.defaults import (
     SEED as SEED,
     Over,
     StudyEngine,
-    at_least,
+    check_count,
     check_seed,
     cores,
 )
@@ -194,9 +194,9 @@ def tolerance(
         warm = warmed(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
-    at_least("--samples", samples, 1)
+    check_count("--samples", samples, 1)
     check_seed(seed)
-    at_least("--jobs", jobs, 1)
+    check_count("--jobs", jobs, 1)
     if rare:
         need_drawn_boards(synthesis.modelfile)
     pool = None if fidelity == "exact" else pool
