@@ -40,8 +40,8 @@ Swept = ModelSubject | BoardSubject
 
 @dataclass(frozen=True)
 class Request:
-    """What the verb is asked, by the names of its parameters, which say what each is. Numbers are in
-    the units that the swept parameter has, texts have a unit; None stands for the usual."""
+    """What the verb is asked, by the names of its parameters, which say what each is. Numbers are
+    in the units that the swept parameter has, texts have a unit; None stands for the usual."""
 
     over: str | None = None
     from_: float | str | None = None
