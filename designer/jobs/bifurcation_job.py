@@ -676,7 +676,7 @@ def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan) -> Made:
     assert isinstance(made, Basins)
     body |= {
         "at": made.plan.changes,
-        "attractors": [dict(a.__dict__) for a in made.attractors],
+        "attractors": made.attractors,
         "cells": [c.attractor for c in made.cells],
     }
     return body, {}, lambda: image_files(kind, bifurcation_plots.basins(made, work.title))
