@@ -83,6 +83,7 @@ def curves_csv(
         begun = c.begun_at and f"{c.begun_at.name} of curve {c.begun_at.curve}"
         head = {"curve": number, "response": c.response, "symmetric": c.symmetric}
         points = zip(c.points.tolist(), c.stable, strict=True)
+        shown: list[tuple[str, Any, bool | None]]
         shown = [(c.kind, values, stable) for values, stable in points]
         shown += [(met.name, met.values, None) for met in c.codimension_two]
         rows += [

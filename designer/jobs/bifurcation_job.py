@@ -17,7 +17,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress, quiet
+from designer.base.progress import Progress
 from designer.base.si_unit import Unit
 from designer.base.version import __version__
 from designer.bifurcations import (
@@ -81,7 +81,8 @@ if TYPE_CHECKING:
 
 Files = dict[str, str | bytes]
 """Contents of files by name."""
-Kept, PlanOf = TypeVar("Kept"), TypeVar("PlanOf")
+Kept = TypeVar("Kept")
+PlanOf = TypeVar("PlanOf")
 Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
 """What is in the JSON object, what it cost, and what makes the pictures and tables."""
 
@@ -96,7 +97,10 @@ def _blocks(plan: Plan, files: WorkFiles) -> Blocks[Any]:
 
 
 def _computed(
-    plan: Plan, jobs: int, store: BlockStore[Any] | None, step: Callable[[], None] = quiet
+    plan: Plan,
+    jobs: int,
+    store: BlockStore[Any] | None,
+    step: Callable[[], None] = lambda: None,
 ) -> Computed:
     """What a plan makes, or what of it the store has not."""
     if isinstance(plan, SweepPlan):
@@ -644,6 +648,7 @@ def _subject(
 
 def _names(work: BifurcationWork) -> list[str]:
     """Files of a stage."""
+    stores: list[tuple[Blocks[Any] | None, tuple[str, ...]]]
     stores = [(work.store(_blocks, work.plan), TABLES if isinstance(work.plan, SweepPlan) else ())]
     if work.shares is not None:
         stores.append((work.store(share_blocks, work.shares), ("shares.csv",)))

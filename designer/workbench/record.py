@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -106,7 +107,7 @@ class Record:
         """Means of so many neighbours: times since the first sample (m,) [s], voltages of channels
         (m, c) [V], and where one of the neighbours is cut off (m, c). most : of these means."""
 
-        def grouped(samples: Array) -> Array:
+        def grouped(samples: Array | Mask) -> Any:
             count = len(samples) // width
             return samples[: count * width].reshape(count, width)[:most]
 
