@@ -315,12 +315,12 @@ def test_lengths_and_speeds_are_read_in_their_units() -> None:
 @pytest.mark.parametrize(
     ("more", "option", "expected"),
     [
-        ({"over": "zeta", "low": "0.1 m", "high": 0.2}, "--from", "zeta has no unit"),
-        ({"over": "b", "low": 0.2, "high": "10 Hz"}, "--to", "in m"),
-        ({"low": 1.0, "high": "2 mm"}, "--to", "62.8 rad/s"),
-        ({"low": 1.0, "high": 2.0, "frequency": "10 Hz"}, "--frequency", "is swept"),
+        ({"over": "zeta", "from_": "0.1 m", "to": 0.2}, "--from", "zeta has no unit"),
+        ({"over": "b", "from_": 0.2, "to": "10 Hz"}, "--to", "in m"),
+        ({"from_": 1.0, "to": "2 mm"}, "--to", "62.8 rad/s"),
+        ({"from_": 1.0, "to": 2.0, "frequency": "10 Hz"}, "--frequency", "is swept"),
         (
-            {"over": "b", "low": 0.2, "high": 0.3, "frequency": "10 Hz", "omega": 1.0},
+            {"over": "b", "from_": 0.2, "to": 0.3, "frequency": "10 Hz", "omega": 1.0},
             "--frequency",
             "beside --omega",
         ),
