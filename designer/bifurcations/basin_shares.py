@@ -21,7 +21,7 @@ from designer.base.arrays import Array
 from designer.base.proportion import wilson
 from designer.base.threads import parallel
 from designer.bifurcations.attractor_list import AttractorList, MetAttractor
-from designer.bifurcations.block_store import BlockStore
+from designer.bifurcations.block_store import KeptBlocks
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.parameter_map import COURSE
 from designer.bifurcations.subject import Subject
@@ -163,7 +163,7 @@ class BasinShares:
 def run(
     plan: SharePlan,
     jobs: int = 1,
-    store: BlockStore[list[Step]] | None = None,
+    store: KeptBlocks[list[Step]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> BasinShares:
     """Count the starts, or what of them ``store`` has not; ``progress`` is called once a value."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.bifurcations.attractor_list import AttractorList
-from designer.bifurcations.block_store import BlockStore
+from designer.bifurcations.block_store import KeptBlocks
 from designer.bifurcations.parameter_map import COURSE, MapCell, cell_of, filled
 from designer.bifurcations.subject import Subject
 from designer.dynamics.steady_state import DrivenSystem, TransientSettings
@@ -89,7 +89,7 @@ class Basins:
 def run(
     plan: BasinPlan,
     jobs: int = 1,
-    store: BlockStore[list[MapCell]] | None = None,
+    store: KeptBlocks[list[MapCell]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Basins:
     """Make the basins, or what of them ``store`` has not; ``progress`` is called once a row."""

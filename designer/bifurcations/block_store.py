@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 Kept = TypeVar("Kept")
 
 
-class BlockStore(Protocol[Kept]):
+class KeptBlocks(Protocol[Kept]):
     """Blocks by their place in the work: a number, or a track with one."""
 
     def read(self, *place: Any) -> Kept | None:
@@ -19,7 +19,7 @@ class BlockStore(Protocol[Kept]):
 
 
 def stored(
-    store: BlockStore[Kept] | None,
+    store: KeptBlocks[Kept] | None,
     place: tuple[Any, ...],
     may_be: Callable[[Kept], bool],
     make: Callable[[], Kept],

@@ -15,7 +15,7 @@ import shapely
 from designer.base.arrays import Array
 from designer.base.defaults import CURVE_DEPTH
 from designer.base.threads import parallel
-from designer.bifurcations.block_store import BlockStore, stored
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.border_curve import (
     DEEPER,
     FOLLOWED,
@@ -70,7 +70,7 @@ def run(
     plan: CurvePlan,
     points: Sequence[Bifurcation],
     jobs: int = 1,
-    store: BlockStore[list[BorderCurve]] | None = None,
+    store: KeptBlocks[list[BorderCurve]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> list[BorderCurve]:
     """The curves through points of the sweep at which a stable orbit changes, each once; then those
@@ -102,7 +102,7 @@ def _level(
     depth: int,
     follow: Callable[[int], list[BorderCurve]],
     jobs: int,
-    store: BlockStore[list[BorderCurve]] | None,
+    store: KeptBlocks[list[BorderCurve]] | None,
     progress: Callable[[], None],
 ) -> list[BorderCurve]:
     """The curves of one depth, or what of them the store has not."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
-from designer.bifurcations.block_store import BlockStore, stored
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.subject import Subject
 from designer.dynamics.counts import Pairs
 from designer.dynamics.orbit import Motion, OrbitStatus
@@ -94,7 +94,7 @@ class ParameterMap:
 def run(
     plan: MapPlan,
     jobs: int = 1,
-    store: BlockStore[list[MapCell]] | None = None,
+    store: KeptBlocks[list[MapCell]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> ParameterMap:
     """Make the map, or what of it ``store`` has not; ``progress`` is called once a row."""
@@ -110,7 +110,7 @@ def filled(
     rows: int,
     subject: Subject,
     jobs: int,
-    store: BlockStore[list[MapCell]] | None,
+    store: KeptBlocks[list[MapCell]] | None,
     progress: Callable[[], None],
 ) -> tuple[MapCell, ...]:
     """The cells of a grid, row by row. row : makes one that ``store`` has not."""

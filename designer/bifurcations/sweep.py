@@ -17,7 +17,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
-from designer.bifurcations.block_store import BlockStore, stored
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.orbit_jumps import jumps
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
@@ -158,7 +158,7 @@ def from_starts(subject: Subject, changes: Sequence[Mapping[str, float]], count:
 def run(
     plan: SweepPlan,
     jobs: int = 1,
-    store: BlockStore[list[SteadyMotion]] | None = None,
+    store: KeptBlocks[list[SteadyMotion]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sweep:
     """Make the sweep, or what of it ``store`` has not: a block holds the steps of a track and of a

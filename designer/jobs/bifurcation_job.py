@@ -31,7 +31,7 @@ from designer.bifurcations import (
 )
 from designer.bifurcations.basin_shares import BasinShares, SharePlan
 from designer.bifurcations.basins import BasinPlan, Basins
-from designer.bifurcations.block_store import BlockStore
+from designer.bifurcations.block_store import KeptBlocks
 from designer.bifurcations.border_curve import BorderCurve
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan, ParameterMap
@@ -99,7 +99,7 @@ def _blocks(plan: Plan, files: WorkFiles) -> Blocks[Any]:
 def _computed(
     plan: Plan,
     jobs: int,
-    store: BlockStore[Any] | None,
+    store: KeptBlocks[Any] | None,
     step: Callable[[], None] = lambda: None,
 ) -> Computed:
     """What a plan makes, or what of it the store has not."""
