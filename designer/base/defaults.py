@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import Literal, get_args
 
@@ -45,14 +46,14 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def at_least(name: str, value: int, least: int) -> None:
-    """InputError unless an option is large enough."""
-    if value < least:
+def check_count(name: str, value: int | None, least: int, most: float = math.inf) -> None:
+    """InputError for an option that is stated, and is too small or too large."""
+    if value is not None and value < least:
         raise InputError(None, name, value, f"a whole number >= {least}")
+    if value is not None and value > most:
+        raise InputError(None, name, value, f"at most {most}")
 
 
 def check_seed(seed: int) -> None:
     """InputError unless an option is a seed."""
-    at_least("--seed", seed, 0)
-    if seed > MOST_SEED:
-        raise InputError(None, "--seed", seed, f"at most {MOST_SEED}")
+    check_count("--seed", seed, 0, MOST_SEED)

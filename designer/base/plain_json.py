@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ def dumps(value: object, *, indent: int | None = 2) -> str:
 
 
 def plain(value: object) -> Any:
-    """The value in dicts, lists, str, int, bool, finite float and None."""
+    """The value in dicts, lists, str, int, bool, finite float and None; a record by its fields."""
     if value is None or isinstance(value, bool | np.bool_):
         return None if value is None else bool(value)
     if isinstance(value, str):
@@ -36,4 +37,6 @@ def plain(value: object) -> Any:
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray | Sequence):
         return [plain(v) for v in value]
+    if is_dataclass(value):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
     raise TypeError(f"{type(value).__name__} has no JSON form")

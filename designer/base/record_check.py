@@ -21,28 +21,36 @@ _KINDS = {"f": "fiu", "i": "iu", "u": "iu", "c": "cfiu", "b": "b"}
 _hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
-def read_record(kind: type[Record], row: Mapping[str, Any]) -> Record:
+def read_record(kind: type[Record], row: Mapping[str, Any], *, null: float | None = None) -> Record:
     """The record of a dataclass from what JSON and Parquet hold of it: a text for an enumeration,
     a list for a tuple or an array, a mapping for a record.
+
+    null : what a missing number stands for where its field has to have one, such as nan in JSON,
+    which has none.
 
     Raises
     ------
     TypeError, ValueError : a value is not of its field's type, is missing, or has no field.
     """
     hints = _hints(kind)
-    return checked_record(kind, {name: _read(v, hints.get(name)) for name, v in row.items()})
+    values = {name: _read(v, hints.get(name), null) for name, v in row.items()}
+    return checked_record(kind, values)
 
 
-def _read(value: object, kind: Any) -> Any:
+def _read(value: object, kind: Any, null: float | None) -> Any:
     """A value as its annotation has it; as it is where that says nothing of it."""
-    if value is None or isinstance(value, int | float):
+    if value is None:
+        return null if kind is float else None
+    if isinstance(value, int | float):
         return value
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
-        return _read(value, inner[0])
+        return _read(value, inner[0], null)
     if origin is tuple and isinstance(value, list):
         each = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
-        return tuple(_read(v, k) for v, k in zip(value, each, strict=True))
+        return tuple(_read(v, k, null) for v, k in zip(value, each, strict=True))
+    if origin is Mapping and isinstance(value, Mapping):
+        return {key: _read(v, inner[1], null) for key, v in value.items()}
     if origin is np.ndarray and isinstance(value, list):
         array = np.array(value)  # with something else in it than numbers it fits no annotation
         return array.astype(float) if array.dtype.kind in "iu" else array
@@ -50,7 +58,7 @@ def _read(value: object, kind: Any) -> Any:
         if issubclass(kind, Enum):
             return kind(value)
         if isinstance(value, Mapping) and is_dataclass(kind):
-            return read_record(kind, value)
+            return read_record(kind, value, null=null)
     return value
 
 

@@ -20,6 +20,9 @@ from .basins import (
     BasinPlan as BasinPlan,
     Basins as Basins,
 )
+from .block_store import (
+    KeptBlocks as KeptBlocks,
+)
 from .border_curve import (
     BorderCurve as BorderCurve,
     CurveMeeting as CurveMeeting,

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from designer.base.arrays import Array
 from designer.base.proportion import wilson
 from designer.base.threads import parallel
 from designer.bifurcations.attractor_list import AttractorList, MetAttractor
+from designer.bifurcations.block_store import KeptBlocks
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.parameter_map import COURSE
 from designer.bifurcations.subject import Subject
@@ -159,20 +160,10 @@ class BasinShares:
         }
 
 
-class ShareStore(Protocol):
-    """Where finished blocks are kept."""
-
-    def read(self, block: int) -> list[Step] | None:
-        """The steps of a block; None where there is none."""
-
-    def write(self, block: int, values: Sequence[float], steps: Sequence[Step]) -> None:
-        """Keep a finished block."""
-
-
 def run(
     plan: SharePlan,
     jobs: int = 1,
-    store: ShareStore | None = None,
+    store: KeptBlocks[list[Step]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> BasinShares:
     """Count the starts, or what of them ``store`` has not; ``progress`` is called once a value."""
@@ -198,7 +189,7 @@ def run(
             met = islice(counted, len(block))
             steps = [lineage.step(v, *m) for v, m in zip(block.tolist(), met, strict=True)]
             if store is not None:
-                store.write(k, block.tolist(), steps)
+                store.write(steps, k)
         else:
             lineage.take(float(block[-1]), steps)
             for _ in block:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.threads import parallel
 from designer.bifurcations.attractor_list import AttractorList
-from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of, may_be
+from designer.bifurcations.block_store import KeptBlocks
+from designer.bifurcations.parameter_map import COURSE, MapCell, cell_of, filled
 from designer.bifurcations.subject import Subject
 from designer.dynamics.steady_state import DrivenSystem, TransientSettings
 
@@ -89,29 +89,23 @@ class Basins:
 def run(
     plan: BasinPlan,
     jobs: int = 1,
-    store: CellStore | None = None,
+    store: KeptBlocks[list[MapCell]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Basins:
     """Make the basins, or what of them ``store`` has not; ``progress`` is called once a row."""
     (setting,) = plan.subject.settings([plan.changes])
 
     def row(i: int) -> list[MapCell]:
-        cells = None if store is None else store.read(i)
-        if cells is None or not all(may_be(cell, plan.subject) for cell in cells):
-            cells = [
-                cell_of(i, j, setting.steady(plan.state(i, j), plan.course))
-                for j in range(len(plan.xs))
-            ]
-            if store is not None:
-                store.write(i, cells)
-        progress()
-        return cells
+        return [
+            cell_of(i, j, setting.steady(plan.state(i, j), plan.course))
+            for j in range(len(plan.xs))
+        ]
 
-    rows = parallel(row, range(len(plan.ys)), jobs)
-    return _named(plan, setting, [cell for cells in rows for cell in cells])
+    cells = filled(row, len(plan.ys), plan.subject, jobs, store, progress)
+    return _named(plan, setting, cells)
 
 
-def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basins:
+def _named(plan: BasinPlan, setting: DrivenSystem, cells: Sequence[MapCell]) -> Basins:
     """Number the attractors: one orbit, whichever of its strobes a start came to."""
     met = AttractorList(setting.flow(), plan.subject.weights)
     numbers = np.array([met.number(c, c.symmetric, np.array(c.strobe)) for c in cells])

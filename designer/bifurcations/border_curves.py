@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import shapely
@@ -15,6 +15,7 @@ import shapely
 from designer.base.arrays import Array
 from designer.base.defaults import CURVE_DEPTH
 from designer.base.threads import parallel
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.border_curve import (
     DEEPER,
     FOLLOWED,
@@ -40,16 +41,6 @@ SAME = 1e-6
 """Distance in widths of the window: a point this near to a curve of its kind lies on it."""
 BESIDE = 1e-3
 """The same distance, from the straight way between two points of a curve."""
-
-
-class CurveStore(Protocol):
-    """Where finished curves are kept."""
-
-    def read(self, block: int) -> list[BorderCurve] | None:
-        """The curves of a block; None where there is none."""
-
-    def write(self, block: int, curves: Sequence[BorderCurve]) -> None:
-        """Keep a finished block."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +70,7 @@ def run(
     plan: CurvePlan,
     points: Sequence[Bifurcation],
     jobs: int = 1,
-    store: CurveStore | None = None,
+    store: KeptBlocks[list[BorderCurve]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> list[BorderCurve]:
     """The curves through points of the sweep at which a stable orbit changes, each once; then those
@@ -111,18 +102,17 @@ def _level(
     depth: int,
     follow: Callable[[int], list[BorderCurve]],
     jobs: int,
-    store: CurveStore | None,
+    store: KeptBlocks[list[BorderCurve]] | None,
     progress: Callable[[], None],
 ) -> list[BorderCurve]:
     """The curves of one depth, or what of them the store has not."""
 
+    def may_be(curves: list[BorderCurve]) -> bool:
+        return all(_may_be(curve, plan.subject) for curve in curves)
+
     def block(number: int) -> list[BorderCurve]:
         place = depth * BLOCKS + number
-        curves = None if store is None else store.read(place)
-        if curves is None or not all(_may_be(curve, plan.subject) for curve in curves):
-            curves = follow(number)
-            if store is not None:
-                store.write(place, curves)
+        curves = stored(store, (place,), may_be, lambda: follow(number))
         progress()
         return curves
 

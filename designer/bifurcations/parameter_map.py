@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.subject import Subject
 from designer.dynamics.counts import Pairs
 from designer.dynamics.orbit import Motion, OrbitStatus
@@ -39,16 +40,6 @@ class MapCell(Motion):
     attractor: int = 0
     """Its number in a basin, 0 in a map."""
     more: Pairs = ()
-
-
-class CellStore(Protocol):
-    """Where finished rows of a grid are kept."""
-
-    def read(self, row: int) -> list[MapCell] | None:
-        """The cells of a row; None where there is none."""
-
-    def write(self, row: int, cells: list[MapCell]) -> None:
-        """Keep a finished row."""
 
 
 @dataclass(frozen=True)
@@ -103,27 +94,36 @@ class ParameterMap:
 def run(
     plan: MapPlan,
     jobs: int = 1,
-    store: CellStore | None = None,
+    store: KeptBlocks[list[MapCell]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> ParameterMap:
     """Make the map, or what of it ``store`` has not; ``progress`` is called once a row."""
 
     def row(i: int) -> list[MapCell]:
-        cells = None if store is None else store.read(i)
-        if cells is None or not all(may_be(cell, plan.subject) for cell in cells):
-            cells = list(cells_at(plan, [(i, j) for j in range(len(plan.xs))]))
-            if store is not None:
-                store.write(i, cells)
+        return list(cells_at(plan, [(i, j) for j in range(len(plan.xs))]))
+
+    return ParameterMap(plan, filled(row, len(plan.ys), plan.subject, jobs, store, progress))
+
+
+def filled(
+    row: Callable[[int], list[MapCell]],
+    rows: int,
+    subject: Subject,
+    jobs: int,
+    store: KeptBlocks[list[MapCell]] | None,
+    progress: Callable[[], None],
+) -> tuple[MapCell, ...]:
+    """The cells of a grid, row by row. row : makes one that ``store`` has not."""
+
+    def may_be(cells: list[MapCell]) -> bool:
+        return all(c.countable and len(c.strobe) == len(subject.states) for c in cells)
+
+    def kept(i: int) -> list[MapCell]:
+        cells = stored(store, (i,), may_be, lambda: row(i))
         progress()
         return cells
 
-    rows = parallel(row, range(len(plan.ys)), jobs)
-    return ParameterMap(plan, tuple(cell for cells in rows for cell in cells))
-
-
-def may_be(cell: MapCell, subject: Subject) -> bool:
-    """Whether a stored cell is of this system."""
-    return cell.countable and len(cell.strobe) == len(subject.states)
+    return tuple(cell for cells in parallel(kept, range(rows), jobs) for cell in cells)
 
 
 def cells_at(

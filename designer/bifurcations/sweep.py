@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Protocol
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
+from designer.bifurcations.block_store import KeptBlocks, stored
 from designer.bifurcations.orbit_jumps import jumps
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
@@ -30,18 +31,6 @@ KICK = 1e-6
 each step. A state that is symmetric to the last digit would stay on a symmetric orbit long after
 that lost its stability; which twin it leaves for is decided here."""
 DOWN, UP = "down", "up"
-
-
-class Store(Protocol):
-    """Where finished blocks are kept."""
-
-    def read(self, track: str, block: int) -> list[SteadyMotion] | None:
-        """The steps of a block, in the order they were made; None where there is none."""
-
-    def write(
-        self, track: str, block: int, values: Sequence[float], steps: list[SteadyMotion]
-    ) -> None:
-        """Keep a finished block."""
 
 
 @dataclass(frozen=True)
@@ -169,10 +158,11 @@ def from_starts(subject: Subject, changes: Sequence[Mapping[str, float]], count:
 def run(
     plan: SweepPlan,
     jobs: int = 1,
-    store: Store | None = None,
+    store: KeptBlocks[list[SteadyMotion]] | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sweep:
-    """Make the sweep, or what of it ``store`` has not.
+    """Make the sweep, or what of it ``store`` has not: a block holds the steps of a track and of a
+    number in the order in which they are made.
 
     ``progress`` is called once a block.
 
@@ -189,14 +179,12 @@ def run(
         out, x = [], np.zeros(len(plan.subject.states))
         for track, number in task:
             block = plan.blocks(track)[number]
-            steps = None if store is None else store.read(track, number)
-            if steps is None or not _may_be(steps, plan, block):
-                if plan.followed:
-                    steps = _followed(plan, block, x)
-                else:
-                    steps = _fixed(plan, block, plan.starts[int(track.split()[1])])
-                if store is not None:
-                    store.write(track, number, [float(v) for v in block], steps)
+            if plan.followed:
+                make = partial(_followed, plan, block, x)
+            else:
+                make = partial(_fixed, plan, block, plan.starts[int(track.split()[1])])
+            may_be = partial(_may_be, plan=plan, block=block)
+            steps = stored(store, (track, number), may_be, make)
             x = next_start(steps[-1], plan.subject.weights)
             out.append((track, steps))
             progress()

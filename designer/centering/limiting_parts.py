@@ -13,7 +13,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -56,10 +55,6 @@ class Limiting:
     shares: dict[str, float]
     """Shares of the border's variance, by what moves it; see ``shares``."""
     line: str
-
-    def as_dict(self) -> dict[str, Any]:
-        """The record as plain data for JSON."""
-        return dict(self.__dict__)
 
 
 def limitings(

@@ -245,19 +245,9 @@ class MeasuredYield:
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         low, high = self.interval
-        y, rare = self.counts, self.rare
-        more = {} if rare is None else {"rare": asdict(rare)}
-        return {
-            "ok": y.ok,
-            "lost": y.lost,
-            "grazing": y.grazing,
-            "failed": y.failed,
-            "samples": y.samples,
-            "rate": y.rate if rare is None else self.rate,
-            "low": low,
-            "high": high,
-            **more,
-        }
+        more = {} if self.rare is None else {"rare": asdict(self.rare)}
+        rate = self.counts.rate if self.rare is None else self.rate
+        return {**self.counts.counts, "rate": rate, "low": low, "high": high, **more}
 
 
 def is_rare(target: float) -> bool:

@@ -15,15 +15,12 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import DRAWN_STARTS, SEED, at_least
-from designer.base.errors import InputError
+from designer.base.defaults import DRAWN_STARTS, SEED, check_count
 from designer.base.proportion import wilson
-from designer.dynamics import step_budget
-from designer.dynamics.attractors import mirrored_strobes, same, settle
-from designer.dynamics.coexisting_attractors import outlived
+from designer.dynamics.attractors import mirrored_strobes, same
+from designer.dynamics.coexisting_attractors import outlived, settled
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
-from designer.dynamics.step_budget import Budget
 from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse, scale_of
 from designer.model.mechanics import MechanicalModel, state_names
@@ -106,9 +103,7 @@ def _reach(orbit: Orbit) -> tuple[float | None, float | None]:
 
 def check(starts: int) -> None:
     """Raises InputError for a number of starts that cannot be."""
-    at_least("--starts", starts, 0)
-    if starts > MOST_STARTS:
-        raise InputError(None, "--starts", starts, f"at most {MOST_STARTS}")
+    check_count("--starts", starts, 0, MOST_STARTS)
 
 
 def random_starts(box: Array, count: int, seed: int) -> Array:
@@ -186,14 +181,7 @@ class _Tally:
     def take(self, states: Array) -> tuple[int, int]:
         """Settle these starts while there are steps left; returns how many were run, and how many
         of them lead to no attractor."""
-        left, unsettled = float(step_budget.STARTS), 0
-        met: list[Orbit] = []
-        for x in states:
-            if left <= 0.0:
-                break
-            budget = Budget(min(step_budget.SETTLING, left))
-            met.append(settle(self._flow, x, budget=budget, watch=0))
-            left -= budget.spent
+        met, unsettled = settled(self._flow, states), 0
         new = all(orbit.status is not OrbitStatus.APERIODIC for orbit in self._orbits)
         for orbit in outlived(self._flow, met, measure=new):
             if orbit.status not in ANSWERS:

@@ -21,6 +21,7 @@ from .attractors import (
 from .coexisting_attractors import (
     coexisting as coexisting,
     outlived as outlived,
+    settled as settled,
 )
 from .continued_orbit import (
     ContinuedOrbit as ContinuedOrbit,

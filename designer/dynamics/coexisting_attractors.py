@@ -34,6 +34,15 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
     Starts that are left when ``step_budget.STARTS`` steps are spent are not run. Mirror twins
     count as one; aperiodic ones are not told apart, nor are quasi-periodic ones.
     """
+    attractors: list[Orbit] = []
+    for orbit in outlived(flow, settled(flow, states)):
+        if not any(same(flow, orbit, other) for other in attractors):
+            attractors.append(orbit)
+    return attractors
+
+
+def settled(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
+    """Where these starts settle, as far as ``step_budget.STARTS`` steps carry."""
     orbits: list[Orbit] = []
     left = float(step_budget.STARTS)
     for x in states:
@@ -42,11 +51,7 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
         budget = Budget(min(step_budget.SETTLING, left))
         orbits.append(settle(flow, np.asarray(x, dtype=float), budget=budget, watch=0))
         left -= budget.spent
-    attractors: list[Orbit] = []
-    for orbit in outlived(flow, orbits):
-        if not any(same(flow, orbit, other) for other in attractors):
-            attractors.append(orbit)
-    return attractors
+    return orbits
 
 
 def outlived(flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False) -> list[Orbit]:

@@ -112,8 +112,8 @@ def fidelities(
     """The inverse of ``fidelities_json``; numbers that are not finite come back as nan."""
     settings = piece["settings"]
     return (
-        tuple(read_record(FidelityError, _numbers(row)) for row in piece["rows"]),
-        read_record(Truth, _numbers(piece["truth"])),
+        tuple(read_record(FidelityError, row, null=math.nan) for row in piece["rows"]),
+        read_record(Truth, piece["truth"], null=math.nan),
         None if settings is None else checked_record(SolverSettings, settings),
         _number(piece["seconds"]),
     )
@@ -122,16 +122,6 @@ def fidelities(
 def tally(piece: Mapping[str, Any]) -> Tally:
     """Counts of a piece of boards."""
     return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
-
-
-def _numbers(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row with nan where JSON has none for a number."""
-    out = dict(row)
-    for name in _NUMBERS & row.keys():
-        value = row[name]
-        each = isinstance(value, Mapping)
-        out[name] = {of: _number(v) for of, v in value.items()} if each else _number(value)
-    return out
 
 
 def _number(value: float | None) -> float:

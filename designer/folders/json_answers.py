@@ -63,7 +63,7 @@ def synthesis_json(
         **({"better_grades": _plain_grades(better_grades)} if better_grades else {}),
         "errors": errors.errors,
         "max_error": errors.max_error,
-        "certificate": dict(design.certificate.__dict__),
+        "certificate": design.certificate,
         "scales": {
             "seconds": errors.scales.seconds,
             "volts": _by_state(errors.scales.volts),
@@ -230,7 +230,7 @@ def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:
     held = simulated.sticking[number] if simulated.sticking else ()
     if held is None:
         return {"sticking": None}
-    return {"sticking": [each.as_dict() for each in held]} if held else {}
+    return {"sticking": held} if held else {}
 
 
 def _by_state(values: Array) -> dict[str, Any]:
@@ -304,7 +304,7 @@ def _conditions(design: Design) -> dict[str, Any]:
     """Limits by name; what the finished circuit has; which conditions are near, which cost."""
     return {
         **design.conditions,
-        "checked": [dict(check.__dict__) for check in design.checks],
+        "checked": design.checks,
         "at_limit": sorted({check.name for check in design.checks if check.at_limit}),
         "binding": dict(design.binding),
     }

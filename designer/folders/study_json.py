@@ -113,16 +113,8 @@ def _yield(counted: Yield | None) -> dict[str, Any] | None:
     if counted is None:
         return None
     low, high = counted.interval
-    return {
-        "ok": counted.ok,
-        "lost": counted.lost,
-        "grazing": counted.grazing,
-        "failed": counted.failed,
-        "samples": counted.samples,
-        "low": low,
-        "high": high,
-        **({"census": True} if counted.census else {}),
-    }
+    more = {"census": True} if counted.census else {}
+    return {**counted.counts, "low": low, "high": high, **more}
 
 
 def tuned_json(rows: Sequence[Tuned], census: bool = False) -> dict[str, Any] | None:
@@ -247,7 +239,7 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
             }
             for s in both.strata
         ],
-        "differences": [dict(d.__dict__) for d in both.differences],
+        "differences": both.differences,
     }
 
 

@@ -17,7 +17,7 @@ from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.study_identity import attribution_hash, study_hash
-from designer.yields.tolerance_study import Stores
+from designer.yields.tolerance_study import LongWork, Stores
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
 TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
@@ -93,24 +93,13 @@ class FolderStores(Stores):
             self._guard()
             self._cache.put("blame", attribution_hash(plan), replace(attribution, seconds=0.0))
 
-    def attribution_parts(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(attribution_hash(plan))
-
-    def maps(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(study_hash(plan, "maps"))
-
-    def rare(self, plan: StudyPlan) -> StoredParts:
-        if self._cache is None:
+    def parts(self, work: LongWork, plan: StudyPlan) -> StoredParts:
+        file = self._cache if work == "rare" else self._pieces
+        if file is None:
             return StoredParts()
-        return _FolderPieces(self._cache, study_hash(plan, "rare"), self._guard)
-
-    def rare_answers(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(study_hash(plan, "rare"))
-
-    def _pieces_of(self, key: str) -> StoredParts:
-        if self._pieces is None:
-            return StoredParts()
-        return _FolderPieces(self._pieces, key, self._guard)
+        layer = work.removesuffix(" answers")
+        key = attribution_hash(plan) if layer == "attribution" else study_hash(plan, layer)
+        return _FolderPieces(file, key, self._guard)
 
     @property
     def names(self) -> Iterable[str]:

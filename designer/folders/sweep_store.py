@@ -1,27 +1,41 @@
-"""Steps of a sweep, and cells of a map or a basin, on disk (``work_files``)."""
+"""The finished blocks of sweeps, maps, basins, counted basins and curves in a folder, as Parquet.
+
+Every file says which work it belongs to and carries the provenance; it appears whole or not at
+all, and one that was damaged since is not taken (``base.keyed_store``).
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import pyarrow as pa
 
-from designer.base.arrays import Array
+from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody
 from designer.base.parquet_entry import ParquetCodec, Rows, columns_of
-from designer.base.record_check import read_record
-from designer.bifurcations.parameter_map import MapCell
-from designer.bifurcations.sweep import BLOCK, Sweep
+from designer.base.progress import quiet
+from designer.base.record_check import Record, read_record
+from designer.bifurcations.basin_shares import AttractorShare, SharePlan, Step
+from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.border_curve import BorderCurve, CurveMeeting, CurveOrigin, read_curve
+from designer.bifurcations.border_curves import BLOCKS, CurvePlan
+from designer.bifurcations.curve_switch import OtherCurve
+from designer.bifurcations.grazing_contact import GrazingContact
+from designer.bifurcations.parameter_map import MapCell, MapPlan
+from designer.bifurcations.sweep import BLOCK, Sweep, SweepPlan
 from designer.dynamics.orbit import Motion
 from designer.dynamics.steady_state import SteadyMotion
-from designer.folders.work_files import WorkFiles
 
+FORMAT = 1
 RULES = 4
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
+Kept = TypeVar("Kept")
+Place = tuple[Any, ...]
+"""Of a block in its work: a number, or a track and a number."""
 _STEP = columns_of(
     SteadyMotion,
     "status n p q symmetric lyapunov lyapunov_error radius start end minima velocities "
@@ -32,12 +46,123 @@ _MORE = pa.schema(columns_of(MapCell, ["more"]))
 """The column of systems with more clearances than one."""
 _FURTHER = pa.schema(columns_of(SteadyMotion, ["more", "further"]))
 """The same, and the column of sweeps that show more stops than one."""
+_SHARE = columns_of(
+    AttractorShare, "attractor status n p q more symmetric twin count strobes".split()
+)
+_TOUCH = [
+    *columns_of(GrazingContact, "clearance side tip".split()),
+    *columns_of(OtherCurve, "phase size".split()),
+]
+_OTHER = [
+    *columns_of(OtherCurve, "kind n state stable".split()),
+    pa.field("touch", pa.struct(_TOUCH)),
+]
+_KIND, _VALUES = pa.field("kind", pa.string()), *columns_of(CurveMeeting, ["values"])
+_MEETING = pa.struct([_KIND, _VALUES, pa.field("other", pa.struct(_OTHER))])
+_ORIGIN = pa.struct([*columns_of(CurveOrigin, ["curve"]), _KIND, _VALUES])
+_CURVE = [
+    *columns_of(BorderCurve, "kind response symmetric".split()),
+    pa.field("points", pa.list_(pa.list_(pa.float64()))),
+    *columns_of(BorderCurve, "stable ends".split()),
+    pa.field("codimension_two", pa.list_(_MEETING)),
+    pa.field("begun_at", _ORIGIN),
+]
 
 
 def work_hash(settings: Mapping[str, Any]) -> str:
     """Hash of what decides a result."""
     text = json.dumps({"rules": RULES, **settings}, sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+@dataclass(frozen=True)
+class WorkFiles:
+    """Where the blocks of one work lie, and what each of them says."""
+
+    root: Path
+    """Folder that they lie in."""
+    work: str
+    """Hash of what decides the work."""
+    provenance: Mapping[str, Any]
+    """Versions, seed and settings, which go into every file."""
+    note: Note = quiet
+    """Is told of entries that are not taken."""
+    vouch: Vouch = nobody
+    """Asked about entries without a seal."""
+    noted: set[str] = field(default_factory=set)
+    """Names of blocks that ``note`` was told of."""
+
+
+@dataclass(frozen=True)
+class Blocks(Generic[Kept]):
+    """The blocks of a plan in a folder (``bifurcations.block_store``)."""
+
+    files: WorkFiles
+    """Where they lie."""
+    file: str
+    """Name of a block's file, inside the folder, with its place left open."""
+    places: Sequence[Place]
+    """Of all blocks."""
+    codec: ParquetCodec
+    """How a block is written."""
+    rows: Callable[[Kept, Place], Rows]
+    """The rows of a block."""
+    make: Callable[[Rows, Place], Kept]
+    """The block of these rows, as of ``KeyedStore.read_as``."""
+    words: tuple[str, ...] = ("block",)
+    """What a file calls the parts of its place."""
+
+    @property
+    def names(self) -> list[str]:
+        """File names of all blocks."""
+        return [self.name(*place) for place in self.places]
+
+    def name(self, *place: Any) -> str:
+        """File name of a block."""
+        return self.file.format(*place).replace(" ", "-")
+
+    def read(self, *place: Any) -> Kept | None:
+        """A finished block of this very work, or None."""
+        key, make = self._key(place), lambda rows: self.make(rows, place)
+        return self._store.read_as(self.name(*place), key, make)
+
+    def write(self, block: Kept, *place: Any) -> None:
+        """Keep a finished block.
+
+        Raises
+        ------
+        InputError : it cannot be written.
+        """
+        more = {"provenance": self.files.provenance}
+        self._store.write(self.name(*place), self._key(place), self.rows(block, place), more)
+
+    @property
+    def _store(self) -> KeyedStore[Rows]:
+        files = self.files
+        return KeyedStore(files.root, self.codec, files.note, files.vouch, noted=files.noted)
+
+    def _key(self, place: Place) -> dict[str, Any]:
+        named = zip(self.words, place, strict=True)
+        return {"format": FORMAT, "work": self.files.work, **dict(named)}
+
+
+def sweep_blocks(plan: SweepPlan, files: WorkFiles) -> Blocks[list[SteadyMotion]]:
+    """Steps of a sweep in the order in which they are made."""
+    name = plan.parameter
+
+    def rows(steps: Sequence[SteadyMotion], place: Place) -> Rows:
+        track, block = place
+        return _steps(name, track, plan.blocks(track)[block].tolist(), steps)
+
+    return Blocks(
+        files,
+        "sweep.parquet/{}-{:06d}.parquet",
+        [(track, k) for track in plan.tracks for k in range(len(plan.blocks(track)))],
+        _sweep_codec(name, BLOCK),
+        rows,
+        lambda rows, _: [_record(SteadyMotion, row, "track", name) for row in rows],
+        ("track", "block"),
+    )
 
 
 def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None:
@@ -48,14 +173,12 @@ def write_sweep(path: Path, sweep: Sweep, provenance: Mapping[str, Any]) -> None
     ------
     InputError : it cannot be written.
     """
-    parameter = sweep.plan.parameter
-    rows = [
-        row
-        for track, steps in sweep.steps.items()
-        for row in _rows(parameter, track, [float(v) for v in sweep.plan.values], steps)
-    ]
-    files = WorkFiles(path.parent, work_hash(sweep.plan.as_dict()), provenance)
-    files.write(path.name, _sweep_codec(parameter, len(rows)), rows)
+    name, values = sweep.plan.parameter, sweep.plan.values.tolist()
+    each = (_steps(name, track, values, steps) for track, steps in sweep.steps.items())
+    rows = [row for track in each for row in track]
+    store = KeyedStore(path.parent, _sweep_codec(name, len(rows)))
+    key = {"format": FORMAT, "work": work_hash(sweep.plan.as_dict())}
+    store.write(path.name, key, rows, {"provenance": provenance})
 
 
 def _sweep_codec(parameter: str, most: int) -> ParquetCodec:
@@ -63,100 +186,69 @@ def _sweep_codec(parameter: str, most: int) -> ParquetCodec:
     return ParquetCodec(schema, _FURTHER, most)
 
 
-def _rows(
-    parameter: str, track: str, values: Sequence[float], steps: Sequence[SteadyMotion]
-) -> list[dict[str, Any]]:
-    return [
-        {"track": track, parameter: v, **_columns(s)} for v, s in zip(values, steps, strict=True)
-    ]
+def _steps(
+    parameter: str, track: str, values: Iterable[float], steps: Sequence[SteadyMotion]
+) -> Rows:
+    pairs = zip(values, steps, strict=True)
+    return [{"track": track, parameter: value, **_columns(step)} for value, step in pairs]
 
 
 def _columns(motion: Motion) -> dict[str, Any]:
     return {**motion.__dict__, "status": str(motion.status)}
 
 
-@dataclass(frozen=True)
-class SweepStore:
-    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in a folder."""
+def _record(kind: type[Record], row: Mapping[str, Any], *places: str) -> Record:
+    """A record from a row that says its places too."""
+    return read_record(kind, {name: value for name, value in row.items() if name not in places})
 
-    files: WorkFiles
-    """Where the blocks lie."""
-    parameter: str
-    """Name of the swept parameter's column."""
 
-    @staticmethod
-    def name(track: str, block: int) -> str:
-        """File name of a block, inside the folder."""
-        return f"sweep.parquet/{track.replace(' ', '-')}-{block:06d}.parquet"
+def grid_blocks(plan: MapPlan | BasinPlan, files: WorkFiles) -> Blocks[list[MapCell]]:
+    """Rows of a map or of basins."""
+    x, y = plan.x, plan.y
+    at = [pa.field(name, pa.float64()) for name in (x, y)]
+    schema = pa.schema([*columns_of(MapCell, "ij"), *at, *_CELL])
 
-    def read(self, track: str, block: int) -> list[SteadyMotion] | None:
-        """The steps of a finished block of this very work, or None."""
-        codec = _sweep_codec(self.parameter, BLOCK)
-        name = self.name(track, block)
-        return self.files.read(name, codec, self._steps, track=track, block=block)
+    def rows(cells: Sequence[MapCell], _: Place) -> Rows:
+        return [{x: plan.xs[c.j], y: plan.ys[c.i], **_columns(c)} for c in cells]
 
-    def _steps(self, rows: Rows) -> list[SteadyMotion]:
-        out = []
-        for row in map(dict, rows):
-            del row["track"], row[self.parameter]
-            out.append(read_record(SteadyMotion, row))
+    def cells(rows: Rows, place: Place) -> list[MapCell]:
+        out = [_record(MapCell, row, x, y) for row in rows]
+        if [(cell.i, cell.j) for cell in out] != [(*place, j) for j in range(len(plan.xs))]:
+            raise ValueError("cells of other places")
         return out
 
-    def write(
-        self, track: str, block: int, values: Sequence[float], steps: list[SteadyMotion]
-    ) -> None:
-        """Keep a finished block; rows in the order in which the steps were made."""
-        rows = _rows(self.parameter, track, values, steps)
-        codec = _sweep_codec(self.parameter, BLOCK)
-        self.files.write(self.name(track, block), codec, rows, track=track, block=block)
+    kind = "map" if isinstance(plan, MapPlan) else "basins"
+    file, places = f"{kind}.parquet/row-{{:06d}}.parquet", [(i,) for i in range(len(plan.ys))]
+    codec = ParquetCodec(schema, _MORE, len(plan.xs))
+    return Blocks(files, file, places, codec, rows, cells, ("row",))
 
 
-@dataclass(frozen=True)
-class GridStore:
-    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in a folder."""
+def share_blocks(plan: SharePlan, files: WorkFiles) -> Blocks[list[Step]]:
+    """Counted basins, a row for each attractor at each value."""
+    name, blocks = plan.parameter, plan.blocks()
 
-    files: WorkFiles
-    """Where the rows lie."""
-    kind: str
-    """"map" or "basins"."""
-    x: str
-    """Name of the column of values along a row."""
-    xs: Array
-    """Values along a row."""
-    y: str
-    """Name of the column of values from row to row."""
-    ys: Array
-    """Values from row to row."""
+    def rows(steps: Sequence[Step], place: Place) -> Rows:
+        pairs = zip(blocks[place[0]].tolist(), steps, strict=True)
+        return [{name: value, **_columns(share)} for value, step in pairs for share in step]
 
-    @staticmethod
-    def name(kind: str, row: int) -> str:
-        """File name of a row, inside the folder."""
-        return f"{kind}.parquet/row-{row:06d}.parquet"
+    def steps(rows: Rows, _: Place) -> list[Step]:
+        by_value: dict[float, list[AttractorShare]] = {}
+        for row in rows:
+            by_value.setdefault(row[name], []).append(_record(AttractorShare, row, name))
+        return [tuple(step) for step in by_value.values()]
 
-    def read(self, row: int) -> list[MapCell] | None:
-        """The cells of a finished row of this very work, or None."""
+    codec = ParquetCodec(pa.schema([pa.field(name, pa.float64()), *_SHARE]))
+    places = [(k,) for k in range(len(blocks))]
+    return Blocks(files, "shares.parquet/block-{:06d}.parquet", places, codec, rows, steps)
 
-        def cells(rows: Rows) -> list[MapCell]:
-            out = []
-            for each in map(dict, rows):
-                del each[self.x], each[self.y]
-                out.append(read_record(MapCell, each))
-            if [(cell.i, cell.j) for cell in out] != [(row, j) for j in range(len(self.xs))]:
-                raise ValueError("cells of other places")
-            return out
 
-        return self.files.read(self.name(self.kind, row), self._codec, cells, row=row)
-
-    def write(self, row: int, cells: list[MapCell]) -> None:
-        """Keep a finished row."""
-        rows = []
-        for cell in cells:
-            coordinates = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
-            rows.append({**coordinates, **_columns(cell)})
-        self.files.write(self.name(self.kind, row), self._codec, rows, row=row)
-
-    @property
-    def _codec(self) -> ParquetCodec:
-        at = [pa.field(name, pa.float64()) for name in (self.x, self.y)]
-        schema = pa.schema([*columns_of(MapCell, "ij"), *at, *_CELL])
-        return ParquetCodec(schema, _MORE, len(self.xs))
+def curve_blocks(plan: CurvePlan, files: WorkFiles) -> Blocks[list[BorderCurve]]:
+    """Bifurcation curves, a row each."""
+    return Blocks(
+        files,
+        "curves.parquet/block-{:06d}.parquet",
+        [(k,) for k in range(BLOCKS * (1 + plan.depth))],
+        ParquetCodec(pa.schema(_CURVE)),
+        lambda curves, _: [curve.as_dict() for curve in curves],
+        lambda rows, _: list(map(read_curve, rows)),
+    )

@@ -1,4 +1,4 @@
-"""A sweep's windows and points as CSV, from the rows of its JSON object."""
+"""What a sweep shows as CSV: windows and points from its JSON object, counted basins, curves."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from designer.base.csv_tables import csv_text
+from designer.base.si_unit import Unit
+from designer.bifurcations.basin_shares import BasinShares
+from designer.bifurcations.border_curve import BorderCurve
 
 _WINDOW = ("track", "from", "to", "response", "symmetric", "steps")
 _END = ("kind", "value", "error", "reason")
@@ -37,6 +40,57 @@ def points_csv(points: Sequence[Mapping[str, Any]], suffix: str = "") -> str:
     ``windows_csv``."""
     columns = (*_POINT, *_in_unit(("value",), suffix))
     return _csv(columns, [{key: point.get(key) for key in columns} for point in points])
+
+
+def shares_csv(shares: BasinShares) -> str:
+    """A row for each attractor at each value: its share of the starts with its limits (95 %), its
+    response, and its first strobe."""
+    plan, starts = shares.plan, len(shares.plan.numbers)
+    columns = (
+        plan.parameter, "attractor", "response", "symmetric", "twin", "count", "starts", "share",
+        "low", "high", *plan.subject.states,
+    )  # fmt: skip
+    rows = []
+    for value, step in zip(plan.values.tolist(), shares.steps, strict=True):
+        for s in step:
+            cells = (
+                value, s.attractor, s.response, s.symmetric, s.twin, s.count, starts,
+                s.count / starts, *shares.interval(s.count), *s.strobes[0],
+            )  # fmt: skip
+            rows.append(dict(zip(columns, cells, strict=True)))
+    return _csv(columns, rows)
+
+
+def curves_csv(
+    curves: Sequence[BorderCurve], first: str, second: str, units: Mapping[str, Unit] | None = None
+) -> str:
+    """A row a point: the curve's number, kind, response, symmetry, both values, whether the orbit
+    is stable on one side, and where the curve was begun if it was switched to; points of
+    codimension two follow their curve, with their name as kind. units : of the parameters that have
+    an SI unit; such a one's values stand in it too, last."""
+    in_si = {name: unit for name, unit in (units or {}).items() if name in (first, second)}
+    columns = [
+        "curve", "kind", "response", "symmetric", first, second, "stable", "begun_at",
+        *(f"{name}_{unit.suffix}" for name, unit in in_si.items()),
+    ]  # fmt: skip
+
+    def place(values: Sequence[float]) -> dict[str, float]:
+        at = dict(zip((first, second), values, strict=True))
+        return at | {f"{n}_{unit.suffix}": at[n] * unit.scale for n, unit in in_si.items()}
+
+    rows = []
+    for number, c in enumerate(curves, 1):
+        begun = c.begun_at and f"{c.begun_at.name} of curve {c.begun_at.curve}"
+        head = {"curve": number, "response": c.response, "symmetric": c.symmetric}
+        points = zip(c.points.tolist(), c.stable, strict=True)
+        shown: list[tuple[str, Any, bool | None]]
+        shown = [(c.kind, values, stable) for values, stable in points]
+        shown += [(met.name, met.values, None) for met in c.codimension_two]
+        rows += [
+            {**head, "kind": kind, **place(values), "stable": stable, "begun_at": begun}
+            for kind, values, stable in shown
+        ]
+    return _csv(columns, rows)
 
 
 def _in_unit(keys: Sequence[str], suffix: str) -> tuple[str, ...]:

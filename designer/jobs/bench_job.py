@@ -284,7 +284,7 @@ def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> 
             "fitted": wave.fitted,
             "difference": dict(wave.errors),
         },
-        "fitted": None if benched.board is None else [f.as_dict() for f in benched.board.figures],
+        "fitted": None if benched.board is None else benched.board.figures,
         "advice": None if benched.advice is None else benched.advice.as_dict(si),
     }
 

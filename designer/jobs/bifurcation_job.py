@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from designer.bifurcations import (
 )
 from designer.bifurcations.basin_shares import BasinShares, SharePlan
 from designer.bifurcations.basins import BasinPlan, Basins
+from designer.bifurcations.block_store import KeptBlocks
 from designer.bifurcations.border_curve import BorderCurve
 from designer.bifurcations.border_curves import CurvePlan
 from designer.bifurcations.parameter_map import MapPlan, ParameterMap
@@ -45,13 +47,18 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.counts import period_of
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion
-from designer.folders.curve_store import CurveBlocks, curves_csv
 from designer.folders.model_source import model_of
 from designer.folders.origin import provenance
-from designer.folders.share_store import ShareBlocks, shares_csv
-from designer.folders.sweep_store import GridStore, SweepStore, work_hash
-from designer.folders.sweep_tables import points_csv, windows_csv
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import (
+    Blocks,
+    WorkFiles,
+    curve_blocks,
+    grid_blocks,
+    share_blocks,
+    sweep_blocks,
+    work_hash,
+)
+from designer.folders.sweep_tables import curves_csv, points_csv, shares_csv, windows_csv
 from designer.jobs.bifurcation_request import (
     Plan,
     Request,
@@ -74,22 +81,33 @@ if TYPE_CHECKING:
 
 Files = dict[str, str | bytes]
 """Contents of files by name."""
+Kept = TypeVar("Kept")
+PlanOf = TypeVar("PlanOf")
 Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
 """What is in the JSON object, what it cost, and what makes the pictures and tables."""
 
 
-@overload
-def _store(plan: SweepPlan, files: WorkFiles) -> SweepStore: ...
-@overload
-def _store(plan: MapPlan | BasinPlan, files: WorkFiles) -> GridStore: ...
-@overload
-def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore: ...
-def _store(plan: Plan, files: WorkFiles) -> SweepStore | GridStore:
+Computed = Sweep | ParameterMap | Basins
+"""What a plan makes."""
+
+
+def _blocks(plan: Plan, files: WorkFiles) -> Blocks[Any]:
     """Where the blocks of a plan's work are kept, to write them and to read them."""
+    return sweep_blocks(plan, files) if isinstance(plan, SweepPlan) else grid_blocks(plan, files)
+
+
+def _computed(
+    plan: Plan,
+    jobs: int,
+    store: KeptBlocks[Any] | None,
+    step: Callable[[], None] = lambda: None,
+) -> Computed:
+    """What a plan makes, or what of it the store has not."""
     if isinstance(plan, SweepPlan):
-        return SweepStore(files, plan.parameter)
-    kind = "map" if isinstance(plan, MapPlan) else "basins"
-    return GridStore(files, kind, plan.x, plan.xs, plan.y, plan.ys)
+        return sweep.run(plan, jobs, store, step)
+    if isinstance(plan, MapPlan):
+        return parameter_map.run(plan, jobs, store, step)
+    return basins.run(plan, jobs, store, step)
 
 
 class BifurcationWork:
@@ -100,7 +118,8 @@ class BifurcationWork:
     ) -> None:
         self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
         self.title = modelfile.title
-        self.made: Sweep | ParameterMap | Basins | None = None
+        self.made: Computed | None = None
+        self.folder: Folder | None = None
         self.curves: CurvePlan | None = None
         self.region: float | None = None
         self.spread: Spread | None = None
@@ -127,31 +146,19 @@ class BifurcationWork:
             settings={"bifurcation": self.decides},
         )
 
-    def swept(self, folder: Folder | None) -> Sweep:
-        """The sweep, or what of it the folder has not."""
+    def computed(self) -> Computed:
+        """The sweep, the map or the basins, or what of them the folder has not."""
         plan = self.plan
-        assert isinstance(plan, SweepPlan)
-        name = plan.parameter
-        store = None if folder is None else _store(plan, self.files(folder))
-        blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
-        over = titles.taken(plan.subject, name, plan.values)
-        step = self.progress.stage(f"sweep over {over}", blocks)
-        self.made = sweep.run(plan, self.jobs, store, step)
+        if isinstance(plan, SweepPlan):
+            over = titles.taken(plan.subject, plan.parameter, plan.values)
+            blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
+        else:
+            over = titles.taken(plan.subject, plan.x, plan.xs)
+            over += f" and {titles.taken(plan.subject, plan.y, plan.ys)}"
+            blocks = len(plan.ys)
+        step = self.progress.stage(f"{self.request.kind} over {over}", blocks)
+        self.made = _computed(plan, self.jobs, self.store(_blocks, plan), step)
         return self.made
-
-    def grid(self, folder: Folder | None) -> ParameterMap | Basins:
-        """The map or the basins likewise."""
-        plan, kind = self.plan, self.request.kind
-        assert not isinstance(plan, SweepPlan)
-        store = None if folder is None else _store(plan, self.files(folder))
-        over = titles.taken(plan.subject, plan.x, plan.xs)
-        over += f" and {titles.taken(plan.subject, plan.y, plan.ys)}"
-        step = self.progress.stage(f"{kind} over {over}", len(plan.ys))
-        if isinstance(plan, MapPlan):
-            self.made = made = parameter_map.run(plan, self.jobs, store, step)
-            return made
-        self.made = plane = basins.run(plan, self.jobs, store, step)
-        return plane
 
     @property
     def _seed(self) -> int | None:
@@ -160,10 +167,15 @@ class BifurcationWork:
             return self.shares.seed
         return None if self.request.starts is None else 0
 
-    def files(self, folder: Folder) -> WorkFiles:
-        """Where the finished blocks lie in a folder."""
-        note = self.progress.note
-        return WorkFiles(folder.path, self.hash, self.provenance, note, folder.vouches)
+    def store(
+        self, blocks: Callable[[PlanOf, WorkFiles], Blocks[Kept]], plan: PlanOf
+    ) -> Blocks[Kept] | None:
+        """Where the finished blocks of a plan lie in the folder, if there is one."""
+        if self.folder is None:
+            return None
+        path, vouches = self.folder.path, self.folder.vouches
+        files = WorkFiles(path, self.hash, self.provenance, self.progress.note, vouches)
+        return blocks(plan, files)
 
 
 def with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
@@ -188,23 +200,11 @@ TABLES = ("windows.csv", "points.csv")
 """Tables of the sweep itself."""
 
 
-def sweep_files(work: BifurcationWork, plan: SweepPlan) -> list[str]:
-    """Names of the files beside ``sweep.json`` and its pictures."""
-    names = [
-        SweepStore.name(track, k) for track in plan.tracks for k in range(len(plan.blocks(track)))
-    ]
-    names += TABLES
-    if work.shares is not None:
-        names += [*ShareBlocks.names(work.shares), "shares.csv"]
-    if work.curves is not None:
-        names += [*CurveBlocks.names(work.curves.depth), *CURVE_FILES]
-    return names
-
-
-def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) -> Made:
+def _sweep(work: BifurcationWork, plan: SweepPlan) -> Made:
     """The sweep, its points, and what else was asked for along it."""
     progress, jobs, name = work.progress, work.jobs, plan.parameter
-    swept, found = work.swept(folder), None
+    swept, found = work.computed(), None
+    assert isinstance(swept, Sweep)
     if work.request.points:
         step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
         found = window_ends.find(swept, jobs, step)
@@ -235,7 +235,7 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
             for end in found.missing
         )
         body["points"] = sorted([*body["points"], *missing], key=lambda row: float(row["value"]))
-    shares = _shares(work, folder)
+    shares = _shares(work)
     suffix = "" if si is None else si.suffix
     tables = (windows_csv(body["windows"], suffix), points_csv(body["points"], suffix))
     pictures: list[Callable[[], Files]] = [
@@ -246,7 +246,7 @@ def sweep_answer(work: BifurcationWork, plan: SweepPlan, folder: Folder | None) 
         body["shares"] = shares.as_dict()
         pictures.append(lambda: {"shares.csv": shares_csv(shares)})
     if work.curves is not None:
-        curves = _curves(work, work.curves, points, folder)
+        curves = _curves(work, work.curves, points)
         second = plan.subject.si.get(work.curves.second)
         body["and"] = {
             **with_si({**work.curves.as_dict(), "at": work.curves.at}, second),
@@ -359,15 +359,13 @@ def _curve_files(
     return {"curves.csv": table, **image_files("curves", picture)}
 
 
-def _shares(work: BifurcationWork, folder: Folder | None) -> BasinShares | None:
+def _shares(work: BifurcationWork) -> BasinShares | None:
     """The counted basins along the sweep, if they were asked for."""
-    plan, store = work.shares, None
+    plan = work.shares
     if plan is None:
         return None
-    if folder is not None:
-        store = ShareBlocks(work.files(folder), plan.parameter)
     step = work.progress.stage(f"{len(plan.numbers)} starts at each value", len(plan.values))
-    return basin_shares.run(plan, work.jobs, store, step)
+    return basin_shares.run(plan, work.jobs, work.store(share_blocks, plan), step)
 
 
 def _region(work: BifurcationWork, plan: CurvePlan, swept: Sweep) -> ResponseRegion | None:
@@ -406,21 +404,18 @@ def _spread_box(work: BifurcationWork, plan: CurvePlan, found: ResponseRegion) -
 
 
 def _curves(
-    work: BifurcationWork, plan: CurvePlan, points: Sequence[Bifurcation], folder: Folder | None
+    work: BifurcationWork, plan: CurvePlan, points: Sequence[Bifurcation]
 ) -> list[BorderCurve]:
     """The curves through the sweep's points, or what of them the folder has not."""
-    store = None
-    if folder is not None:
-        store = CurveBlocks(work.files(folder))
     over = f"bifurcation curves over {plan.first} and {plan.second}"
     step = work.progress.stage(over, border_curves.BLOCKS * (1 + plan.depth))
-    return border_curves.run(plan, points, work.jobs, store, step)
+    return border_curves.run(plan, points, work.jobs, work.store(curve_blocks, plan), step)
 
 
 class _Finished:
     """The blocks of a finished work, which are only read."""
 
-    def __init__(self, store: SweepStore | GridStore) -> None:
+    def __init__(self, store: Blocks[Any]) -> None:
         self.store = store
 
     def read(self, *place: Any) -> Any:
@@ -444,28 +439,22 @@ class PictureData:
 
     plan: Plan
     """What was asked for."""
-    made: Sweep | ParameterMap | Basins | None
+    made: Computed | None
     """What was made now; None where the folder had all."""
     kept: WorkFiles | None
     """The blocks in the folder, if there is one."""
 
-    def read(self) -> Sweep | ParameterMap | Basins:
+    def read(self) -> Computed:
         """The data.
 
         Raises
         ------
         InputError : the folder's blocks are gone, or not those of this work.
         """
-        plan, kept = self.plan, self.kept
         if self.made is not None:
             return self.made
-        assert kept is not None
-        finished = _Finished(_store(plan, kept))
-        if isinstance(plan, SweepPlan):
-            return sweep.run(plan, 1, finished)
-        if isinstance(plan, MapPlan):
-            return parameter_map.run(plan, 1, finished)
-        return basins.run(plan, 1, finished)
+        assert self.kept is not None
+        return _computed(self.plan, 1, _Finished(_blocks(self.plan, self.kept)))
 
 
 @dataclass(frozen=True)
@@ -601,11 +590,12 @@ def requested(
     plan = plan_of(request, subject, modelfile)
     work = BifurcationWork(request, plan, modelfile, options.workers, progress)
     if out is None:
-        answer, _ = _make(work, None)
+        answer, _ = _make(work)
         answer["cost"]["seconds"] = time.perf_counter() - began
         data = PictureData(plan, work.made, None)
         return BifurcationResult(answer, False, None, request.ends, data)
     folder, kind = Folder(out), request.kind
+    work.folder = folder
     inputs = {
         "model": _model_hash(modelfile, folder, kind),
         "version": __version__,
@@ -614,13 +604,13 @@ def requested(
     }
     if request.circuit:
         inputs["catalogue"] = load_catalog().hash
-    stages: Stages = {kind: (inputs, _names(kind, work))}
+    stages: Stages = {kind: (inputs, _names(work))}
     asked = {"model": modelfile.text, "work": work.decides}
     todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume, asked=asked)
     if todo:
         before = None if folder.manifest is None else folder.manifest.provenance
         with folder.working(stages, before or work.provenance):
-            answer, figure = _make(work, folder)
+            answer, figure = _make(work)
             progress.stage("pictures")
             for name, content in figure().items():
                 folder.write(name, content)
@@ -656,47 +646,42 @@ def _subject(
     return modelfile, ModelSubject(modelfile.model, scales=modelfile.si)
 
 
-def _names(kind: StageName, work: BifurcationWork) -> list[str]:
+def _names(work: BifurcationWork) -> list[str]:
     """Files of a stage."""
-    plan = work.plan
-    if isinstance(plan, SweepPlan):
-        blocks = sweep_files(work, plan)
-    else:
-        blocks = [GridStore.name(kind, row) for row in range(len(plan.ys))]
-    return [*blocks, f"{kind}.json", f"{kind}.png", f"{kind}.svg"]
+    stores: list[tuple[Blocks[Any] | None, tuple[str, ...]]]
+    stores = [(work.store(_blocks, work.plan), TABLES if isinstance(work.plan, SweepPlan) else ())]
+    if work.shares is not None:
+        stores.append((work.store(share_blocks, work.shares), ("shares.csv",)))
+    if work.curves is not None:
+        stores.append((work.store(curve_blocks, work.curves), CURVE_FILES))
+    names = [name for store, more in stores if store for name in (*store.names, *more)]
+    return [*names, *(f"{work.request.kind}.{ending}" for ending in ("json", "png", "svg"))]
 
 
-def _make(
-    work: BifurcationWork, folder: Folder | None
-) -> tuple[dict[str, Any], Callable[[], Files]]:
+def _make(work: BifurcationWork) -> tuple[dict[str, Any], Callable[[], Files]]:
     """The JSON object, and what makes the pictures and tables."""
     plan = work.plan
-    if isinstance(plan, SweepPlan):
-        body, cost, draw = sweep_answer(work, plan, folder)
-    else:
-        body, cost, draw = _grid(work, plan, folder)
+    body, cost, draw = _sweep(work, plan) if isinstance(plan, SweepPlan) else _grid(work, plan)
     head = {"format": 1, "kind": work.request.kind}
     return plain({**head, **body, "provenance": work.provenance, "cost": cost}), draw
 
 
-def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan, folder: Folder | None) -> Made:
+def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan) -> Made:
     from designer.plots import bifurcation_plots
 
-    kind, made = work.request.kind, work.grid(folder)
+    kind, made = work.request.kind, work.computed()
     body: dict[str, Any] = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),
         "y": _grid_axis(plan.subject, plan.y, plan.ys),
     }
     if isinstance(made, ParameterMap):
         body["counts"] = made.counts
-        return (
-            body,
-            {},
-            lambda: image_files(kind, bifurcation_plots.parameter_map(made, work.title)),
-        )
+        draw = partial(bifurcation_plots.parameter_map, made, work.title)
+        return body, {}, lambda: image_files(kind, draw())
+    assert isinstance(made, Basins)
     body |= {
         "at": made.plan.changes,
-        "attractors": [dict(a.__dict__) for a in made.attractors],
+        "attractors": made.attractors,
         "cells": [c.attractor for c in made.cells],
     }
     return body, {}, lambda: image_files(kind, bifurcation_plots.basins(made, work.title))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import CURVE_DEPTH, SEED, at_least
+from designer.base.defaults import CURVE_DEPTH, SEED, check_count
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.schema import one_of
@@ -42,66 +42,42 @@ Swept = ModelSubject | BoardSubject
 
 @dataclass(frozen=True)
 class Request:
-    """The command line: numbers in the units that the swept parameter has, or texts with a unit."""
+    """What the verb is asked, by the names of its parameters, which say what each is. Numbers are
+    in the units that the swept parameter has, texts have a unit; None stands for the usual."""
 
     over: str | None = None
-    """The parameter that is swept; None for ω, the generator's frequency with ``circuit``, or x1
-    with ``basins``."""
-    low: float | str | None = None
-    """Least value of the swept parameter."""
-    high: float | str | None = None
-    """Largest value of the swept parameter."""
+    from_: float | str | None = None
+    to: float | str | None = None
     steps: int | None = None
-    """Number of values of the swept parameter."""
     omega: float | None = None
-    """Dimensionless frequency of the drive where it is not swept."""
     frequency: str | None = None
-    """Frequency of the drive as text, such as "10 Hz", of the mechanism or with ``circuit`` of the
-    generator."""
     down: bool = False
-    """Whether a track goes down."""
     up: bool = False
-    """Whether a track goes up."""
     starts: int | None = None
-    """Number of fixed starts at each value; None for none."""
     periods: int | None = None
-    """Drive periods that are left out; None for the default."""
     keep: int | None = None
-    """Drive periods that are kept; None for the default."""
-    second: tuple[str, float | str, float | str, int] | None = None
-    """(name, from, to, steps) of a map's or a basin's other axis."""
+    map_: tuple[str, float | str, float | str, int] | None = None
     and_: tuple[str, float | str, float | str] | None = None
-    """(name, from, to) of the second parameter that the sweep's points are continued over."""
     depth: int | None = None
-    """How many times in a row other curves are begun at points of codimension two; None for the
-    default."""
     region: float | str | None = None
-    """Value of the swept parameter at which a response lives whose region is sought."""
     basins: bool = False
-    """Whether basins of attraction are asked for."""
     circuit: bool = False
-    """Whether the circuit is swept, and not the model."""
     points: bool = True
-    """Whether bifurcation points are sought."""
     shares: int | None = None
-    """Number of random starts at each value whose attractors are counted; None for none."""
     box: tuple[tuple[str, float | str, float | str], ...] = ()
-    """(state, least, greatest) of the box that these starts are drawn from, where it is not the
-    usual one."""
     seed: int = SEED
-    """Seed of these starts."""
 
     @property
     def ends(self) -> tuple[str, str]:
         """Least and largest value of the swept parameter as they are asked for; "" for the
         usual."""
-        low, high = self.low, self.high
-        return "" if low is None else str(low), "" if high is None else str(high)
+        low, high = ("" if end is None else str(end) for end in (self.from_, self.to))
+        return low, high
 
     @property
     def kind(self) -> StageName:
         """Which of the three pictures is asked for."""
-        return "basins" if self.basins else "map" if self.second is not None else "sweep"
+        return "basins" if self.basins else "map" if self.map_ is not None else "sweep"
 
 
 Plan = SweepPlan | MapPlan | BasinPlan
@@ -119,12 +95,12 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
         return _basin_plan(request, subject, modelfile)
     over = request.over or ("frequency" if request.circuit else "omega")
     read = _reader(subject, modelfile)
-    first = _checked(read, subject, "--from", over, request.low)
-    last = _checked(read, subject, "--to", over, request.high)
+    first = _checked(read, subject, "--from", over, request.from_)
+    last = _checked(read, subject, "--to", over, request.to)
     low, high, steps = _axis("--from", "--to", "--steps", first, last, request.steps)
     swept = [over]
-    if request.second is not None:
-        name, *ends, count = request.second
+    if request.map_ is not None:
+        name, *ends, count = request.map_
         if name == over:
             raise InputError(None, "--map", name, f"another parameter than --over {over}")
         start, stop = (_checked(read, subject, "--map", name, value) for value in ends)
@@ -133,7 +109,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
         swept.append(name)
     subject = _at_frequency(request, subject, modelfile, swept)
     values = np.linspace(low, high, steps)
-    if request.second is not None:
+    if request.map_ is not None:
         _check_pairs(subject, "--map", {over: (low, high), name: (float(ys[0]), float(ys[-1]))})
         course = _course(request, parameter_map.COURSE)
         return MapPlan(subject, over, values, name, ys, course=course)
@@ -208,7 +184,7 @@ def share_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Share
         return None
     subject = plan.subject
     assert isinstance(subject, ModelSubject | BoardSubject)
-    at_least("--shares", request.shares, 1)
+    check_count("--shares", request.shares, 1)
     if request.shares * len(plan.values) > MOST_CELLS:
         text = f"{request.shares} starts at {len(plan.values)} values"
         raise InputError(None, "--shares", text, f"at most {MOST_CELLS} starts in all")
@@ -270,12 +246,9 @@ def _check_pairs(subject: Swept, option: str, ends: Mapping[str, tuple[float, fl
 
 
 def _check_options(request: Request) -> None:
-    if request.starts is not None:
-        at_least("--starts", request.starts, 1)
-        if request.starts > MOST_STARTS:
-            raise InputError(None, "--starts", request.starts, f"at most {MOST_STARTS}")
-        if request.down or request.up:
-            raise InputError(None, "--starts", request.starts, "without --down and --up")
+    check_count("--starts", request.starts, 1, MOST_STARTS)
+    if request.starts is not None and (request.down or request.up):
+        raise InputError(None, "--starts", request.starts, "without --down and --up")
     if request.kind != "sweep" and (request.starts is not None or request.down or request.up):
         raise InputError(
             None, "--down, --up or --starts", "given", "none with --map or --basins: every point "
@@ -288,21 +261,13 @@ def _check_options(request: Request) -> None:
         raise InputError(None, "--shares", request.shares, "a sweep: none of --map and --basins")
     if request.box and request.shares is None:
         raise InputError(None, "--box", request.box[0][0], "a number of starts too: --shares")
-    if request.depth is not None:
-        at_least("--depth", request.depth, 0)
-        if request.depth > MOST_DEPTH:
-            raise InputError(None, "--depth", request.depth, f"at most {MOST_DEPTH}")
-        if request.and_ is None:
-            raise InputError(None, "--depth", request.depth, "a second parameter too: --and")
+    check_count("--depth", request.depth, 0, MOST_DEPTH)
+    if request.depth is not None and request.and_ is None:
+        raise InputError(None, "--depth", request.depth, "a second parameter too: --and")
     if request.region is not None and request.and_ is None:
         raise InputError(None, "--region", request.region, "a second parameter too: --and")
-    if request.periods is not None:
-        at_least("--periods", request.periods, 0)
-    if request.keep is not None:
-        at_least("--keep", request.keep, 1)
-    for option, count in (("--periods", request.periods), ("--keep", request.keep)):
-        if count is not None and count > MOST_PERIODS:
-            raise InputError(None, option, count, f"at most {MOST_PERIODS}")
+    check_count("--periods", request.periods, 0, MOST_PERIODS)
+    check_count("--keep", request.keep, 1, MOST_PERIODS)
 
 
 def _axis(
@@ -317,9 +282,7 @@ def _axis(
     assert high is not None
     if steps is None:
         raise InputError(None, third, MISSING, "a whole number >= 2")
-    at_least(third, steps, 2)
-    if steps > MOST_STEPS:
-        raise InputError(None, third, steps, f"at most {MOST_STEPS}")
+    check_count(third, steps, 2, MOST_STEPS)
     for option, value in ((first, low), (second, high)):
         if not np.isfinite(value):
             raise InputError(None, option, value, "a finite number")
@@ -343,7 +306,7 @@ def _course(request: Request, usual: TransientSettings) -> TransientSettings:
 def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> BasinPlan:
     states = subject.states
     read = _reader(subject, modelfile)
-    name, start, stop, count = request.second or (states[1], None, None, None)
+    name, start, stop, count = request.map_ or (states[1], None, None, None)
     over = request.over or states[0]
     for option, state in (("--over", over), ("--map", name)):
         if state not in states:
@@ -367,7 +330,7 @@ def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> Basin
             )
         )
 
-    xs = axis(over, "--over", request.low, request.high, request.steps)
+    xs = axis(over, "--over", request.from_, request.to, request.steps)
     ys = axis(name, "--map", start, stop, count)
     _check_cells(len(xs), len(ys))
     return BasinPlan(

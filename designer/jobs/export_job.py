@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from designer.base.defaults import Dialect
-from designer.base.design_folder import DESIGN
+from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
-from designer.base.manifest import ORDERS, DeckStage, OrderStage, Stages
+from designer.base.manifest import ORDERS, DeckStage, OrderStage, StageName, Stages
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
@@ -88,171 +88,158 @@ class ExportResult:
         return table_html(str(self.folder), [{"file": name} for name in self.answer["files"]])
 
 
-def export_into(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress
-) -> ExportResult:
-    """Write the project into a design folder, which is made where there is none."""
-    runner, synthesis, reused = _design(modelfile, out, options, progress)
-    folder, files, inputs = runner.folder, kicad_files.texts(synthesis), _inputs(runner)
-    if folder.state(kicad_files.STAGE, inputs) == "other" and not options.overwrite:
-        # The project is of its time, as the design is: it may hold a board that somebody routed.
-        assert folder.manifest is not None
-        inputs = folder.manifest.stages[kicad_files.STAGE].inputs
-        listed = folder.manifest.files.items()
-        files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
-        progress.note("so does its KiCad project: --overwrite makes it anew, with what is here")
-    stages = kicad_files.stages(inputs, files)
-    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
-    if todo:
-        progress.stage("KiCad project")
-        kicad_files.write(folder, synthesis, inputs, files)
-    return _result(runner, list(files), reused and not todo)
+@dataclass
+class Export:
+    """What is written of a design into its folder, which is made where there is none."""
 
+    modelfile: ModelFile
+    out: Path
+    options: Options
+    progress: Progress
 
-def export_design(
-    modelfile: ModelFile, out: Path, file: Path, options: Options, progress: Progress
-) -> ExportResult:
-    """Write the project where there is none, and its board for another router."""
-    runner, synthesis, reused = _design(modelfile, out, options, progress)
-    _board(runner, None, progress)
-    write_design(runner.folder, synthesis, file, options, progress)
-    made = _result(runner, [], reused)
-    return replace(made, answer={**made.answer, "dsn": str(file)})
+    def project(self) -> ExportResult:
+        """Write the KiCad project."""
+        runner, synthesis, reused = self._design()
+        folder, files, inputs = runner.folder, kicad_files.texts(synthesis), _inputs(runner)
+        if folder.state(kicad_files.STAGE, inputs) == "other" and not self.options.overwrite:
+            # The project is of its time, as the design is: it may hold a routed board.
+            assert folder.manifest is not None
+            inputs = folder.manifest.stages[kicad_files.STAGE].inputs
+            listed = folder.manifest.files.items()
+            files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
+            note = "so does its KiCad project: --overwrite makes it anew, with what is here"
+            self.progress.note(note)
+        todo = self._decide(folder, kicad_files.stages(inputs, files))
+        if todo:
+            self.progress.stage("KiCad project")
+            kicad_files.write(folder, synthesis, inputs, files)
+        return _result(runner, list(files), reused and not todo)
 
+    def for_router(self, file: Path) -> ExportResult:
+        """Write the project where there is none, and its board for another router."""
+        runner, synthesis, reused = self._design()
+        self._board(runner, None)
+        write_design(runner.folder, synthesis, file, self.options, self.progress)
+        return _result(runner, [], reused, dsn=str(file))
 
-def export_routed(
-    modelfile: ModelFile,
-    out: Path,
-    keep: bool,
-    options: Options,
-    progress: Progress,
-    session: Path | None = None,
-    layers: int | None = None,
-) -> ExportResult:
-    """Write the project where there is none, and route what is open on its board.
+    def routed(
+        self, keep: bool, session: Path | None = None, layers: int | None = None
+    ) -> ExportResult:
+        """Write the project where there is none, and route what is open on its board.
 
-    session : of another router, or None. layers : of copper; None for as many as there are.
+        session : of another router, or None. layers : of copper; None for as many as there are.
 
-    Raises
-    ------
-    InputError : a board that somebody has changed, but with ``keep``.
-    """
-    if keep:
-        runner, synthesis, reused = _design(modelfile, out, options, progress)
+        Raises
+        ------
+        InputError : a board that somebody has changed, but with ``keep``.
+        """
+        made = self._design() if keep else None
+        if made is None or made[0].folder.state(kicad_files.STAGE, _inputs(made[0])) == "new":
+            self.project()
+            made = self._design()
+        runner, synthesis, reused = made
         folder = runner.folder
-        new = folder.state(kicad_files.STAGE, _inputs(runner)) == "new"
-    if not keep or new:
-        export_into(modelfile, out, options, progress)
-        runner, synthesis, reused = _design(modelfile, out, options, progress)
-        folder = runner.folder
-    routing = route_in_folder(folder, synthesis, progress, session, layers)
-    listed = {} if folder.manifest is None else folder.manifest.files
-    files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
-    made = _result(runner, files, reused)
-    return replace(made, answer={**made.answer, "routing": routing})
+        routing = route_in_folder(folder, synthesis, self.progress, session, layers)
+        listed = {} if folder.manifest is None else folder.manifest.files
+        files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
+        return _result(runner, files, reused, routing=routing)
 
+    def decks(self, dialects: Sequence[Dialect]) -> ExportResult:
+        """Write decks."""
+        runner, synthesis, reused = self._design()
+        folder, inputs = runner.folder, _inputs(runner)
+        names = {dialect: file_name(dialect) for dialect in dialects}
+        stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
+        todo = self._decide(folder, stages)
+        if todo:
+            self.progress.stage("decks")
+            texts = {
+                name: deck_text(synthesis, dialect)
+                for dialect, name in names.items()
+                if DeckStage.of(dialect) in todo
+            }
+            begun = {stage: stages[stage] for stage in todo}
+            with folder.working(begun, design_provenance(synthesis)):
+                for name, text in texts.items():
+                    folder.write(name, text)
+        return _result(runner, list(names.values()), reused and not todo)
 
-def export_decks(
-    modelfile: ModelFile,
-    out: Path,
-    dialects: Sequence[Dialect],
-    options: Options,
-    progress: Progress,
-) -> ExportResult:
-    """Write decks into a design folder, which is made where there is none."""
-    runner, synthesis, reused = _design(modelfile, out, options, progress)
-    folder, inputs = runner.folder, _inputs(runner)
-    names = {dialect: file_name(dialect) for dialect in dialects}
-    stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
-    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
-    if todo:
-        progress.stage("decks")
-        texts = {
-            name: deck_text(synthesis, dialect)
-            for dialect, name in names.items()
-            if DeckStage.of(dialect) in todo
-        }
-        with folder.working({stage: stages[stage] for stage in todo}, design_provenance(synthesis)):
-            for name, text in texts.items():
-                folder.write(name, text)
-    return _result(runner, list(names.values()), reused and not todo)
+    def orders(self, asked: OrderRequest) -> ExportResult:
+        """Write what fabs are sent.
 
+        An order that the rules forbid, or whose files do not make the circuit, is refused: nothing
+        is written, and the answer says why.
+        """
+        try:
+            version = needed_version()
+        except KicadFailed as why:
+            raise EnvironmentMissing(f"{why}: --fab needs it") from None
+        names, parts, progress = asked.fabs, asked.parts, self.progress
+        fabs(names, load_catalog().folders)
+        check_accepted(asked.accepted)
+        stock = () if parts is None else stock_rows(parts, "--parts")
+        runner, synthesis, _ = self._design()
+        folder, board = runner.folder, self._board(runner, asked.board)
+        check_edge(board)
+        inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
+        inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
+        inputs["accepted"] = ", ".join(sorted(asked.accepted))
+        # What stands in the way is known before any work.
+        wanted: Stages = {OrderStage.of(name): (dict(inputs), []) for name in names}
+        todo = self._decide(folder, wanted)
+        if not todo:
+            return _ordered(runner, names, True)
+        makers = [name for name in names if OrderStage.of(name) in todo]
+        progress.stage("design rules")
+        outcomes = checked(synthesis, board, makers).outcomes
+        if reasons := refusals(outcomes, asked.accepted):
+            return _refused(runner, names, reasons)
+        progress.stage("Gerbers, holes, positions, read back")
+        order = BoardOrder(
+            name=project_name(self.modelfile.title),
+            title=self.modelfile.title,
+            board=board,
+            components=board_files.listed(synthesis),
+            bought=board_files.bought(synthesis, stock),
+            not_checked=not_checked(outcomes),
+            accepted=accepted_failures(outcomes, asked.accepted),
+        )
+        try:
+            files = {
+                OrderStage.of(fab.name): _order_texts(order, fab, runner)
+                for fab in fabs(makers, runner.catalog.folders)
+            }
+        except FaultyOrder as why:
+            return _refused(runner, names, read_back(why.faults))
+        stages: Stages = {stage: (dict(inputs), list(texts)) for stage, texts in files.items()}
+        self._decide(folder, stages)
+        with folder.working(stages, design_provenance(synthesis)):
+            for path, content in ChainMap(*files.values()).items():
+                folder.write(path, content)
+        return _ordered(runner, names, False)
 
-def export_orders(
-    modelfile: ModelFile,
-    out: Path,
-    asked: OrderRequest,
-    options: Options,
-    progress: Progress,
-) -> ExportResult:
-    """Write what fabs are sent into a design folder, which is made where there is none.
+    def _design(self) -> tuple[StageRunner, Synthesis, bool]:
+        """The folder with its design, and whether the design was there already."""
+        runner = StageRunner(self.modelfile, self.out, self.options, self.progress)
+        reused = not runner.decide()
+        return runner, runner.design(), reused
 
-    An order that the rules forbid, or whose files do not make the circuit, is refused: nothing is
-    written, and the answer says why.
-    """
-    try:
-        version = needed_version()
-    except KicadFailed as why:
-        raise EnvironmentMissing(f"{why}: --fab needs it") from None
-    names, parts = asked.fabs, asked.parts
-    fabs(names, load_catalog().folders)
-    check_accepted(asked.accepted)
-    stock = () if parts is None else stock_rows(parts, "--parts")
-    runner, synthesis, _ = _design(modelfile, out, options, progress)
-    folder, board = runner.folder, _board(runner, asked.board, progress)
-    check_edge(board)
-    inputs = {**_inputs(runner), "board": sha256(board.text.encode("utf-8")), "kicad": version}
-    inputs["parts"] = None if parts is None else sha256(parts.read_bytes())
-    inputs["accepted"] = ", ".join(sorted(asked.accepted))
-    # What stands in the way is known before any work.
-    wanted: Stages = {OrderStage.of(name): (dict(inputs), []) for name in names}
-    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
-    if not todo:
-        return _ordered(runner, names, True)
-    makers = [name for name in names if OrderStage.of(name) in todo]
-    progress.stage("design rules")
-    outcomes = checked(synthesis, board, makers).outcomes
-    if reasons := refusals(outcomes, asked.accepted):
-        return _refused(runner, names, reasons)
-    progress.stage("Gerbers, holes, positions, read back")
-    order = BoardOrder(
-        name=project_name(modelfile.title),
-        title=modelfile.title,
-        board=board,
-        components=board_files.listed(synthesis),
-        bought=board_files.bought(synthesis, stock),
-        not_checked=not_checked(outcomes),
-        accepted=accepted_failures(outcomes, asked.accepted),
-    )
-    try:
-        files = {
-            OrderStage.of(fab.name): _order_texts(order, fab, runner)
-            for fab in fabs(makers, runner.catalog.folders)
-        }
-    except FaultyOrder as why:
-        return _refused(runner, names, read_back(why.faults))
-    stages: Stages = {stage: (dict(inputs), list(texts)) for stage, texts in files.items()}
-    folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
-    with folder.working(stages, design_provenance(synthesis)):
-        for path, content in ChainMap(*files.values()).items():
-            folder.write(path, content)
-    return _ordered(runner, names, False)
+    def _decide(self, folder: Folder, stages: Stages) -> list[StageName]:
+        overwrite, resume = self.options.overwrite, self.options.resume
+        return folder.decide(stages, overwrite=overwrite, resume=resume)
+
+    def _board(self, runner: StageRunner, file: Path | None) -> BoardFile:
+        """The board that is named, else the folder's own, whoever has routed it."""
+        name = project_name(self.modelfile.title)
+        own = runner.folder / f"{kicad_files.FOLDER}/{name}.kicad_pcb"
+        if file is None and not own.is_file():
+            self.project()
+        return read_board(own if file is None else file)
 
 
 def _refused(runner: StageRunner, names: Sequence[str], reasons: Sequence[str]) -> ExportResult:
     """The answer of an order that is not written."""
-    answer = _result(runner, [], False).answer
-    refused = {**answer, "fabs": list(names), "refused": list(reasons)}
-    return ExportResult(refused, runner.folder.path, False)
-
-
-def _board(runner: StageRunner, file: Path | None, progress: Progress) -> BoardFile:
-    """The board that is named, else the folder's own, whoever has routed it."""
-    name = project_name(runner.modelfile.title)
-    own = runner.folder / f"{kicad_files.FOLDER}/{name}.kicad_pcb"
-    if file is None and not own.is_file():
-        export_into(runner.modelfile, runner.folder.path, runner.options, progress)
-    return read_board(own if file is None else file)
+    return _result(runner, [], False, fabs=list(names), refused=list(reasons))
 
 
 def _order_texts(order: BoardOrder, fab: Fab, runner: StageRunner) -> dict[str, bytes]:
@@ -271,9 +258,7 @@ def _ordered(runner: StageRunner, names: Sequence[str], reused: bool) -> ExportR
     assert runner.folder.manifest is not None
     folders = tuple(f"{ORDERS}/{name}/" for name in names)
     files = [name for name in runner.folder.manifest.files if name.startswith(folders)]
-    result = _result(runner, files, reused)
-    answer = {**result.answer, "fabs": list(names), "refused": []}
-    return replace(result, answer=answer)
+    return _result(runner, files, reused, fabs=list(names), refused=[])
 
 
 def deck_text(synthesis: Synthesis, dialect: Dialect) -> str:
@@ -288,22 +273,15 @@ def deck_text(synthesis: Synthesis, dialect: Dialect) -> str:
     )
 
 
-def _design(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress
-) -> tuple[StageRunner, Synthesis, bool]:
-    """The folder with its design, and whether the design was there already."""
-    runner = StageRunner(modelfile, out, options, progress)
-    reused = not runner.decide()
-    return runner, runner.design(), reused
-
-
 def _inputs(runner: StageRunner) -> dict[str, Any]:
     """What decides the files that are exported now."""
     current = {"catalogue": runner.catalog.hash, "version": __version__}
     return {**design_inputs_of(runner.folder), **current}
 
 
-def _result(runner: StageRunner, files: Sequence[str], reused: bool) -> ExportResult:
+def _result(
+    runner: StageRunner, files: Sequence[str], reused: bool, **more: object
+) -> ExportResult:
     origin = runner.folder.json(DESIGN)["provenance"]
-    answer = {"format": 1, "files": sorted(files), "provenance": origin}
+    answer = {"format": 1, "files": sorted(files), "provenance": origin, **more}
     return ExportResult(answer, runner.folder.path, reused)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SAMPLES, SEED, Over, StudyEngine, at_least, check_seed, cores
+from designer.base.defaults import SAMPLES, SEED, Over, StudyEngine, check_count, check_seed, cores
 from designer.base.errors import InputError
 
 MOST_SAMPLES = 1_000_000
@@ -69,21 +69,17 @@ class Options:
 
     def check(self) -> None:
         """InputError for a number that cannot be."""
-        at_least("--samples", self.samples, 1)
-        if self.samples > MOST_SAMPLES:
-            raise InputError(None, "--samples", self.samples, f"at most {MOST_SAMPLES}")
+        check_count("--samples", self.samples, 1, MOST_SAMPLES)
         if self.until is not None and not 0.0 < self.until <= 1.0:
             raise InputError(None, "--until", self.until, "a width above 0, at most 1")
         if self.cluster is not None and not self.cluster.startswith(("tcp://", "tls://")):
             raise InputError(None, "--cluster", self.cluster, "a scheduler's address, tcp://…")
         check_seed(self.seed)
-        if self.blame_budget is not None:
-            at_least("--blame-budget", self.blame_budget, 1)
-            if not self.blame:
-                expected = "no such option with --no-blame"
-                raise InputError(None, "--blame-budget", self.blame_budget, expected)
-        if self.jobs is not None:
-            at_least("--jobs", self.jobs, 1)
+        check_count("--blame-budget", self.blame_budget, 1)
+        if self.blame_budget is not None and not self.blame:
+            expected = "no such option with --no-blame"
+            raise InputError(None, "--blame-budget", self.blame_budget, expected)
+        check_count("--jobs", self.jobs, 1)
 
 
 def stated_options(words: Mapping[str, Any]) -> dict[str, Any]:

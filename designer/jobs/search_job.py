@@ -176,7 +176,7 @@ def _confirm(
     answers = {(a.sample, a.question): a for a in study.answers}
     rows = confirmation_json(cross_checks, answers, study.response_indices, len(study.checked))
     for index, limit, gate in zip(study.response_indices, limits, gates, strict=True):
-        rows[index]["limited_by"] = limit.as_dict()
+        rows[index]["limited_by"] = limit
         rows[index]["gate"] = gate.as_dict()
     return {"rung": FIDELITY, "responses": rows}
 

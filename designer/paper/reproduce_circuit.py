@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.defaults import at_least, cores
+from designer.base.defaults import check_count, cores
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
@@ -310,7 +310,7 @@ def reproduce(
     """
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
-    at_least("--jobs", jobs, 1)
+    check_count("--jobs", jobs, 1)
     extent = CircuitExtent() if extent is None else extent
     with SpicePool(1) as pool:
         require_ngspice(pool)

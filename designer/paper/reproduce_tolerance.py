@@ -27,7 +27,7 @@ from matplotlib.image import AxesImage
 
 from designer.base.arrays import Array
 from designer.base.atomic_write import write
-from designer.base.defaults import at_least, check_seed, cores
+from designer.base.defaults import check_count, check_seed, cores
 from designer.base.figure_style import INK, MUTED, new_figure, number_cells, styled
 from designer.base.page import Block, Page, PageSection, Picture, bullets, table
 from designer.base.progress import Progress
@@ -221,7 +221,7 @@ def reproduce(
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     for name, value in (("--samples", samples), ("--jobs", jobs)):
-        at_least(name, value, 1)
+        check_count(name, value, 1)
     check_seed(seed)
     store = CaseStore(out, FILES, resume=resume, note=progress.note)
     catalog = load_catalog()

@@ -24,8 +24,7 @@ from designer.circuit.nominal import Trace
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.report import words
-from designer.report.data import ReportData
-from designer.report.plot_names import portrait_name
+from designer.report.data import ReportData, portrait_name
 from designer.spread.board_quantities import column, quantities
 from designer.verdicts.verdict import Answer, Verdict
 

@@ -220,3 +220,13 @@ class ReportData:
         attribution, question = self.study.blame, self.question_of(response)
         rows = () if attribution is None else attribution.responses
         return next((b for b in rows if b.question == question), None)
+
+
+def portrait_name(response: int, motion: int) -> str:
+    """Name of the portrait of a response, by the numbers of the response and of its motion."""
+    return f"portrait {response} {motion}"
+
+
+def stop_name(clearance: int) -> str:
+    """Name of the plot of the dead zone of a clearance."""
+    return f"stop {clearance}"

@@ -36,13 +36,12 @@ from designer.plots.system_equations import approximation_notes, equations_of, n
 from designer.report import (
     design_tables,
     equations as forms,
-    question_lines,
+    four_answers,
     response_tables,
     tolerance_tables,
     words,
 )
 from designer.report.data import ReportData
-from designer.report.four_answers import answers
 from designer.report.spread_words import words_of
 from designer.spread.part_grades import better_grades_text
 from designer.yields.loss_attribution import Attribution
@@ -98,20 +97,19 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
     """The page of a run: the answers, then a folded section for each question. pictures : those of
     ``pictures.pictures``; none for Markdown."""
     head: list[Block] = [_purpose(data)]
-    lines = question_lines
     sections = [
         _not_good_enough(data),
-        answers(data, pictures.get("small portraits")),
+        four_answers.answers(data, pictures.get("small portraits")),
         _question(
             "Which response does each engine show?",
-            lines.shown(data),
+            four_answers.shown_line(data),
             "engines",
             PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
             _responses(data),
         ),
         _question(
             "How many boards work, and why are the others lost?",
-            lines.working(data),
+            four_answers.working_line(data),
             "working",
             _yields(data, pictures),
             _boards(data, pictures),
@@ -121,7 +119,7 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         _attribution(data, pictures),
         _question(
             "What was chosen, and how good is it?",
-            lines.chosen(data),
+            four_answers.chosen_line(data),
             "choice",
             _model(data, pictures.get("model")),
             _errors(data, pictures.get("errors")),
@@ -131,15 +129,15 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         ),
         _question(
             "How to build and start it?",
-            lines.built(data),
+            four_answers.built_line(data),
             "build",
             PageSection("Schematic", [pictures.get("schematic")], "schematic"),
             PageSection("The board", [pictures.get("board")], "board"),
             _parts(data),
             *_starts(data),
         ),
-        _question(MADE, lines.MADE_WITH, "made", _provenance(data)),
-        PageSection(WORDS, [Items(GLOSSARY, "terms")], "words", "", lines.WORDS),
+        _question(MADE, four_answers.MADE_LINE, "made", _provenance(data)),
+        PageSection(WORDS, [Items(GLOSSARY, "terms")], "words", "", four_answers.WORDS_LINE),
     ]
     if not pictures:
         head.append(Markup("The pictures stand in `report.html`."))
@@ -412,7 +410,7 @@ def _attribution(data: ReportData, pictures: Pictures) -> PageSection:
         blocks.append(PageSection("Whose spread moves the margin", moved))
     blocks.append(titled("Worst corners", tolerance_tables.corners(data)))
     title = "Which part is to blame?" if lost else "What comes nearest to a loss?"
-    return PageSection(title, blocks, "blame", "", question_lines.attributed(data))
+    return PageSection(title, blocks, "blame", "", four_answers.attributed_line(data))
 
 
 INDICES_NOTE = (

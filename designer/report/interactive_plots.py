@@ -40,8 +40,7 @@ from designer.model.relative_motion import RelativeMotion
 from designer.plots import orbit_plots
 from designer.plots.study_plots import VERDICTS, stop_curve
 from designer.report import design_tables, words
-from designer.report.data import ReportData
-from designer.report.plot_names import portrait_name, stop_name
+from designer.report.data import ReportData, portrait_name, stop_name
 from designer.verdicts.verdict import Verdict
 from designer.workbench.prediction import PredictedStop
 from designer.yields.yield_count import Yield

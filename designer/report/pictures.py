@@ -25,10 +25,9 @@ from designer.plots import (
     system_drawing,
 )
 from designer.report import design_tables, words
-from designer.report.data import ReportData
+from designer.report.data import ReportData, portrait_name, stop_name
 from designer.report.design_page import Pictures
 from designer.report.inline_svg import InlineSvg, legible_width
-from designer.report.plot_names import portrait_name, stop_name
 from designer.schematic import schematic_drawing
 
 INTRO = (

@@ -188,9 +188,7 @@ def bench(
         "format": 1,
         "title": synthesis.modelfile.title,
         "boards": [board.as_dict(synthesis.modelfile.si) for board in fitted.values()],
-        "spread": [k.as_dict() for k in estimated_spread([*fits.values()])]
-        if boards and fits
-        else [],
+        "spread": estimated_spread([*fits.values()]) if boards and fits else (),
         "files": [] if place is None else [NAME, bench_job.PAGE, *names, *lists],
         "design_sha256": design_hash(path),
         "provenance": provenance(synthesis.modelfile, catalog.hash, settings=settings),
@@ -326,5 +324,4 @@ VERB = Verb(
     "Make",
     "designer bench out/model --record scope.csv --out out/board-1",
     show=show,
-    satisfied=lambda result: result.satisfied,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -148,33 +149,13 @@ def bifurcation(
     ------
     InputError : the words do not fit together, or a value lies outside its domain.
     """
+    words = dict(locals())
     from designer.jobs.bifurcation_job import requested
     from designer.jobs.bifurcation_request import Request
     from designer.jobs.options import Options
 
-    request = Request(
-        over=over,
-        low=from_,
-        high=to,
-        steps=steps,
-        omega=omega,
-        frequency=frequency,
-        down=down,
-        up=up,
-        starts=starts,
-        periods=periods,
-        keep=keep,
-        second=map_,
-        and_=and_,
-        depth=depth,
-        region=region,
-        basins=basins,
-        circuit=circuit,
-        points=points,
-        shares=shares,
-        box=tuple(_limits(each) for each in box),
-        seed=seed,
-    )
+    words["box"] = tuple(_limits(each) for each in box)
+    request = Request(**{each.name: words[each.name] for each in fields(Request)})
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     place = None if out is None else Path(out)
     return requested(model, request, place, options, Progress() if progress is None else progress)

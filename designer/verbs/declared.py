@@ -141,8 +141,9 @@ class Verb:
     """Prints what the function returns for people."""
     json: Callable[[Any], Mapping[str, Any]] | None = answer_of
     """The object for ``--json``; None of a verb that has none."""
-    satisfied: Callable[[Any], bool] = lambda _: True
-    """Whether what the function returns is a yes: exit status 0."""
+    satisfied: Callable[[Any], bool] = lambda result: getattr(result, "satisfied", True)
+    """Whether what the function returns is a yes: exit status 0. By default what it says of
+    itself."""
     parts: Show | None = None
     """How the design is shown as soon as its parts stand; the function is given what does that as
     ``shown``."""

@@ -123,18 +123,15 @@ def export(
     if dsn is not None and (routed or deck or fab):
         raise InputError(None, "--dsn", "with another", "one after the other")
     modelfile, folder = source(model, out)
+    job = export_job.Export(modelfile, folder, options, progress)
     if routed:
-        return export_job.export_routed(
-            modelfile, folder, keep, options, progress, _path(session), layers
-        )
+        return job.routed(keep, _path(session), layers)
     if dsn is not None:
-        return export_job.export_design(modelfile, folder, Path(dsn), options, progress)
+        return job.for_router(Path(dsn))
     if fab:
         asked = export_job.OrderRequest(tuple(fab), _path(board), _path(parts), tuple(accept))
-        return export_job.export_orders(modelfile, folder, asked, options, progress)
-    if deck:
-        return export_job.export_decks(modelfile, folder, deck, options, progress)
-    return export_job.export_into(modelfile, folder, options, progress)
+        return job.orders(asked)
+    return job.decks(deck) if deck else job.project()
 
 
 def _path(named: Path | str | None) -> Path | None:

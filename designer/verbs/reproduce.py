@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
-from designer.base.defaults import at_least, cores
+from designer.base.defaults import check_count, cores
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.verbs.declared import Jobs, Resume, Verb, argument, option
@@ -56,8 +56,7 @@ def reproduce(
 
     if what not in get_args(PaperPart):
         raise InputError(None, "the part", what, one_of(what, get_args(PaperPart)))
-    if jobs is not None:
-        at_least("--jobs", jobs, 1)
+    check_count("--jobs", jobs, 1)
     place = PLACES[what] if out is None else Path(out)
     if what != "tolerance":
         for name, value in (("--samples", samples), ("--seed", seed)):

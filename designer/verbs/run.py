@@ -84,7 +84,6 @@ VERB = Verb(
     "Design",
     "designer run model.toml --out out/model --samples 200",
     show=show,
-    satisfied=lambda result: result.satisfied,
     parts=synthesised,
     early=(studied, tolerance),
 )

@@ -271,5 +271,4 @@ VERB = Verb(
     "Design",
     "designer search model.toml --out out/robust",
     show=show,
-    satisfied=lambda result: result.satisfied,
 )

@@ -489,5 +489,4 @@ VERB = Verb(
     "Explore",
     "designer simulate model.toml --omega 0.85 --plots pictures",
     show=show,
-    satisfied=lambda result: result.satisfied,
 )

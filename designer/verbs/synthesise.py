@@ -148,5 +148,4 @@ VERB = Verb(
     show=show,
     parts=synthesised,
     beside=_process,
-    satisfied=lambda result: result.satisfied,
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from designer.base.defaults import SEED, TRADE_BOARDS, at_least
+from designer.base.defaults import SEED, TRADE_BOARDS, check_count
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
 from designer.base.printed import tell
@@ -96,9 +96,7 @@ def trade(
     numbers: dict[str, Any] = usual | stated_options(words)
     if numbers["truth"] not in (TOP, VENDOR):
         raise InputError(None, "--truth", numbers["truth"], f"{TOP} or {VENDOR}")
-    at_least("--boards", numbers["boards"], 0)
-    if numbers["boards"] > MOST_SAMPLES:
-        raise InputError(None, "--boards", numbers["boards"], f"at most {MOST_SAMPLES}")
+    check_count("--boards", numbers["boards"], 0, MOST_SAMPLES)
     options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
     options.check()
     folder: Path | None = None

@@ -225,12 +225,7 @@ def _stretch(
     board's equations need, and where they are cut off (k, c)."""
     fastest = max([prediction.fastest, *(s.frequency_hz for s in prediction.settings)])
     width = max(int(1.0 / (fastest * STEPS * record.interval)), 1)
-    count = min(len(record.time) // width, STRETCH)
-    cut = slice(0, count * width)
-    time = (record.time[cut] - record.time[0]).reshape(count, width).mean(axis=1)
-    values = [record.signals[c][cut].reshape(count, width).mean(axis=1) for c in shown]
-    clipped = [record.cut(c)[cut].reshape(count, width).any(axis=1) for c in shown]
-    return time, np.column_stack(values), np.column_stack(clipped)
+    return record.means(shown, width, STRETCH)
 
 
 def _by_shape(

@@ -8,7 +8,7 @@ record leaves open is not reported: a figure is told where the records have narr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,10 +60,6 @@ class BoardFigure:
     def determined(self) -> bool:
         """Whether the records say more of it than the spread does."""
         return self.high - self.low < DETERMINED * 2.0 * NORMAL * self.sigma
-
-    def as_dict(self) -> dict[str, Any]:
-        """The figure as a JSON answer has it."""
-        return asdict(self)
 
 
 def determined_figures(fit: BoardFit) -> tuple[BoardFigure, ...]:
@@ -208,7 +204,7 @@ class FittedBoard:
         return {
             "board": self.name,
             "files": list(self.files),
-            "figures": [figure.as_dict() for figure in self.figures],
+            "figures": self.figures,
             "misfit": self.misfit,
             "doubtful": self.misfit is not None and self.misfit > DOUBTFUL,
             "residual": None if self.fit is None else max(self.fit.residuals),

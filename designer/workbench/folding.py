@@ -76,21 +76,16 @@ class Fold:
 def samples_of(record: Record, channels: Sequence[str], frequency: float) -> Samples:
     """The samples of these channels for a drive of about this frequency [Hz]."""
     block = max(int(1.0 / (frequency * record.interval * SAMPLES)), 1)
-    count = len(record.time) // block
-    cut = slice(0, count * block)
-    time = (record.time[cut] - record.time[0]).reshape(count, block).mean(axis=1)
-    values = [record.signals[c][cut].reshape(count, block).mean(axis=1) for c in channels]
+    time, table, clipped = record.means(channels, block)
     noise = np.array([record.noise[c] for c in channels])
     quantum = np.array([record.quantum[c] for c in channels])
     # Rounding averages out only where noise carries the signal from one step to the next.
     carried = noise > DITHER * quantum
     rounding = np.where(carried, 0.0, quantum / math.sqrt(12.0))
     floor = quantum / np.sqrt(12.0 * np.where(carried, block, 1))
-    table = np.column_stack(values)
     least = EXACT * max(float(np.ptp(table, axis=0).max()), 1e-300)
     noise = np.maximum(noise / math.sqrt(block), floor)
-    clipped = [record.cut(c)[cut].reshape(count, block).any(axis=1) for c in channels]
-    return Samples(time, table, np.maximum(noise, least), np.column_stack(clipped), rounding)
+    return Samples(time, table, np.maximum(noise, least), clipped, rounding)
 
 
 def fold(samples: Samples, frequency: float, n: int, knots: int | Sequence[int]) -> Fold:

@@ -7,9 +7,10 @@ Both say nothing of how the file was written (``record_formats``) nor of what th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -99,6 +100,21 @@ class Record:
     def span(self) -> Mapping[str, float]:
         """Largest less smallest value of each channel [V]."""
         return {name: float(np.ptp(signal)) for name, signal in self.signals.items()}
+
+    def means(
+        self, channels: Sequence[str], width: int, most: int | None = None
+    ) -> tuple[Array, Array, Mask]:
+        """Means of so many neighbours: times since the first sample (m,) [s], voltages of channels
+        (m, c) [V], and where one of the neighbours is cut off (m, c). most : of these means."""
+
+        def grouped(samples: Array | Mask) -> Any:
+            count = len(samples) // width
+            return samples[: count * width].reshape(count, width)[:most]
+
+        values = [grouped(self.signals[c]).mean(axis=1) for c in channels]
+        clipped = [grouped(self.cut(c)).any(axis=1) for c in channels]
+        time = grouped(self.time - self.time[0]).mean(axis=1)
+        return time, np.column_stack(values), np.column_stack(clipped)
 
     def moves(self, channel: str) -> bool:
         """Whether a channel shows more than rounding."""

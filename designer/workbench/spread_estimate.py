@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -54,10 +53,6 @@ class KindSpread:
     """Upper end of its 95 % interval."""
     told: float
     """How many numbers of this kind the records told in all, a part of one each."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """As a JSON answer has it."""
-        return dict(self.__dict__)
 
 
 def estimated_spread(fits: Sequence[BoardFit]) -> tuple[KindSpread, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from designer.base.defaults import (
     SEED as SEED,
     Over,
     StudyEngine,
-    at_least,
+    check_count,
     check_seed,
     cores,
 )
@@ -104,6 +104,11 @@ IN_VAIN = 0.1
 ngspice that keeps the whole interval wide."""
 
 
+LongWork = Literal["attribution", "maps", "rare", "rare answers"]
+"""Work that is kept in parts: an attribution, yield maps, estimates of rare losses, and the answers
+of boards that one of these has asked so far."""
+
+
 class Stores:
     """Where the layers of a study are kept, and its attribution; this one keeps nothing."""
 
@@ -120,20 +125,8 @@ class Stores:
     def put_attribution(self, plan: StudyPlan, attribution: Attribution) -> None:
         pass
 
-    def attribution_parts(self, plan: StudyPlan) -> StoredParts:
-        """Where the finished parts of an attribution are."""
-        return StoredParts()
-
-    def maps(self, plan: StudyPlan) -> StoredParts:
-        """Where the finished yield maps are."""
-        return StoredParts()
-
-    def rare(self, plan: StudyPlan) -> StoredParts:
-        """Where the finished estimates of rare losses are."""
-        return StoredParts()
-
-    def rare_answers(self, plan: StudyPlan) -> StoredParts:
-        """Where the answers of boards are that an estimate of rare losses has asked so far."""
+    def parts(self, work: LongWork, plan: StudyPlan) -> StoredParts:
+        """Where the finished parts of long work are."""
         return StoredParts()
 
 
@@ -195,9 +188,9 @@ def tolerance(
         warm = warmed(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
-    at_least("--samples", samples, 1)
+    check_count("--samples", samples, 1)
     check_seed(seed)
-    at_least("--jobs", jobs, 1)
+    check_count("--jobs", jobs, 1)
     if rare:
         need_drawn_boards(synthesis.modelfile)
     pool = None if fidelity == "exact" else pool
@@ -413,7 +406,7 @@ class StudyWork:
             progress=self.progress.stage(
                 "blame, boards asked again", extent_of(plan, answers, budget).steps
             ),
-            parts=self.stores.attribution_parts(plan),
+            parts=self.stores.parts("attribution", plan),
         )
         self.stores.put_attribution(plan, result)
         return replace(study, blame=result)
@@ -421,8 +414,8 @@ class StudyWork:
     def drawn_where_lost(self, study: Study) -> Study:
         """The study with an estimate of each response's losses, by boards that are drawn where they
         are lost."""
-        found, parts = [], self.stores.rare(study.plan)
-        answers = self.stores.rare_answers(study.plan)
+        found, parts = [], self.stores.parts("rare", study.plan)
+        answers = self.stores.parts("rare answers", study.plan)
         for number, index in enumerate(study.response_indices):
             name = f"rare {number}"
             result = parts.get(name)
@@ -443,7 +436,7 @@ class StudyWork:
 
         warm : ``warmed`` of ``yield_map``.
         """
-        maps, parts = [], self.stores.maps(study.plan)
+        maps, parts = [], self.stores.parts("maps", study.plan)
         for over in overs:
             for number, index in enumerate(study.response_indices):
                 b = study.checked[index].model.b

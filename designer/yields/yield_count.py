@@ -46,6 +46,11 @@ class Yield:
             return self.rate, self.rate
         return wilson(self.ok, decided)
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """The counts by the keys of the contract."""
+        return {name: getattr(self, name) for name in "ok lost grazing failed samples".split()}
+
 
 class JudgedSample(Protocol):
     """A verdict on one response of one sample, such as a `BoardRow`."""

@@ -20,8 +20,7 @@ from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import TransientSettings
-from designer.folders.sweep_store import GridStore, SweepStore
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import WorkFiles, grid_blocks, sweep_blocks
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.point_captions import caption
@@ -156,7 +155,7 @@ def subject() -> ModelSubject:
 
 def test_a_sweep_and_its_store(tmp_path: Path) -> None:
     plan = SweepPlan(subject(), "omega", np.linspace(0.7, 0.72, 3), course=BRIEF)
-    store = SweepStore(WorkFiles(tmp_path, "w", {}), "omega")
+    store = sweep_blocks(plan, WorkFiles(tmp_path, "w", {}))
     made = sweep.run(plan, store=store)
     for value, step in zip(plan.values, made.steps["down"], strict=True):
         flow = plan.subject.settings([{"omega": float(value)}])[0].flow()
@@ -169,8 +168,8 @@ def test_a_sweep_and_its_store(tmp_path: Path) -> None:
 
 def test_a_map_and_basins(tmp_path: Path) -> None:
     axes = ("omega", np.linspace(0.7, 0.72, 2), "A.upper", np.linspace(0.5, 0.6, 2))
-    store = GridStore(WorkFiles(tmp_path, "w", {}), "map", *axes)
     plan = MapPlan(subject(), *axes, course=BRIEF)
+    store = grid_blocks(plan, WorkFiles(tmp_path, "w", {}))
     made = parameter_map.run(plan, store=store)
     assert parameter_map.run(plan, store=store) == made
     for cell in made.cells:

@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 
 from designer.bifurcations import basin_shares
 from designer.bifurcations.basin_shares import BasinShares, SharePlan
-from designer.folders.share_store import ShareBlocks
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import WorkFiles, share_blocks
 from designer.model.swept_model import ModelSubject
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.oracles import Array, Plain
@@ -95,7 +94,7 @@ def test_blocks_are_taken_up_again(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     """With the same numbers of attractors, to the byte, whichever block is missing."""
     monkeypatch.setattr(basin_shares, "BLOCK", 2)
     plan = _plan(1.35, 1.47, 6, 5)
-    store = ShareBlocks(WorkFiles(tmp_path, "work", {}), "omega")
+    store = share_blocks(plan, WorkFiles(tmp_path, "work", {}))
     whole = basin_shares.run(plan, 2, store)
     files = {p: p.read_bytes() for p in sorted((tmp_path / "shares.parquet").iterdir())}
     assert len(files) == 3

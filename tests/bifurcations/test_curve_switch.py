@@ -23,8 +23,7 @@ from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, followed
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.windows import window
 from designer.dynamics.attractors import settle
-from designer.folders.curve_store import CurveBlocks
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import WorkFiles, curve_blocks
 from designer.model.swept_model import ModelSubject
 from tests.bifurcations import test_resonances_with_impacts as resonant
 from tests.bifurcations.test_codimension_two_independently import (
@@ -178,7 +177,7 @@ def test_a_fold_that_the_sweep_does_not_cross_is_had_from_a_grazing_that_it_meet
     assert stable.high.point is not None
     within = PlaneWindow((0.2175, 0.24), (0.215, 0.255))
     plan = CurvePlan(ModelSubject(PAPER), "omega", "b", 0.25, within, depth=1)
-    store = CurveBlocks(WorkFiles(tmp_path, "work", {}))
+    store = curve_blocks(plan, WorkFiles(tmp_path, "work", {}))
     grazing, fold = run(plan, [stable.high.point], store=store)
     assert (grazing.kind, grazing.begun_at) == ("grazing", None)
     (met,) = [m for m in grazing.codimension_two if m.name == "grazing meets fold"]

@@ -23,8 +23,13 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import SteadyMotion, TransientSettings, by_flow
-from designer.folders.sweep_store import GridStore, SweepStore, work_hash
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import (
+    Blocks,
+    WorkFiles,
+    grid_blocks,
+    sweep_blocks,
+    work_hash,
+)
 from designer.model.swept_model import ModelSubject
 from designer.plots import bifurcation_plots, response_colours
 from tests.dynamics.test_modal_tables import PAPER
@@ -189,16 +194,16 @@ def test_goes_on_from_any_finished_block(
     plan = _plan(0.9, 1.1, 18, *tracks, course=QUICK)
     assert len(plan.blocks(tracks[0])) == 3
 
-    def store(name: str, work: str = "w") -> SweepStore:
+    def store(name: str, work: str = "w") -> Blocks[list[SteadyMotion]]:
         (tmp_path / name).mkdir(exist_ok=True)
-        return SweepStore(WorkFiles(tmp_path / name, work, {"seed": None}), "omega")
+        return sweep_blocks(plan, WorkFiles(tmp_path / name, work, {"seed": None}))
 
     whole = sweep.run(plan, store=store("whole"))
     for track in tracks:
         for kept in (1, 2):
             place = store(f"{track}{kept}")
             for number in range(kept):
-                name = SweepStore.name(track, number)
+                name = place.name(track, number)
                 (place.files.root / name).parent.mkdir(exist_ok=True)
                 (place.files.root / name).write_bytes((tmp_path / "whole" / name).read_bytes())
             assert _text(sweep.run(plan, store=place)) == _text(whole)
@@ -224,23 +229,23 @@ def test_damaged_blocks_are_computed_again(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(sweep, "BLOCK", 8)
     notes: list[str] = []
     plan = _plan(1.0, 0.9, 12, "down", course=QUICK)
-    steps = SweepStore(WorkFiles(tmp_path, "w", {}, notes.append), "omega")
+    steps = sweep_blocks(plan, WorkFiles(tmp_path, "w", {}, notes.append))
     whole = sweep.run(plan, store=steps)
     assert len(plan.blocks("down")) > 1
-    path = tmp_path / SweepStore.name("down", 0)
-    before, last = _flipped(path), tmp_path / SweepStore.name("down", 1)
+    path = tmp_path / steps.name("down", 0)
+    before, last = _flipped(path), tmp_path / steps.name("down", 1)
     written = last.stat().st_mtime_ns
     assert steps.read("down", 0) is None
-    again = SweepStore(WorkFiles(tmp_path, "w", {}, notes.append), "omega")
+    again = sweep_blocks(plan, WorkFiles(tmp_path, "w", {}, notes.append))
     assert _text(sweep.run(plan, store=again)) == _text(whole)
     assert notes == [f"{path}: damaged, computed again"] * 2  # by each of the stores
     assert path.read_bytes() == before
     assert last.stat().st_mtime_ns == written
     axes = ("omega", np.linspace(0.8, 1.6, 3), "b", np.linspace(0.2, 0.3, 2))
-    grid = GridStore(WorkFiles(tmp_path, "w", {}, notes.append), "map", *axes)
     mapped = MapPlan(ModelSubject(PAPER), *axes)
+    grid = grid_blocks(mapped, WorkFiles(tmp_path, "w", {}, notes.append))
     made = parameter_map.run(mapped, store=grid)
-    path = tmp_path / GridStore.name("map", 1)
+    path = tmp_path / grid.name(1)
     before = _flipped(path)
     assert grid.read(1) is None
     assert parameter_map.run(mapped, store=grid) == made
@@ -248,17 +253,18 @@ def test_damaged_blocks_are_computed_again(tmp_path: Path, monkeypatch: pytest.M
     assert path.read_bytes() == before
 
 
-def test_further_clearances_are_kept(tmp_path: Path) -> None:
+def test_further_clearances_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a column of their own, which files of systems with one clearance do not have."""
     (one,) = sweep.run(_plan(0.9, 0.9, 1, "down", course=QUICK)).steps["down"]
     both = replace(one, more=((1, 0), (0, 3)))
-    store = SweepStore(WorkFiles(tmp_path, "w", {}), "omega")
+    monkeypatch.setattr(sweep, "BLOCK", 2)
+    store = sweep_blocks(_plan(0.9, 0.92, 3, "down"), WorkFiles(tmp_path, "w", {}))
     for block, steps in enumerate(([one, both], [one])):
-        store.write("down", block, [0.9] * len(steps), steps)
+        store.write(steps, "down", block)
         found = store.read("down", block)
         assert found is not None
         assert [(s.counts, s.response) for s in found] == [(s.counts, s.response) for s in steps]
-        names = pq.read_schema(tmp_path / SweepStore.name("down", block)).names
+        names = pq.read_schema(tmp_path / store.name("down", block)).names
         assert ("more" in names) == (block == 0)
 
 
@@ -266,7 +272,7 @@ def test_map_by_settling(tmp_path: Path) -> None:
     plan = MapPlan(
         ModelSubject(PAPER), "omega", np.linspace(0.8, 1.6, 12), "b", np.linspace(0.15, 0.4, 6)
     )
-    store = GridStore(WorkFiles(tmp_path, "w", {}), "map", "omega", plan.xs, "b", plan.ys)
+    store = grid_blocks(plan, WorkFiles(tmp_path, "w", {}))
     made = parameter_map.run(plan, jobs=2, store=store)
     assert parameter_map.run(plan, store=store) == made  # read again
     assert [(c.i, c.j) for c in made.cells] == [(i, j) for i in range(6) for j in range(12)]

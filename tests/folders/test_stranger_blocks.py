@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,10 +24,14 @@ from designer.bifurcations.sweep import SweepPlan
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion, TransientSettings
 from designer.folders import sweep_store
-from designer.folders.curve_store import CurveBlocks
-from designer.folders.share_store import ShareBlocks
-from designer.folders.sweep_store import GridStore, SweepStore
-from designer.folders.work_files import WorkFiles
+from designer.folders.sweep_store import (
+    Blocks,
+    WorkFiles,
+    curve_blocks,
+    grid_blocks,
+    share_blocks,
+    sweep_blocks,
+)
 from designer.model.swept_model import ModelSubject
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.resealed import Change, reseal, with_value
@@ -35,7 +40,7 @@ SUBJECT = ModelSubject(PAPER)
 QUICK = TransientSettings(40, 16, 400)
 VALUES = np.linspace(1.4, 1.5, 3)
 SWEEP = SweepPlan(SUBJECT, "omega", VALUES, ("down",), course=QUICK)
-AXES = ("omega", np.linspace(1.4, 1.5, 2), "b", np.array([0.25]))
+MAP = MapPlan(SUBJECT, "omega", np.linspace(1.4, 1.5, 2), "b", np.array([0.25]))
 BOX = np.outer(SUBJECT.scale([{"omega": 1.4}]), [-1.0, 1.0])
 SHARES = SharePlan(SUBJECT, "omega", VALUES, BOX, np.random.default_rng(3).random((3, 5)), seed=3)
 CURVES = CurvePlan(SUBJECT, "omega", "b", 0.25, PlaneWindow((1.3, 1.6), (0.2, 0.3)), depth=0)
@@ -102,8 +107,8 @@ class _Sweep:
         "too many periods": with_value("minima", [0.1] * 1000),
     }
 
-    def store(self, folder: Path, notes: list[str]) -> SweepStore:
-        return SweepStore(files(folder, notes), "omega")
+    def store(self, folder: Path, notes: list[str]) -> Blocks[Any]:
+        return sweep_blocks(SWEEP, files(folder, notes))
 
     def read(self, folder: Path, notes: list[str]) -> object:
         return self.store(folder, notes).read("down", 0)
@@ -112,7 +117,7 @@ class _Sweep:
         made = sweep.run(SWEEP, store=self.store(folder, notes))
         return repr([step.__dict__ for step in made.steps["down"]])
 
-    path = SweepStore.name("down", 0)
+    path = "sweep.parquet/down-000000.parquet"
     columns = (
         "track: string, omega: double, status: string, n: int64, p: int64, q: int64, "
         "symmetric: bool, lyapunov: double, lyapunov_error: double, radius: double, "
@@ -140,16 +145,16 @@ class _Map:
         "another system": with_value("strobe", [0.1] * 6),
     }
 
-    def store(self, folder: Path, notes: list[str]) -> GridStore:
-        return GridStore(files(folder, notes), "map", *AXES)
+    def store(self, folder: Path, notes: list[str]) -> Blocks[Any]:
+        return grid_blocks(MAP, files(folder, notes))
 
     def read(self, folder: Path, notes: list[str]) -> object:
         return self.store(folder, notes).read(0)
 
     def run(self, folder: Path, notes: list[str]) -> object:
-        return parameter_map.run(MapPlan(SUBJECT, *AXES), store=self.store(folder, notes)).cells
+        return parameter_map.run(MAP, store=self.store(folder, notes)).cells
 
-    path = GridStore.name("map", 0)
+    path = "map.parquet/row-000000.parquet"
     columns = (
         "i: int64, j: int64, omega: double, b: double, status: string, n: int64, p: int64, "
         "q: int64, symmetric: bool, lyapunov: double, strobe: list<element: double>"
@@ -177,8 +182,8 @@ class _Shares:
         "another system": with_value("strobes", [[0.1] * 6]),
     }
 
-    def store(self, folder: Path, notes: list[str]) -> ShareBlocks:
-        return ShareBlocks(files(folder, notes), "omega")
+    def store(self, folder: Path, notes: list[str]) -> Blocks[Any]:
+        return share_blocks(SHARES, files(folder, notes))
 
     def read(self, folder: Path, notes: list[str]) -> object:
         return self.store(folder, notes).read(0)
@@ -186,7 +191,7 @@ class _Shares:
     def run(self, folder: Path, notes: list[str]) -> object:
         return basin_shares.run(SHARES, store=self.store(folder, notes)).steps
 
-    path = ShareBlocks.name(0)
+    path = "shares.parquet/block-000000.parquet"
     columns = (
         "omega: double, attractor: int64, status: string, n: int64, p: int64, q: int64, "
         "more: list<element: list<element: int64>>, symmetric: bool, twin: int64, count: int64, "
@@ -225,8 +230,8 @@ class _Curves:
         "a phase of no number": other("phase", float("nan")),
     }
 
-    def store(self, folder: Path, notes: list[str]) -> CurveBlocks:
-        return CurveBlocks(files(folder, notes))
+    def store(self, folder: Path, notes: list[str]) -> Blocks[Any]:
+        return curve_blocks(CURVES, files(folder, notes))
 
     def read(self, folder: Path, notes: list[str]) -> object:
         return self.store(folder, notes).read(0)
@@ -234,10 +239,10 @@ class _Curves:
     def run(self, folder: Path, notes: list[str]) -> object:
         store = self.store(folder, notes)
         if not (folder / self.path).exists():
-            store.write(0, [CURVE])
+            store.write([CURVE], 0)
         return [curve.as_dict() for curve in border_curves.run(CURVES, [], store=store)]
 
-    path = CurveBlocks.name(0)
+    path = "curves.parquet/block-000000.parquet"
     columns = (
         "kind: string, response: string, symmetric: bool, "
         "points: list<element: list<element: double>>, stable: list<element: bool>, "
@@ -284,14 +289,14 @@ def test_blocks_of_several_stops_have_the_columns_of_earlier_versions(tmp_path: 
         velocities=place, further=(place,), periods=4,
     )  # fmt: skip
     cell = MapCell(**shared, i=0, j=0, strobe=tuple(place.tolist()))
-    store = SweepStore(files(tmp_path, []), "omega")
-    store.write("down", 0, [1.4], [step])
+    store = sweep_blocks(replace(SWEEP, values=VALUES[:1]), files(tmp_path, []))
+    store.write([step], "down", 0)
     assert columns(tmp_path / _Sweep.path) == (
         f"{_Sweep.columns}, more: list<element: list<element: int64>>, "
         "further: list<element: list<element: double>>"
     )
-    grid = GridStore(files(tmp_path, []), "map", *AXES)
-    grid.write(0, [cell])
+    grid = grid_blocks(MAP, files(tmp_path, []))
+    grid.write([cell], 0)
     assert columns(tmp_path / _Map.path) == (
         f"{_Map.columns}, more: list<element: list<element: int64>>"
     )

@@ -45,8 +45,7 @@ from designer.explorer.questions import read_question
 from designer.explorer.response_map import read_map
 from designer.explorer.saved_model import PinnedResponse, place_for, read_pins, saved_text
 from designer.folders.study_cache import StudyCache
-from designer.jobs.second_format import second_format
-from designer.jobs.template import SECOND, TEXT
+from designer.jobs.template import SECOND, TEXT, second_format
 from designer.model.measured_values import read_measured
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.routing.board_copper import read_copper

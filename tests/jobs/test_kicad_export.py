@@ -232,7 +232,7 @@ def test_a_case_without_a_footprint_stops_the_export_alone(
     """synthesise goes on and says it; export says what is accepted."""
     from designer.base.progress import Progress
     from designer.jobs import synthesise_job
-    from designer.jobs.export_job import export_into
+    from designer.jobs.export_job import Export
     from designer.jobs.options import Options
     from designer.model.model_file import read_model_file
 
@@ -254,7 +254,7 @@ def test_a_case_without_a_footprint_stops_the_export_alone(
     assert any("no KiCad project" in n and "Other:QFN" in n for n in notes.notes)
     assert not (tmp_path / "design" / "kicad").exists()
     with pytest.raises(InputError, match="Other:QFN"):
-        export_into(read_model_file(model), tmp_path / "design", Options(), notes)
+        Export(read_model_file(model), tmp_path / "design", Options(), notes).project()
 
 
 def test_the_sheet_takes_the_gate_s_settings_unless_somebody_changed_it(

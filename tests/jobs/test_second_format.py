@@ -10,8 +10,7 @@ from hypothesis import given, strategies as st
 
 from designer.base.errors import InputError
 from designer.cli import entry
-from designer.jobs.second_format import second_format
-from designer.jobs.template import SECOND, TEXT
+from designer.jobs.template import SECOND, TEXT, second_format
 from designer.model.driven import model_flow
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Mechanical

@@ -302,13 +302,13 @@ def plan_of(**more: Any) -> Any:
 
 
 def test_lengths_and_speeds_are_read_in_their_units() -> None:
-    sweep = plan_of(over="b", low="0.4 mm", high=0.3, frequency="54.1 Hz")
+    sweep = plan_of(over="b", from_="0.4 mm", to=0.3, frequency="54.1 Hz")
     assert sweep.values[[0, -1]] == pytest.approx([0.4e-3 / LENGTH, 0.3], rel=1e-12)
     assert sweep.subject.omega == pytest.approx(2.0 * math.pi * 54.1 * TIME, rel=1e-12)
-    both = plan_of(over="b", low="0.4 mm", high="0.5 mm", second=("omega", "40 Hz", "1.9", 3))
+    both = plan_of(over="b", from_="0.4 mm", to="0.5 mm", map_=("omega", "40 Hz", "1.9", 3))
     assert isinstance(both, MapPlan)
     assert both.ys[[0, -1]] == pytest.approx([80.0 * math.pi * TIME, 1.9], rel=1e-12)
-    plane = plan_of(basins=True, low="-1 mm", high="1 mm", second=("x2'", "-50 mm/s", "0.1", 3))
+    plane = plan_of(basins=True, from_="-1 mm", to="1 mm", map_=("x2'", "-50 mm/s", "0.1", 3))
     assert plane.xs[[0, -1]] == pytest.approx([-1e-3 / LENGTH, 1e-3 / LENGTH], rel=1e-12)
     assert plane.ys[[0, -1]] == pytest.approx([-50e-3 / SPEED, 0.1], rel=1e-12)
 
@@ -316,12 +316,12 @@ def test_lengths_and_speeds_are_read_in_their_units() -> None:
 @pytest.mark.parametrize(
     ("more", "option", "expected"),
     [
-        ({"over": "zeta", "low": "0.1 m", "high": 0.2}, "--from", "zeta has no unit"),
-        ({"over": "b", "low": 0.2, "high": "10 Hz"}, "--to", "in m"),
-        ({"low": 1.0, "high": "2 mm"}, "--to", "62.8 rad/s"),
-        ({"low": 1.0, "high": 2.0, "frequency": "10 Hz"}, "--frequency", "is swept"),
+        ({"over": "zeta", "from_": "0.1 m", "to": 0.2}, "--from", "zeta has no unit"),
+        ({"over": "b", "from_": 0.2, "to": "10 Hz"}, "--to", "in m"),
+        ({"from_": 1.0, "to": "2 mm"}, "--to", "62.8 rad/s"),
+        ({"from_": 1.0, "to": 2.0, "frequency": "10 Hz"}, "--frequency", "is swept"),
         (
-            {"over": "b", "low": 0.2, "high": 0.3, "frequency": "10 Hz", "omega": 1.0},
+            {"over": "b", "from_": 0.2, "to": 0.3, "frequency": "10 Hz", "omega": 1.0},
             "--frequency",
             "beside --omega",
         ),
@@ -344,7 +344,7 @@ def test_a_board_is_swept_in_its_own_units() -> None:
 
 
 def test_pictures_have_axes_in_si_units() -> None:
-    sweep = plan_of(low="50 Hz", high="60 Hz", periods=40, keep=2)
+    sweep = plan_of(from_="50 Hz", to="60 Hz", periods=40, keep=2)
     from designer.bifurcations import sweep as sweeps
 
     figure = bifurcation_plots.diagram(sweeps.run(sweep, 1))
@@ -353,7 +353,7 @@ def test_pictures_have_axes_in_si_units() -> None:
     heights = {a.get_ylabel() for axes in figure.axes for a in axes.child_axes}
     assert {"mm", "mm/s"} <= heights
     plain = bifurcation_request.plan_of(
-        Request(low=0.8, high=0.9, steps=3, periods=20, keep=2),
+        Request(from_=0.8, to=0.9, steps=3, periods=20, keep=2),
         ModelSubject(Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)),
         parse_model_file("format = 1\n" + PAPER_TABLE),
     )

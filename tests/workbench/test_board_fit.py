@@ -15,8 +15,14 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.reduction import Reduction
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.spread.spread import Spread, draw_many
-from designer.workbench.board_fit import BoardFit, NoSuchBoard, fit_board, orbit_slopes
-from designer.workbench.board_orbits import NetOrbit, follow
+from designer.workbench.board_fit import (
+    BoardFit,
+    NetOrbit,
+    NoSuchBoard,
+    fit_board,
+    follow,
+    orbit_slopes,
+)
 from designer.workbench.board_prior import Prior
 from designer.workbench.fitted_board import NORMAL, board_figures, determined_figures, figures
 from designer.workbench.observation import observe

@@ -38,7 +38,7 @@ from designer.yields.loss_attribution import attribute
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
-from designer.yields.tolerance_study import GROWTH, Stores, StudyWork, tolerance
+from designer.yields.tolerance_study import GROWTH, LongWork, Stores, StudyWork, tolerance
 from tests.folders.test_study_cache import MAP
 from tests.shared.folder_contents import differing, without_cost
 from tests.shared.model_text import SMALL
@@ -374,7 +374,7 @@ def test_a_map_that_is_there_is_not_made_again(
         return MAP
 
     class Kept(Stores):
-        def maps(self, plan: Any) -> StoredParts:
+        def parts(self, work: LongWork, plan: Any) -> StoredParts:
             return pieces
 
     monkeypatch.setattr(tolerance_study, "yield_map", yield_map)
