@@ -38,7 +38,7 @@ from designer.dynamics.attractors import settle, starts, twin
 from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.orbit import Orbit
 from designer.folders import origin
-from designer.folders.curve_store import curves_csv
+from designer.folders.sweep_tables import curves_csv
 from designer.folders.sweep_store import write_sweep
 from designer.model import swept_model
 from designer.model.find_responses import scale_of
