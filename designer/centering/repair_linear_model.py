@@ -47,8 +47,8 @@ from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
 from designer.yields import margins
+from designer.yields.loss_regions import OFTEN, WIDE
 from designer.yields.margins import Margin
-from designer.yields.rare_losses import OFTEN, WIDE
 from designer.yields.trimmed_yield import HIGH, LOW, DcTrim, trimmed_boards
 
 SHOWN = 4

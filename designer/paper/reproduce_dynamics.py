@@ -38,8 +38,8 @@ from designer.dynamics.attractors import settle, starts, twin
 from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.orbit import Orbit
 from designer.folders import origin
-from designer.folders.sweep_tables import curves_csv
 from designer.folders.sweep_store import write_sweep
+from designer.folders.sweep_tables import curves_csv
 from designer.model import swept_model
 from designer.model.find_responses import scale_of
 from designer.model.model_file import parse_model_file

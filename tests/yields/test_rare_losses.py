@@ -22,9 +22,10 @@ from designer.cli import entry
 from designer.folders.study_cache import StudyCache
 from designer.folders.study_stores import PIECES
 from designer.model.model_file import parse_model_file
+from designer.spread import loss_walks
 from designer.spread.tilted_cube import TiltedCube, mean_of, tilt_of, width_of
 from designer.verdicts.verdict import Verdict
-from designer.yields import loss_walks, rare_losses, stored_parts
+from designer.yields import drawn_boards, loss_regions, rare_losses, stored_parts
 from designer.yields.margins import Margin
 from designer.yields.rare_losses import AnyLost, RareLosses, counted_losses
 from designer.yields.stored_parts import AnswerLog, StoredParts
@@ -116,11 +117,11 @@ def estimated(
     )  # fmt: skip
     limits = [] if limit is None else [SimpleNamespace(what="a limit")]
     margin = SimpleNamespace(limits=limits, each=lambda boards: limit(boards.points)[:, None])  # type: ignore[misc]
-    monkeypatch.setattr(rare_losses._Drawing, "_verdicts", verdicts)
-    monkeypatch.setattr(rare_losses._Drawing, "_kinds", kinds)
-    monkeypatch.setattr(rare_losses._Drawing, "quick", True)
-    monkeypatch.setattr(rare_losses, "nominal_limits", lambda *_, **__: margin)
-    monkeypatch.setattr(rare_losses, "between", wider)
+    monkeypatch.setattr(drawn_boards.Drawing, "_verdicts", verdicts)
+    monkeypatch.setattr(drawn_boards.Drawing, "_kinds", kinds)
+    monkeypatch.setattr(drawn_boards.Drawing, "quick", True)
+    monkeypatch.setattr(loss_regions, "nominal_limits", lambda *_, **__: margin)
+    monkeypatch.setattr(drawn_boards, "between", wider)
     return rare_losses.rare_losses(plan, 0, **how)
 
 
@@ -183,7 +184,7 @@ def test_a_limit_of_the_nominal_board_leads_to_the_losses(monkeypatch: pytest.Mo
     def lost(points: Array) -> list[str]:
         return ["1-0-0" if m < 0.0 else "" for m in margin(points)]
 
-    monkeypatch.setattr(rare_losses, "_by_wider_boards", lambda *_: ([], 0))
+    monkeypatch.setattr(loss_regions, "_by_wider_boards", lambda *_: ([], 0))
     found = [estimated(monkeypatch, 16, lost, seed, lost, margin) for seed in range(REPETITIONS)]
     assert sum(r.low <= truth <= r.high for r in found) >= 52
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
@@ -225,7 +226,7 @@ def test_plenty_of_losses_are_counted_on_plain_boards(monkeypatch: pytest.Monkey
     def never(*_: object) -> None:
         raise AssertionError("sought")
 
-    monkeypatch.setattr(rare_losses, "_regions", never)
+    monkeypatch.setattr(rare_losses, "find_regions", never)
     found = [estimated(monkeypatch, 12, lost, seed) for seed in range(REPETITIONS)]
     assert sum(r.low <= truth <= r.high for r in found) >= 52
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
@@ -499,7 +500,7 @@ def test_an_interrupted_estimate_goes_on_where_it_was(
 ) -> None:
     """No board that was answered is asked again, and the end is the same to the last digit."""
     monkeypatch.setattr(stored_parts, "EVERY", 0.0)
-    monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
+    monkeypatch.setattr(loss_regions, "FEW_MOVES", 20)
     whole = _Asked()
     expected = replace(estimated(monkeypatch, 12, whole, 1), seconds=0.0)
     path, done = tmp_path / "pieces.npz", 0
@@ -580,13 +581,13 @@ def share_of(counted: Yield) -> RareLosses:
 # On boards
 
 
-def drawing_of(text: str) -> rare_losses._Drawing:
+def drawing_of(text: str) -> drawn_boards.Drawing:
     """Boards of the one response of a model file."""
     modelfile = parse_model_file(text)
     made = synthesise(modelfile)
     plan = plan_study(modelfile, made.design, check(made, None), made.catalog, samples=1, seed=1)
     log = AnswerLog(StoredParts(), "")
-    return rare_losses._Drawing(plan, plan.questions[0], 1, lambda: None, log)
+    return drawn_boards.Drawing(plan, plan.questions[0], 1, lambda: None, log)
 
 
 def test_what_is_foretold_of_boards_is_what_they_show() -> None:
@@ -596,9 +597,9 @@ def test_what_is_foretold_of_boards_is_what_they_show() -> None:
     assert drawing.quick
     points = np.random.default_rng(5).random((96, len(drawing.names)))
     wide = np.full(96, 8.0)
-    known = drawing.asked(points, wide, within=rare_losses.SCOUTED)
-    lost = ["" if v is Verdict.OK else rare_losses._kind_of(r) for v, r in known]
-    assert {"", "clipped", rare_losses.OTHER} < set(lost)
+    known = drawing.asked(points, wide, within=drawn_boards.SCOUTED)
+    lost = ["" if v is Verdict.OK else drawn_boards.kind_of(r) for v, r in known]
+    assert {"", "clipped", drawn_boards.OTHER} < set(lost)
     assert replace(drawing, jobs=3).foretold(points, wide, whole=True) == lost
     quickly = drawing.foretold(points, wide, whole=False)
     assert all(a in (b, "") for a, b in zip(quickly, lost, strict=True))
@@ -626,10 +627,10 @@ def test_the_verb_writes_it_and_takes_it_over(
 ) -> None:
     monkeypatch.setattr(rare_losses, "MOST_BOARDS", 60)
     monkeypatch.setattr(rare_losses, "BLOCK", 30)
-    monkeypatch.setattr(rare_losses, "PILOT", 30)
-    monkeypatch.setattr(rare_losses, "EXPLORED", 64)
+    monkeypatch.setattr(loss_regions, "PILOT", 30)
+    monkeypatch.setattr(loss_regions, "EXPLORED", 64)
     monkeypatch.setattr(loss_walks, "BOARDS", 12)
-    monkeypatch.setattr(rare_losses, "FEW_MOVES", 20)
+    monkeypatch.setattr(loss_regions, "FEW_MOVES", 20)
     monkeypatch.setattr(stored_parts, "EVERY", 0.0)
     model, folder = tmp_path / "model.toml", tmp_path / "d"
     model.write_text(SMALL, "utf-8")
@@ -646,7 +647,7 @@ def test_the_verb_writes_it_and_takes_it_over(
     monkeypatch.setattr(rare_losses, "_margins", stopped)
     assert entry.status(command) == 130
     monkeypatch.setattr(rare_losses, "_margins", margins)
-    monkeypatch.setattr(rare_losses._Drawing, "_verdicts", never)
+    monkeypatch.setattr(drawn_boards.Drawing, "_verdicts", never)
     assert entry.status([*command, "--resume"]) == 0
     assert not (folder / PIECES).exists()
     assert "Rare losses" in capsys.readouterr().err
@@ -679,6 +680,6 @@ def test_no_limit_is_asked_for_without_a_period(monkeypatch: pytest.MonkeyPatch)
     def never(*_: object, **__: object) -> Margin:
         raise AssertionError("followed")
 
-    monkeypatch.setattr(rare_losses, "nominal_limits", never)
+    monkeypatch.setattr(loss_regions, "nominal_limits", never)
     monkeypatch.setattr(rare_losses, "MOST_BOARDS", 500)
     estimated(monkeypatch, 3, lambda points: [""] * len(points), 2)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from designer.base.arrays import Array
-from designer.yields.loss_walks import LossWalk, independent, walk
+from designer.spread.loss_walks import LossWalk, independent, walk
 from tests.shared.closed_forms import irwin_hall
 
 SIZE, SUMMED = 60, 12
