@@ -202,11 +202,11 @@ def _led_back(
         lost = drawing.scouted(points, np.zeros(len(points), dtype=int)).lost
         asked += len(points)
         even, share = np.ones(len(points)), independent(points) / len(points)
-        for mine in _sides(points, even, lost, share) if lost.any() else ():
+        sides = list(_sides(points, even, lost, share)) if lost.any() else []
+        sides.sort(key=lambda mine: -mine.sum())
+        for mine in sides:
             count = share * float(mine.sum())
-            if (
-                count < FEWEST and mine.sum() < lost.sum()
-            ):  # too few tell where; others begin there again
+            if count < FEWEST and mine is not sides[0]:  # few, by which others begin again
                 continue
             tilt = _tilt(points[mine], even[mine], may, np.zeros(len(may)), count)
             if tilt.any():
