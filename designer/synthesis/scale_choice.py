@@ -244,9 +244,9 @@ class ScaleChoice:
         return np.asarray(np.log(np.max(each, axis=0) / rule.limit))
 
     def _circuits(self) -> Iterator[ScaleAttempt | Shortfall]:
-        """Circuits of the best candidates, as they are ranked: up to ``DECLINED`` as they are meant,
-        then up to ``TRIED`` whose error is not that of their candidate, then those whose offsets
-        are too large."""
+        """Circuits of the best candidates, as they are ranked: up to ``DECLINED`` as meant, then up
+        to ``TRIED`` whose error is not that of their candidate, then those whose offsets are too
+        large."""
         why = Shortfall("coefficients", False)
         worse: list[tuple[bool, float, ScaleAttempt]] = []
         given = tried = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -384,15 +384,12 @@ def test_the_board_has_a_jack_for_each_channel() -> None:
 def test_no_record_of_such_a_board_is_named() -> None:
     for name, found in (("square", "another shape"), ("two phases", "a second channel")):
         prediction = BoardPrediction(made(name))
-        asks: list[Callable[[], object]] = [
-            lambda p=prediction: check_fits(p, fit=False, boards=False, decays=[]),
-            lambda p=prediction: p.settings,
-            lambda p=prediction: p.responses,
-        ]
-        for ask in asks:
-            with pytest.raises(InputError, match=r"one sine drives$") as refused:
-                ask()
-            assert refused.value.found == f"a board whose drive has {found}"
+        with pytest.raises(InputError, match=r"one sine drives$") as refused:
+            check_fits(prediction, fit=False, boards=False, decays=[])
+        assert refused.value.found == f"a board whose drive has {found}"
+        for asked in ("settings", "responses"):
+            with pytest.raises(InputError, match=r"one sine drives$"):
+                getattr(prediction, asked)
         assert prediction.zones
 
 
@@ -444,8 +441,7 @@ def test_waves_of_another_attractor_are_not_predicted(monkeypatch: pytest.Monkey
     assert shown.orbit is orbit
     assert orbit.n == 1
     assert np.abs(x - orbit.start).max() < 1e-9 * np.abs(orbit.extremes).max()
-    for changed in ({"p": orbit.p + 1}, {"n": 2}, {"n": 0}):
-        other = replace(orbit, **changed)
+    for other in (replace(orbit, p=orbit.p + 1), replace(orbit, n=2), replace(orbit, n=0)):
         monkeypatch.setattr(prediction_module, "settle", lambda *_, other=other: other)
         assert BoardPrediction(result).responses == ()
 
