@@ -22,7 +22,12 @@ def dumps(value: object, *, indent: int | None = 2) -> str:
 
 
 def plain(value: object) -> Any:
-    """The value in dicts, lists, str, int, bool, finite float and None; a record by its fields."""
+    """The value in dicts, lists, str, int, bool, finite float and None; a record by its fields.
+
+    Raises
+    ------
+    TypeError : something else, or a record with an ``as_dict``, whose keys are not its fields.
+    """
     if value is None or isinstance(value, bool | np.bool_):
         return None if value is None else bool(value)
     if isinstance(value, str):
@@ -37,6 +42,6 @@ def plain(value: object) -> Any:
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray | Sequence):
         return [plain(v) for v in value]
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, type) and not hasattr(value, "as_dict"):
         return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
     raise TypeError(f"{type(value).__name__} has no JSON form")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,7 +17,7 @@ from designer.centering.ngspice_check import FIDELITY, STRETCH
 from designer.centering.scaled_sigma import LADDER, STREAM
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
-from designer.verdicts.cross_check import CrossCheck
+from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict
 from designer.verdicts.verdict import Answer, Verdict
 
 Rank = tuple[float, float] | None
@@ -92,23 +93,27 @@ def confirmation_json(
     """
     out: list[dict[str, Any]] = []
     for index in range(responses):
-        of_response = [h for h in checks if response_of[h.question] == index]
-        ok = [answers[h.sample, h.question].verdict is Verdict.OK for h in of_response]
-        agreed = [h.agrees(answers[h.sample, h.question]) is True for h in of_response]
-        differ = [h for h, same in zip(of_response, agreed, strict=True) if not same]
+        pairs = [
+            (h, answers[h.sample, h.question]) for h in checks if response_of[h.question] == index
+        ]
+        outcomes = Counter(h.outcome(a) for h, a in pairs)
+        both = [h for h, a in pairs if a.verdict is Verdict.OK and h.agrees(a)]
         out.append(
             {
-                "asked": len(of_response),
-                "agreed": sum(agreed),
-                "ok_on_both": sum(a and b for a, b in zip(ok, agreed, strict=True)),
+                "asked": len(pairs),
+                "agreed": outcomes[NgspiceVerdict.AGREED],
+                "undecided": outcomes[NgspiceVerdict.UNDECIDED],
+                "failed": outcomes[NgspiceVerdict.FAILED],
+                "ok_on_both": len(both),
                 "differences": [
                     {
                         "sample": h.sample,
-                        "exact": answers[h.sample, h.question].response,
+                        "exact": a.response,
                         "ngspice": h.response,
                         "reason": h.reason,
                     }
-                    for h in differ
+                    for h, a in pairs
+                    if h.outcome(a) is NgspiceVerdict.DIFFERED
                 ],
                 "gate": None,
                 "limited_by": None,

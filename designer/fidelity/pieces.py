@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from designer.base.guarded_reading import UNREADABLE
 from designer.base.keyed_store import Lines, Note
 from designer.base.plain_json import plain
 from designer.base.progress import quiet
-from designer.base.record_check import checked_record, read_record
+from designer.base.record_check import checked_record, fits, read_record
 from designer.fidelity.fidelity_errors import FidelityError, Truth
 from designer.fidelity.yields import Tally
 from designer.spice.deck import SolverSettings
@@ -26,8 +26,6 @@ from designer.spice.deck import SolverSettings
 PIECES = "trade-pieces.json"
 CHUNK = 100
 """Boards of a piece."""
-_NUMBERS = {"seconds", "error", "velocity", "numerical", "convergence"}
-"""Fields of a row that are numbers, or numbers by truth."""
 
 
 class TradePieces:
@@ -78,20 +76,31 @@ def read_pieces(path: Path, key: str, note: Note = quiet) -> dict[str, dict[str,
 
 def _may_be(name: str, piece: Mapping[str, Any]) -> bool:
     """Whether a piece is such as ``fidelities`` or ``tally`` read."""
+    elapsed: Any = piece.get("elapsed")
+    if not fits(elapsed, float) or not elapsed >= 0.0:
+        return False
     try:
         if name.startswith("rungs "):
             fidelities(piece)
-            return _number(piece["elapsed"]) >= 0.0
+            return True
         counts = {k: v for k, v in asdict(tally(piece)).items() if isinstance(v, int)}
     except UNREADABLE:
         return False
     counts.pop("runs", None)
-    boards = all(0 <= count <= CHUNK for count in counts.values())
-    return boards and _number(piece["elapsed"]) >= 0.0
+    return all(0 <= count <= CHUNK for count in counts.values())
 
 
 def _lines(key: str) -> Lines:
     return Lines("pieces", key)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What of a response at every fidelity may have numbers that are not finite."""
+
+    rows: tuple[FidelityError, ...]
+    truth: Truth
+    seconds: float
 
 
 def fidelities_json(
@@ -110,19 +119,16 @@ def fidelities(
     piece: Mapping[str, Any],
 ) -> tuple[tuple[FidelityError, ...], Truth, SolverSettings | None, float]:
     """The inverse of ``fidelities_json``; numbers that are not finite come back as nan."""
-    settings = piece["settings"]
+    values = {f.name: piece[f.name] for f in fields(_Measured)}
+    measured, settings = read_record(_Measured, values, null=math.nan), piece["settings"]
     return (
-        tuple(read_record(FidelityError, row, null=math.nan) for row in piece["rows"]),
-        read_record(Truth, piece["truth"], null=math.nan),
+        measured.rows,
+        measured.truth,
         None if settings is None else checked_record(SolverSettings, settings),
-        _number(piece["seconds"]),
+        measured.seconds,
     )
 
 
 def tally(piece: Mapping[str, Any]) -> Tally:
     """Counts of a piece of boards."""
     return checked_record(Tally, {f.name: piece[f.name] for f in fields(Tally)})
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)

@@ -14,9 +14,8 @@ from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.plain_json import dumps
 from designer.base.printed import one_line
 from designer.base.progress import Progress
-from designer.circuit.design import Design, GeneratorSetting
+from designer.circuit.design import GeneratorSetting
 from designer.dynamics.counts import read_counts
-from designer.dynamics.drive_shape import has_harmonics
 from designer.folders.report_sections import BENCHED as NAME
 from designer.model.model import SiScales
 from designer.model.si_units import mechanism_json
@@ -50,7 +49,7 @@ class BenchedRecord:
     overlay: Overlay | None
     """The record over the nominal board's orbit; None where there is none."""
     setting: GeneratorSetting | None
-    """The nearest setting of ``setup.csv``; None where none is near."""
+    """As of ``near_setting``."""
     board: FittedBoard | None = None
     """The board that it is of, fitted to all of its records; None where none was asked for."""
 
@@ -113,10 +112,10 @@ def _fits(record: BenchedRecord) -> bool:
 def check_fits(
     prediction: BoardPrediction, *, fit: bool, boards: bool, decays: Sequence[Path]
 ) -> None:
-    """InputError where the generator does not give one sine, for records are recognised by it, and
-    where boards with laws, or with dampers in their stops, are to be fitted: the fit knows contacts
-    alone, and rates that are continuous there."""
-    _check_drive(prediction.synthesis.design)
+    """InputError where the generator does not give one sine, and where boards with laws, or with
+    dampers in their stops, are to be fitted: the fit knows contacts alone, and rates that are
+    continuous there."""
+    prediction.check_drive()
     laws = ", ".join(dict.fromkeys(bend.bend_of for bend in prediction.circuit.bends))
     asked = {"--fit": fit, "--boards": boards, "--decay": bool(decays)}
     for option, wanted in asked.items():
@@ -126,14 +125,6 @@ def check_fits(
         if wanted and prediction.circuit.dependent_capacitors:
             expected = "a board whose stops have no dampers; records alone are named"
             raise InputError(None, option, "a board with dampers in its stops", expected)
-
-
-def _check_drive(design: Design) -> None:
-    shapes = design.drive_shapes
-    if len(shapes) > 1 or has_harmonics(*shapes):
-        found = "a second channel" if len(shapes) > 1 else "another shape"
-        expected = "records of a board that one sine drives"
-        raise InputError(None, "--record", f"a board whose drive has {found}", expected)
 
 
 def check_decays(files: Sequence[Path], decays: Sequence[Path], several: bool) -> None:
@@ -224,7 +215,7 @@ def picture_names(files: Sequence[Path]) -> list[str]:
 
 
 def near_setting(frequency: float, prediction: BoardPrediction) -> GeneratorSetting | None:
-    """The setting of ``setup.csv`` whose frequency is nearest, if it is near."""
+    """The setting whose frequency is nearest, if it is near."""
     gaps = [(abs(frequency / s.frequency_hz - 1.0), s) for s in prediction.settings]
     gap, setting = min(gaps, key=lambda pair: pair[0], default=(math.inf, None))
     return setting if gap < NEAR else None

@@ -109,7 +109,7 @@ def all_confirmed(confirmation: Mapping[str, Any]) -> bool:
 
 def confirms(row: Mapping[str, Any]) -> bool:
     """Whether ngspice confirms a response: its gate passed, and of the boards that it simulated
-    at most the share ``DIFFERING`` differ or have no answer."""
+    at most the share ``DIFFERING`` differ, are undecided or failed."""
     passed = row["gate"] is not None and row["gate"]["passed"]
     boards, agreed = int(row["asked"]), int(row["agreed"])
     return bool(passed and boards and boards - agreed <= DIFFERING * boards)

@@ -57,9 +57,13 @@ TANGENTS, CUTS = 12, 3
 """Tangents of it at the best point, at most; and at corners of each range of thresholds."""
 STEP = 1e-4
 """Of a logarithm: for the slope of a tangent."""
-TRIED, DECLINED, MOST_TRIED = 6, 12, 30
-"""Choices of which no circuit can be made, or not as it is meant, until the search ends; circuits
-that may be asked for; choices with those whose offsets are too large."""
+MOST_TRIED = 30
+"""Choices, the best ones first, of which circuits are made."""
+TRIED = 6
+"""Choices that have no circuit, or one with a larger error than they have: no more circuits are
+made after so many. One whose offsets are too large does not count."""
+DECLINED = 12
+"""Circuits as they are meant: no more are made after so many."""
 GOAL, ENOUGH = 0.1, 0.5
 """Of the resistors' grade: an error up to the first is worth nothing more; one up to the second is
 worth no lower thresholds."""
@@ -240,8 +244,9 @@ class ScaleChoice:
         return np.asarray(np.log(np.max(each, axis=0) / rule.limit))
 
     def _circuits(self) -> Iterator[ScaleAttempt | Shortfall]:
-        """A circuit of each of the best candidates, as they are ranked; one whose error is not that
-        of its candidate, or whose offsets are too large, comes last."""
+        """Circuits of the best candidates, as they are ranked: up to ``DECLINED`` as meant, then up
+        to ``TRIED`` whose error is not that of their candidate, then those whose offsets are too
+        large."""
         why = Shortfall("coefficients", False)
         worse: list[tuple[bool, float, ScaleAttempt]] = []
         given = tried = 0

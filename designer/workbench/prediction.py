@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array, Mask
+from designer.base.errors import InputError
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import GeneratorSetting, settings
 from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
-from designer.dynamics.drive_shape import SINE
+from designer.dynamics.drive_shape import SINE, has_harmonics
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
@@ -145,25 +146,37 @@ class BoardPrediction:
         """Nets that a channel may show."""
         return (*self.circuit.outputs, self.generator)
 
+    def check_drive(self) -> None:
+        """InputError where the generator does not give one sine, for records are recognised by
+        it."""
+        shapes = self.synthesis.design.drive_shapes
+        if len(shapes) > 1 or has_harmonics(*shapes):
+            found = "a second channel" if len(shapes) > 1 else "another shape"
+            expected = "records of a board that one sine drives"
+            raise InputError(None, "--record", f"a board whose drive has {found}", expected)
+
     @cached_property
     def settings(self) -> tuple[GeneratorSetting, ...]:
-        """The generator's settings of ``setup.csv``. A record begins at any moment, so a sine of
-        whatever phase is one of phase 0."""
+        """The generator's setting for each wanted response. A record begins at any moment, so a
+        sine of whatever phase is one of phase 0. Raises as ``check_drive``."""
+        self.check_drive()
         every = settings(self.synthesis.design, self.synthesis.model_responses)
         return tuple(replace(setting, shape=SINE) for setting in every)
 
     @cached_property
     def responses(self) -> tuple[PredictedResponse, ...]:
-        """Those wanted responses that have an orbit on the nominal board."""
+        """Those wanted responses that have an orbit on the nominal board. Raises as
+        ``check_drive``."""
         system = self.reduction.system()
         shown = []
         for setting, response in zip(self.settings, self.synthesis.model_responses, strict=True):
             orbit = on_circuit(system, self.synthesis.design, response)
-            if orbit.n:
-                orbit = self._from_phase_0(orbit, response, setting)
-                waves = self.waves(orbit, setting)
-                starts = self._starts(orbit, waves)
-                shown.append(PredictedResponse(response.spec, setting, orbit, waves, starts))
+            turned = self._from_phase_0(orbit, response, setting) if orbit.n else orbit
+            # Another attractor's waves must not stand under the name of this one.
+            if orbit.n and turned.counts == orbit.counts:
+                waves = self.waves(turned, setting)
+                starts = self._starts(turned, waves)
+                shown.append(PredictedResponse(response.spec, setting, turned, waves, starts))
         return tuple(shown)
 
     def _from_phase_0(
@@ -171,13 +184,12 @@ class BoardPrediction:
     ) -> Orbit:
         """The same orbit from where the sine of its drive has the phase 0."""
         system = self.reduction.system()
-        flow = circuit_flow(system, self.synthesis.design, response)
-        ((_, sine, cosine),) = flow.drive.shape
+        ((_, sine, cosine),) = circuit_flow(system, self.synthesis.design, response).drive.shape
         if not cosine:
             return orbit
-        points = flow.run(orbit.start, 1, mode=orbit.mode or None, points=POINTS).strobes
-        turn = -np.arctan2(cosine, sine) / (2.0 * np.pi) % 1.0
-        return settle(Flow(system, setting.excitation.drive), points[round(turn * POINTS)])
+        flow = Flow(system, setting.excitation.drive)
+        run = flow.to_strobe(orbit.start, float(np.arctan2(cosine, sine)))
+        return settle(flow, run.strobes[-1])
 
     @property
     def twins(self) -> bool:
@@ -223,8 +235,8 @@ class BoardPrediction:
         return [start for response in near for start in response.starts]
 
     def setting_of(self, motion: RecordedMotion) -> Excitation | None:
-        """The generator's setting: that of ``setup.csv`` where the record is of one, since it is
-        known better than a scope shows it; else None, for what was recorded."""
+        """The generator's setting: that for a wanted response where the record is of one, since it
+        is known better than a scope shows it; else None, for what was recorded."""
         for response in nearest(self.responses, motion.frequency)[:ASKED]:
             setting = response.setting
             same = abs(motion.frequency / setting.frequency_hz - 1.0) < SAME_FREQUENCY

@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from designer.base.keyed_store import Lines
+from designer.base.plain_json import plain
 from designer.fidelity.fidelity_errors import FidelityError, ResponseLabel, Truth
 from designer.fidelity.pieces import (
     CHUNK,
@@ -69,6 +71,8 @@ STRANGE: list[tuple[str, dict[str, Any]]] = [
     ("rungs 1", {"settings": {"method": "trap", "max_step": "1"}}),
     ("rungs 1", {"settings": {"step": 1.0}}),
     ("rungs 1", {"seconds": [1.0]}),
+    ("rungs 1", {"seconds": "1.0"}),
+    ("rungs 1", {"settings": {"method": "trap", "max_step": None}}),
     ("boards 1, 0 to 99", {"decided": CHUNK + 1}),
     ("boards 1, 0 to 99", {"ok": -1}),
     ("boards 1, 0 to 99", {"ok": 1.5}),
@@ -85,3 +89,14 @@ def test_what_cannot_be_is_made_again(tmp_path: Path, name: str, change: dict[st
     assert found.keys() == PIECES.keys() - {name}
     (note,) = notes
     assert "1 that are no pieces of a trade, computed again" in note
+
+
+@pytest.mark.parametrize("elapsed", [None, -1.0, "1", True, [1.0]])
+def test_a_piece_has_the_time_that_it_took(tmp_path: Path, elapsed: object) -> None:
+    pieces = {
+        name: {**piece, "elapsed": elapsed if k else 1.0}
+        for k, (name, piece) in enumerate(PIECES.items())
+    }
+    path = tmp_path / "pieces"
+    path.write_text(Lines("pieces", "a").text(plain(pieces)))
+    assert read_pieces(path, "a").keys() == {"rungs 1"}

@@ -77,6 +77,7 @@ def run(subject: GateSubject, fidelity: Fidelity, steps: int, periods: int) -> R
         stop_time=periods * subject.period,
         initial=subject.orbit.start,
         fidelity=fidelity,
+        also=asked.signals,
     )
     check_netlist(text)
     waves = open_simulator("shared").run(text, asked.signals, periods * subject.period)

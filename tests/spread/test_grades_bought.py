@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from designer.base import plain_json
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import series_values
@@ -142,8 +143,7 @@ def test_parts_of_a_better_grade_are_said_everywhere() -> None:
 def test_the_table_and_the_report_say_so(capfd: pytest.CaptureFixture[str]) -> None:
     for grades, there in ((FIVE, True), ("", False)):
         made = made_of(file_of(grades), MIXED)
-        answer = design_files.answer(made)
-        tables.synthesised(answer)
+        tables.synthesised(plain_json.plain(design_files.answer(made)))
         plan = plan_study(made.modelfile, made.design, (), made.catalog, samples=1, seed=1)
         study = Study((), plan, (), {}, ())
         result = RunResult(made.modelfile, made.catalog, (), made.design, (), study)

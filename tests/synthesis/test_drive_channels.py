@@ -25,8 +25,10 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Connector, Resistor
 from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
 from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
 from designer.dynamics.drive_shape import SINE, wave
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.folders.bench_tables import scales_csv, setup_csv, waveform_csv
 from designer.folders.design_files import chosen, waveform_names
 from designer.jobs.bench_job import check_fits
@@ -38,6 +40,7 @@ from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
 from designer.synthesis.output_loads import design_loads
 from designer.synthesis.part_checks import unit_circuit
+from designer.workbench import prediction as prediction_module
 from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.naming import identify_response
 from designer.workbench.prediction import POINTS, BoardPrediction
@@ -380,9 +383,14 @@ def test_the_board_has_a_jack_for_each_channel() -> None:
 
 def test_no_record_of_such_a_board_is_named() -> None:
     for name, found in (("square", "another shape"), ("two phases", "a second channel")):
+        prediction = BoardPrediction(made(name))
         with pytest.raises(InputError, match=r"one sine drives$") as refused:
-            check_fits(BoardPrediction(made(name)), fit=False, boards=False, decays=[])
+            check_fits(prediction, fit=False, boards=False, decays=[])
         assert refused.value.found == f"a board whose drive has {found}"
+        for asked in ("settings", "responses"):
+            with pytest.raises(InputError, match=r"one sine drives$"):
+                getattr(prediction, asked)
+        assert prediction.zones
 
 
 @pytest.mark.parametrize("name", ["phase", "stops that stay"])
@@ -417,6 +425,25 @@ def test_a_sine_of_another_phase_is_predicted_from_its_phase_0_on(name: str) -> 
     named = identify_response(motion, prediction)
     assert named.sure
     assert named.response == true.response == shown.orbit.response
+
+
+def test_waves_of_another_attractor_are_not_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The orbit is looked for from a point of its own; what counts otherwise is left out."""
+    result, asked = made("phase"), []
+
+    def found(flow: Flow, x: Array) -> Orbit:
+        asked.append((x, orbit := settle(flow, x)))
+        return orbit
+
+    monkeypatch.setattr(prediction_module, "settle", found)
+    (shown,) = BoardPrediction(result).responses
+    ((x, orbit),) = asked
+    assert shown.orbit is orbit
+    assert orbit.n == 1
+    assert np.abs(x - orbit.start).max() < 1e-9 * np.abs(orbit.extremes).max()
+    for other in (replace(orbit, p=orbit.p + 1), replace(orbit, n=2), replace(orbit, n=0)):
+        monkeypatch.setattr(prediction_module, "settle", lambda *_, other=other: other)
+        assert BoardPrediction(result).responses == ()
 
 
 THREE = table("force", on="ball", amplitude=1.0, harmonics=[[2, 0.3, 0.0]]) + table(
