@@ -98,8 +98,8 @@ def evidence(file: ModelFile) -> list[Evidence]:
     )
     name = "instant-impact"
     caption = (
-        "Displacement over a period from the impact on: with impacts that take no time (grey), "
-        "with the seat of the file (line), and 100 times as stiff (broken line)."
+        "Displacement over a period from the impact on: with impacts that take no time, with the "
+        "seat of the file, and with one 100 times as stiff."
     )
     blocks = [
         text,
@@ -181,10 +181,16 @@ def _figure(model: LumpedSystem, bounce: Bounce, omega: float) -> Figure:
     figure = new_figure(7.2, 3.2)
     axes = figure.subplots()
     times = 2.0 * math.pi / omega * np.arange(POINTS + 1) / POINTS
-    axes.plot(MS * times, [MM * bounce.at(float(t))[0] for t in times], color=MUTED, lw=2.6)
-    for factor, dashes in ((1.0, "-"), (100.0, (0, (4, 3)))):
+    instants = [MM * bounce.at(float(t))[0] for t in times]
+    axes.plot(MS * times, instants, color=MUTED, lw=2.6, label="impacts that take no time")
+    for factor, dashes, label in (
+        (1.0, "-", "the seat of the file"),
+        (100.0, (0, (4, 3)), "100 times as stiff"),
+    ):
         x, _, i = _after_impact(_stiffer(model, factor), omega)
-        axes.plot(MS * times, MM * x[i : i + POINTS + 1], color=INK, lw=1.1, ls=dashes)
+        y = MM * x[i : i + POINTS + 1]
+        axes.plot(MS * times, y, color=INK, lw=1.1, ls=dashes, label=label)
+    axes.legend()
     name_axes(axes, "time from the impact on [ms]", "displacement [mm]")
     return figure
 
