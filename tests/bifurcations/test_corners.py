@@ -108,6 +108,27 @@ def test_a_corner_of_a_law_that_a_sweep_moves() -> None:
         assert force == pytest.approx(place * amplitude_at_corner(0.8), rel=1e-7)
 
 
+def test_the_curve_of_a_corner_to_the_edge_of_what_two_points_may_be() -> None:
+    """The corner stays where the linear motion has its amplitude, whatever the point behind it is;
+    a step beyond the edge would put the one behind the other."""
+    law = table(
+        "law", name="F", between=list(JOINT), points=[[-2, 0], [0.5, 0], [4, 0.1], [9, 0.2]]
+    )
+    over, amplitude = subject(law, 1.0, 0.8, 0.6), 0.6 / amplitude_at_corner(0.8)
+    family = over.family("F.x2")
+    orbit = settle(family.flow(1.8), np.zeros(2))
+    (point,) = corners(survey(family, [(1.8, orbit)], amplitude - 0.1, 1.9, depth=0).points)
+    window = PlaneWindow((0.3, amplitude + 5e-4), (amplitude + 6e-4, 4.1))
+    curve = continued(over.plane("F.x2", "F.x3"), point, 4.0, window)
+    assert curve is not None
+    assert curve.ends == ("edge of F.x3", "edge of F.x3")
+    assert curve.values[:, 0] == pytest.approx(amplitude, rel=1e-7)
+    beyond = PlaneWindow((0.3, amplitude + 5e-4), (amplitude + 6e-4, 12.0))
+    curve = continued(over.plane("F.x2", "F.x3"), point, 4.0, beyond)
+    assert curve is not None
+    assert curve.ends[1] != "lost"
+
+
 def test_a_domain_that_another_parameter_bounds() -> None:
     """A static friction below that of sliding is refused: a branch is followed up to it."""
     friction = {"force": 0.3, "static": 0.4, "velocity": 0.1, "stribeck": 0.5}
