@@ -641,9 +641,14 @@ class MechanicalModel(Hashable, Protocol):
         ...
 
     @property
+    def listed(self) -> frozenset[str]:
+        """Those of ``parameters`` that stand in lists, and may be very many."""
+        ...
+
+    @property
     def idle(self) -> frozenset[str]:
         """Those of ``parameters`` that a title leaves out: with the value of an element that is not
-        there, or too many."""
+        there, or ``listed``."""
         ...
 
     def parameter(self, name: str) -> float:
