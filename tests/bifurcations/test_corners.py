@@ -73,6 +73,16 @@ def test_the_corner_is_where_the_linear_motion_comes_to_it() -> None:
     assert (window.low.value, window.high.value) == (1.36, 1.7)
 
 
+def test_corners_that_six_digits_do_not_tell_apart_are_two() -> None:
+    law = table(
+        "law", name="F", between=list(JOINT), points=[[-1, 0], [1, 0], [1.000001, 1e-6], [2, 3]]
+    )
+    found = subject(law, 1.0, 0.8, 0.5).family("omega").flow(0.8).system.corners
+    places = [each.corner.place for each in found if each.corner is not None]
+    assert places == [1.0, 1.000001]
+    assert {str(each.corner) for each in found} == {"F at 1"}
+
+
 def test_a_corner_of_a_law_of_velocity() -> None:
     """At the resonance of the spring all of the force is that of the dampers."""
     points = [[-1.0, -0.3], [-0.5, -0.3], [0.5, 0.3], [1.0, 0.3]]
@@ -334,7 +344,7 @@ def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:
     """The largest and the least displacement, half a period apart: whichever half of the orbit the
     followed one is in, the other is no second touch."""
     flow = subject(STIFFENING, 0.0, 1.4, 1.0).family("omega").flow(1.4)
-    assert [corner.corner for corner in flow.system.corners] == ["F at 1", "F at -1"]
+    assert [str(guard.corner) for guard in flow.system.corners] == ["F at 1", "F at -1"]
     start = settle(flow, np.zeros(2)).start
     every = grazings(flow, start, 1, corners=True)
     tips = [(each, phase) for each, phase in every if each.contact.tip]
