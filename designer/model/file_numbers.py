@@ -70,7 +70,7 @@ class FileNumbers:
                 table, *way = model.places[name]
                 value, unit = new.parameter(name), units.get(name, "")
                 if table == "matrices":
-                    _put_entry(data[table], *way, value)
+                    _put_entry(data[table], way, value)
                     continue
                 entry, key = self._entry(data, name)
                 old = entry.get(key) if isinstance(entry, dict) else entry[key]
@@ -99,16 +99,17 @@ def _indexed(way: Sequence[str | int]) -> bool:
     return isinstance(way[-1], int)
 
 
-def _put_entry(matrices: dict[str, Any], key: str, i: int, j: int, value: float) -> None:
+def _put_entry(matrices: dict[str, Any], way: Sequence[str | int], value: float) -> None:
     """Change an entry of a matrix, and its mirror image in a symmetric one."""
-    rows = matrices[key]
+    key, i, j = way
+    rows = matrices[str(key)]
     if not isinstance(rows[0], list):  # a diagonal
         if i == j:
             rows[i] = value
             return
         size = range(len(rows))
         rows = [[rows[k] if k == n else 0.0 for n in size] for k in size]
-        matrices[key] = rows
+        matrices[str(key)] = rows
     rows[i][j] = value
     if key != "damping":
         rows[j][i] = value
