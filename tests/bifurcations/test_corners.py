@@ -133,10 +133,9 @@ def test_the_curve_of_a_corner_to_the_edge_of_what_two_points_may_be() -> None:
     assert curve is not None
     assert curve.ends == ("edge of F.x3", "edge of F.x3")
     assert curve.values[:, 0] == pytest.approx(amplitude, rel=1e-7)
-    beyond = PlaneWindow((0.3, amplitude + 5e-4), (amplitude + 6e-4, 12.0))
-    curve = continued(over.plane("F.x2", "F.x3"), point, 4.0, beyond)
-    assert curve is not None
-    assert curve.ends[1] != "lost"
+    plane = over.plane("F.x2", "F.x3")
+    pairs = [(5.0, 7.0), (-1.0, 0.0), (7.0, 5.0), (-2.5, 0.0), (1.0, 9.5)]
+    assert [plane.contains(*pair) for pair in pairs] == [True, True, False, False, False]
 
 
 def test_a_domain_that_another_parameter_bounds() -> None:
