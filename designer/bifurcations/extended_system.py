@@ -11,7 +11,7 @@ Broyden's formula then keeps them up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,8 +24,6 @@ from designer.dynamics.orbit import Complex
 
 NEWTON = 14
 """Most iterations of the corrector."""
-MOST_FLOWS = 8
-"""Flows that are kept."""
 FARTHEST = 1.0
 """The longest step of Newton's method, in scaled units."""
 SLOW = 0.3
@@ -97,16 +95,10 @@ class ExtendedSystem:
     states: int
     scale: Array
     """(unknowns,) what each unknown is measured in: peaks, 1 for a phase, widths of the window."""
-    _flows: dict[tuple[float, float], Flow] = field(default_factory=dict, repr=False)
 
     def flow(self, z: Array) -> Flow:
-        """The flow at a point's parameters; the last few are kept."""
-        key = float(z[-2]), float(z[-1])
-        if key not in self._flows:
-            while len(self._flows) >= MOST_FLOWS:
-                self._flows.pop(next(iter(self._flows)))
-            self._flows[key] = self.plane.build(*key)
-        return self._flows[key]
+        """The flow at a point's parameters."""
+        return self.plane.flow(float(z[-2]), float(z[-1]))
 
     def image(self, z: Array) -> MapImage | None:
         """The image of a point's state, with the Jacobian in scaled units."""
@@ -141,7 +133,7 @@ class ExtendedSystem:
         both = Both(p.condition, other)
         split = len(p.z) - 2
         scale = np.concatenate([self.scale[:split], np.ones(len(extra)), self.scale[split:]])
-        system = replace(self, scale=scale, _flows={})
+        system = replace(self, scale=scale)
         z = np.concatenate([p.z[:split], extra, p.z[split:]])
         found = system._solve(z, np.zeros((0, len(z))), both, np.zeros(len(z)))
         if found is None:
@@ -176,7 +168,7 @@ class ExtendedSystem:
                 (p.tangent, np.zeros(len(extra))),
             )
         )
-        system = replace(self, scale=scale, _flows={})
+        system = replace(self, scale=scale)
         return system, system.correct(z, border, other)
 
     def _solve(

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from designer.base.errors import InputError
 from designer.dynamics.flow import Flow
 
+Key = TypeVar("Key")
 MOST_FLOWS = 8
 """Flows that a family remembers."""
 
@@ -40,13 +42,8 @@ class Family:
         flow = self._flows.get(value)
         if flow is not None:
             return flow
-        if not self.within(value):
-            raise InputError(
-                None, self.parameter, value, f"a number between {self.low:g} and {self.high:g}"
-            )
-        while len(self._flows) >= MOST_FLOWS:
-            self._flows.pop(next(iter(self._flows)))
-        return self._flows.setdefault(value, self.build(value))
+        self.check(value)
+        return _remembered(self._flows, value, self.build(value))
 
     def contains(self, value: float) -> bool:
         """Whether there is a flow at the value: others may keep the parameter from it that its own
@@ -57,9 +54,11 @@ class Family:
             return False
         return True
 
-    def within(self, value: float) -> bool:
-        """Whether the value lies inside the domain."""
-        return self.low <= value <= self.high
+    def check(self, value: float) -> None:
+        """InputError unless the value lies inside the domain."""
+        if not self.low <= value <= self.high:
+            expected = f"a number between {self.low:g} and {self.high:g}"
+            raise InputError(None, self.parameter, value, expected)
 
 
 @dataclass(frozen=True)
@@ -72,17 +71,43 @@ class FlowPlane:
     """Name and domain of the second parameter; its flows are at the first's nominal value."""
     build: Callable[[float, float], Flow]
     """Makes the flow at a pair of values, the first parameter's before the second's."""
+    _flows: dict[tuple[float, float], Flow] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def parameters(self) -> tuple[str, str]:
         """Names of both parameters."""
         return self.first.parameter, self.second.parameter
 
+    def flow(self, first: float, second: float) -> Flow:
+        """The flow at a pair of values.
+
+        Raises
+        ------
+        InputError : a value lies outside its domain, or nothing can have both.
+        """
+        flow = self._flows.get((first, second))
+        if flow is not None:
+            return flow
+        self.first.check(first)
+        self.second.check(second)
+        return _remembered(self._flows, (first, second), self.build(first, second))
+
     def contains(self, first: float, second: float) -> bool:
-        """Whether both values lie inside their domains."""
-        return self.first.within(first) and self.second.within(second)
+        """Whether there is a flow at both values: one may keep the other from it."""
+        try:
+            self.flow(first, second)
+        except InputError:
+            return False
+        return True
 
     def along_first(self, second: float) -> Family:
         """The family over the first parameter, at a value of the second."""
         one = self.first
         return Family(one.parameter, one.low, one.high, lambda v: self.build(v, second))
+
+
+def _remembered(flows: dict[Key, Flow], key: Key, flow: Flow) -> Flow:
+    """The flow, kept in the place of the oldest."""
+    while len(flows) >= MOST_FLOWS:
+        flows.pop(next(iter(flows)))
+    return flows.setdefault(key, flow)

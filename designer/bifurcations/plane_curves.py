@@ -166,7 +166,7 @@ def _begun(
     plane: FlowPlane, bifurcation: Bifurcation, second: float, window: PlaneWindow
 ) -> tuple[ExtendedSystem, CurvePoint] | None:
     """The equations of a located point's curve, and the point solved for by them."""
-    solved, flow = bifurcation.point.solved, plane.build(bifurcation.value, second)
+    solved, flow = bifurcation.point.solved, plane.flow(bifurcation.value, second)
     x, n = solved.x, bifurcation.point.orbit.n
     halved = bifurcation.symmetric and flow.system.mirror is not None
     peaks = peaks_near(flow, x)
@@ -197,7 +197,7 @@ def system_at(
 
     values : of both parameters there. extra : the condition's own unknowns.
     """
-    peaks = peaks_near(plane.build(*values), x)
+    peaks = peaks_near(plane.flow(*values), x)
     scale = np.concatenate([peaks, np.ones(len(extra)), window.widths])
     return ExtendedSystem(plane, n, symmetric, len(x), scale)
 

@@ -13,8 +13,9 @@ it on a converged orbit.
 - torus: a pair of complex multipliers crosses the unit circle.
 - grazing: a turning point of a displacement lies on a stop (``dynamics.turning_points``): in a
   clearance whose counts of impacts change.
-- corner: a turning point lies on a corner of a law of force, which it passes more or less often
-  from there on. The multipliers change beyond it as beyond a grazing; the counts stay.
+- corner: a turning point lies on a corner of a force (of a law, a friction, a preload that has
+  risen), which it passes more or less often from there on. The multipliers change beyond it as
+  beyond a grazing; the counts stay.
 """
 
 from __future__ import annotations
@@ -254,7 +255,7 @@ def _stops(curve: Curve, a: BranchPoint, b: BranchPoint, kind: PointKind) -> str
     """``Bifurcation.stops`` of what happens between two points."""
     system = curve.family.flow(a.value).system
     if kind is PointKind.CORNER:
-        return " and ".join(system.corners[k].corner for k in _corners(a, b))
+        return " and ".join(str(system.corners[k].corner) for k in _corners(a, b))
     names = system.clearances
     changed = _changed(a, b)
     words = []

@@ -201,7 +201,7 @@ def _end(plane: FlowPlane, orbit: Orbit, at: Array, way: Array) -> tuple[Array, 
     """Where the response ends on the way from a point, and what happens there."""
 
     def build(share: float) -> Flow:
-        return plane.build(*(at + share * way).tolist())
+        return plane.flow(*(at + share * way).tolist())
 
     past = 1.0 + BEYOND
     most = past if plane.contains(*(at + past * way).tolist()) else 1.0

@@ -79,6 +79,7 @@ from .orbit import (
 )
 from .piecewise_linear import (
     Drive as Drive,
+    ForceCorner as ForceCorner,
     Guard as Guard,
     Mode as Mode,
     ModeKey as ModeKey,

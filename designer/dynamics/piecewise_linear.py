@@ -42,6 +42,21 @@ ModeKey = tuple[int, ...]
 
 
 @dataclass(frozen=True)
+class ForceCorner:
+    """Where a force bends that no contact begins or ends."""
+
+    index: int
+    """Of the force in a ``ModeKey``."""
+    place: float
+    """Of what the force depends on."""
+    force: str
+    """Its name."""
+
+    def __str__(self) -> str:
+        return f"{self.force} at {self.place:.6g}"
+
+
+@dataclass(frozen=True)
 class Guard:
     """One way out of a mode: the linear function C·x + D·u + e becomes positive there."""
 
@@ -58,8 +73,8 @@ class Guard:
     displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop."""
     second: float = 0.0
     """Coefficient of the second drive."""
-    corner: str = ""
-    """Of a corner of a force that is no contact's begin or end, what it is called."""
+    corner: ForceCorner | None = None
+    """The corner that is passed here, if one is."""
 
     @property
     def row(self) -> Array:
@@ -300,7 +315,7 @@ class PiecewiseLinearSystem:
     def corners(self) -> tuple[Guard, ...]:
         """The corners of forces that are no contact's begin, positive on the side away from rest.
         Where turning points are looked at they are numbered after the clearances."""
-        found, keys = dict[str, Guard](), [self.start]
+        found, keys = dict[ForceCorner, Guard](), [self.start]
         while keys:
             key = keys.pop(0)
             for guard in self.mode(key).guards:

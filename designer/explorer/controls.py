@@ -1,4 +1,5 @@
-"""The sliders of a model: one for the drive frequency and one for every parameter."""
+"""The sliders of a model: one for the drive frequency and one for every parameter but those that
+stand in lists."""
 
 from __future__ import annotations
 
@@ -62,7 +63,7 @@ class Control:
 
 
 def controls(modelfile: ModelFile) -> tuple[Control, ...]:
-    """One for ω, then one for every parameter, those of the drive first."""
+    """One for ω, then one for every parameter but points and entries, those of the drive first."""
     place, subject = first_place(modelfile), ModelSubject(modelfile.model, scales=modelfile.si)
     each = [_of_omega(modelfile, place, subject), *_parameters(place.model, subject.units)]
     return tuple(sorted(each, key=lambda control: not control.drive))
@@ -114,6 +115,8 @@ def _of_omega(modelfile: ModelFile, place: ModelPlace, subject: ModelSubject) ->
 
 def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Control]:
     for name, (least, most) in model.parameters.items():
+        if name in model.listed:
+            continue
         value = model.parameter(name)
         low, high, logarithmic = _range(value, least, most)
         factor = name == "b" and "b" not in model.units

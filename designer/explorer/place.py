@@ -34,6 +34,8 @@ class ModelPlace:
     """Index of the displacement that the plots show (``response_view.shown_motions``)."""
     in_si: bool = False
     """Whether the model's numbers are SI values."""
+    asked: frozenset[str] = frozenset()
+    """Those of the model's ``listed`` parameters that were asked for."""
 
     @property
     def state(self) -> Array:
@@ -75,13 +77,14 @@ def read_place(modelfile: ModelFile, words: Mapping[str, object]) -> ModelPlace:
     check_omega(OMEGA, omega, model)
     size = 2 * model.second_order().size
     start, shown = _start(words.get(START, ""), size), _shown(words.get(SHOWN, 0))
-    return ModelPlace(model, omega, start, shown, first.in_si)
+    return ModelPlace(model, omega, start, shown, first.in_si, model.listed & changes.keys())
 
 
 def words_of(place: ModelPlace) -> dict[str, str]:
     """The words that ``read_place`` makes this place of: every number to the last digit."""
-    words = {name: repr(place.model.parameter(name)) for name in place.model.parameters}
-    words = {OMEGA: repr(place.omega), **words}
+    model = place.model
+    names = [n for n in model.parameters if n in place.asked or n not in model.listed]
+    words = {OMEGA: repr(place.omega), **{name: repr(model.parameter(name)) for name in names}}
     if place.start:
         words[START] = start_text(place.start)
     if place.shown:

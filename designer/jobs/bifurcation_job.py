@@ -380,7 +380,7 @@ def _region(work: BifurcationWork, plan: CurvePlan, swept: Sweep) -> ResponseReg
     k = int(np.argmin(np.abs(swept.plan.values - work.region)))
     at = (work.region, plan.at)
     flows = plan.subject.plane(plan.first, plan.second)
-    orbit = settle(flows.build(*at), next(iter(swept.steps.values()))[k].start)
+    orbit = settle(flows.flow(*at), next(iter(swept.steps.values()))[k].start)
     if orbit.status is not OrbitStatus.PERIODIC:
         expected = f"a value with a periodic response ({orbit.response} there)"
         raise InputError(None, "--region", work.region, expected)

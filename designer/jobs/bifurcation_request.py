@@ -95,22 +95,23 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
         return _basin_plan(request, subject, modelfile)
     over = request.over or ("frequency" if request.circuit else "omega")
     read = _reader(subject, modelfile)
-    first = _checked(read, subject, "--from", over, request.from_)
-    last = _checked(read, subject, "--to", over, request.to)
-    low, high, steps = _axis("--from", "--to", "--steps", first, last, request.steps)
-    swept = [over]
+    first = _read(read, subject, "--from", over, request.from_)
+    last = _read(read, subject, "--to", over, request.to)
+    ends = {over: (("--from", first), ("--to", last))}
     if request.map_ is not None:
-        name, *ends, count = request.map_
+        name, *limits, count = request.map_
         if name == over:
             raise InputError(None, "--map", name, f"another parameter than --over {over}")
-        start, stop = (_checked(read, subject, "--map", name, value) for value in ends)
+        start, stop = (_read(read, subject, "--map", name, value) for value in limits)
+        ends[name] = ("--map", start), ("--map", stop)
+    _check_ends(subject, ends)
+    low, high, steps = _axis("--from", "--to", "--steps", first, last, request.steps)
+    if request.map_ is not None:
         ys = np.linspace(*_axis("--map", "--map", "--map", start, stop, count))
         _check_cells(steps, count)
-        swept.append(name)
-    subject = _at_frequency(request, subject, modelfile, swept)
+    subject = _at_frequency(request, subject, modelfile, list(ends))
     values = np.linspace(low, high, steps)
     if request.map_ is not None:
-        _check_pairs(subject, "--map", {over: (low, high), name: (float(ys[0]), float(ys[-1]))})
         course = _course(request, parameter_map.COURSE)
         return MapPlan(subject, over, values, name, ys, course=course)
     if request.starts is not None:
@@ -138,7 +139,7 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
     if name == plan.parameter:
         raise InputError(None, "--and", name, f"another parameter than --over {name}")
     read = _reader(subject, modelfile)
-    one, other = (_checked(read, subject, "--and", name, value) for value in ends)
+    one, other = (_read(read, subject, "--and", name, value) for value in ends)
     held = subject.fixed({plan.parameter: None, name: None})
     at = held.get(name)
     if at is None:
@@ -149,7 +150,8 @@ def curve_plan(request: Request, plan: SweepPlan, modelfile: ModelFile) -> Curve
         expected = f"two ends about {at:.6g}, the value along the sweep"
         raise InputError(None, "--and", f"{name} from {low:g} to {high:g}", expected)
     window = PlaneWindow((float(plan.values[0]), float(plan.values[-1])), (low, high))
-    _check_pairs(subject, "--and", {plan.parameter: window.first, name: window.second})
+    over = (("--from", window.first[0]), ("--to", window.first[1]))
+    _check_ends(subject, {plan.parameter: over, name: (("--and", low), ("--and", high))})
     depth = CURVE_DEPTH if request.depth is None else request.depth
     return CurvePlan(subject, plan.parameter, name, float(at), window, depth)
 
@@ -165,7 +167,7 @@ def region_at(request: Request, plan: SweepPlan, modelfile: ModelFile) -> float 
         return None
     assert isinstance(plan.subject, ModelSubject | BoardSubject)
     read = _reader(plan.subject, modelfile)
-    value = _checked(read, plan.subject, "--region", plan.parameter, request.region)
+    value = _read(read, plan.subject, "--region", plan.parameter, request.region)
     low, high = float(plan.values[0]), float(plan.values[-1])
     if not low < value < high:
         raise InputError(None, "--region", value, f"a value between {low:g} and {high:g}")
@@ -215,10 +217,8 @@ def _reader(subject: Swept, modelfile: ModelFile) -> Reader:
     return Reader(modelfile.model, modelfile.si, units)
 
 
-def _checked(
-    read: Reader, subject: Swept, option: str, name: str, value: float | str | None
-) -> float:
-    """A value of a parameter, if it may have it."""
+def _read(read: Reader, subject: Swept, option: str, name: str, value: float | str | None) -> float:
+    """A value of what can be swept, in the model's units."""
     if value is None:
         raise InputError(None, option, MISSING, f"a value of {name}")
     if name not in subject.parameters:
@@ -227,22 +227,32 @@ def _checked(
         if name in ("frequency", "Omega") and "omega" in subject.parameters:
             hint = 'omega, of which an end may be in hertz, such as "10 Hz"; or '
         raise InputError(None, over, name, hint + one_of(name, subject.parameters))
-    number = read.value(option, name, value)
-    subject.check(option, name, number)
-    return number
+    return read.value(option, name, value)
 
 
-def _check_pairs(subject: Swept, option: str, ends: Mapping[str, tuple[float, float]]) -> None:
-    """InputError unless two parameters of a model may have their ends at once."""
-    if not isinstance(subject, ModelSubject):
+Ends = tuple[tuple[str, float], tuple[str, float]]
+"""Both ends of a parameter, each behind the option that gives it."""
+
+
+def _check_ends(subject: Swept, ends: Mapping[str, Ends]) -> None:
+    """InputError unless one parameter may have its ends, or two theirs at once: of two that bound
+    each other it does not count what the file has."""
+    if len(ends) == 1 or isinstance(subject, BoardSubject) or "omega" in ends:
+        for name, both in ends.items():
+            for option, value in both:
+                subject.check(option, name, value)
+    if len(ends) == 1 or isinstance(subject, BoardSubject):
         return
-    for values in product(*ends.values()):
-        change = dict(zip(ends, values, strict=True))
+    for pair in product(*ends.values()):
+        change = {name: value for name, (_, value) in zip(ends, pair, strict=True)}
         try:
             subject.drawn(change)
         except InputError as error:
+            for name, (option, value) in zip(ends, pair, strict=True):
+                if error.field in (name, f"model.{name}"):  # whatever the other is
+                    subject.check(option, name, value)
             found = " with ".join(f"{name} = {value:g}" for name, value in change.items())
-            raise InputError(None, option, found, error.expected) from None
+            raise InputError(None, pair[-1][0], found, error.expected) from None
 
 
 def _check_options(request: Request) -> None:

@@ -66,16 +66,17 @@ class FileNumbers:
         changed = [n for n in model.parameters if model.parameter(n) != new.parameter(n)]
         if isinstance(model, LumpedSystem):
             units = model.units if in_si(self.si, model) else {}
-            for name in changed:
-                if name != "b" and model.places[name][0] != "matrices":
-                    entry, key = self._entry(data, name)
-                    value = new.parameter(name)
-                    old = entry.get(key) if isinstance(entry, dict) else entry[key]
-                    entry[key] = _with_unit(value, units.get(name, ""), old)
-            assert isinstance(new, LumpedSystem)
-            if new.matrices is not None and new.matrices != model.matrices:
-                for key in ("mass", "damping", "stiffness"):
-                    data["matrices"][key] = [list(row) for row in getattr(new.matrices, key)]
+            for name in (each for each in changed if each != "b"):
+                table, *way = model.places[name]
+                value, unit = new.parameter(name), units.get(name, "")
+                if table == "matrices":
+                    _put_entry(data[table], way, value)
+                    continue
+                entry, key = self._entry(data, name)
+                old = entry.get(key) if isinstance(entry, dict) else entry[key]
+                if _indexed(way) and not isinstance(old, str):
+                    unit = ""  # a unit in one point of a law says what the others are
+                entry[key] = _with_unit(value, unit, old)
         elif self.mechanical is None:
             data["model"] |= {name: new.parameter(name) for name in changed}
         elif changed:
@@ -96,6 +97,22 @@ class FileNumbers:
 def _indexed(way: Sequence[str | int]) -> bool:
     """Whether a number stands in a list of a key's value, which no text replaces."""
     return isinstance(way[-1], int)
+
+
+def _put_entry(matrices: dict[str, Any], way: Sequence[str | int], value: float) -> None:
+    """Change an entry of a matrix, and its mirror image in a symmetric one."""
+    key, i, j = way
+    rows = matrices[str(key)]
+    if not isinstance(rows[0], list):  # a diagonal
+        if i == j:
+            rows[i] = value
+            return
+        size = range(len(rows))
+        rows = [[rows[k] if k == n else 0.0 for n in size] for k in size]
+        matrices[str(key)] = rows
+    rows[i][j] = value
+    if key != "damping":
+        rows[j][i] = value
 
 
 def _put_si(table: dict[str, Any], old: Mechanical, model: Dimensionless) -> None:

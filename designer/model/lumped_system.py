@@ -497,7 +497,11 @@ class LumpedSystem(Elements):
         """What a parameter may be, whatever the others are."""
         if name == "b":
             return SMALLEST, GREATEST
-        group, _, (key, *_) = self._places[name]
+        group, _, (key, *indices) = self._places[name]
+        if group == "matrices" and indices[0] == indices[1]:
+            # Laws may hold what the stiffness matrix does not.
+            positive = key == "mass" or (key == "stiffness" and not self.nonlinear)
+            return SMALLEST if positive else -GREATEST, GREATEST
         return LEAST.get(group, {}).get(str(key), -GREATEST), MOST.get(str(key), GREATEST)
 
     @cached_property
@@ -518,18 +522,23 @@ class LumpedSystem(Elements):
         return {name: text for name, text in found.items() if text}
 
     @property
+    def listed(self) -> frozenset[str]:
+        """Points of laws and entries of matrices."""
+        return frozenset(name for name, (_, _, way) in self._places.items() if len(way) > 1)
+
+    @property
     def idle(self) -> frozenset[str]:
-        """A factor of 1; dampers and forces of 0; points and entries, which are too many."""
+        """A factor of 1; dampers and forces of 0; what is ``listed``."""
 
         def is_idle(name: str, group: str, way: Way) -> bool:
             key = str(way[0])
             own = _LAWS.get(group, {}).get(key)
             may_be = key in _MAY_BE_ZERO if own is None else own.idle_at_zero
-            return len(way) > 1 or (may_be and self.parameter(name) == 0.0)
+            return may_be and self.parameter(name) == 0.0
 
         places = self._places.items()
         idle = {name for name, (group, _, way) in places if is_idle(name, group, way)}
-        return frozenset(idle | ({"b"} if self.b == 1.0 else set()))
+        return self.listed | idle | ({"b"} if self.b == 1.0 else set())
 
     @cached_property
     def _places(self) -> dict[str, tuple[str, int, Way]]:

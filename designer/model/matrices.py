@@ -89,6 +89,10 @@ class Matrices(FileTable):
     damping: Annotated[Rows, _rows()]
     """Damping matrix, with gyroscopic terms or without."""
 
+    def __post_init__(self) -> None:
+        for key in ("mass", "stiffness"):
+            object.__setattr__(self, key, _symmetric(getattr(self, key)))
+
     def check(self) -> None:
         """Refuse what is no linear part of a mechanical system.
 
@@ -104,7 +108,7 @@ class Matrices(FileTable):
                 text = f"{len(matrix)} rows"
                 raise InputError(None, field, text, f"{len(self.names)}, one for each of names")
             off = np.abs(matrix - matrix.T)
-            if key != "damping" and off.max() > ALIKE * np.abs(matrix).max():
+            if key != "damping" and off.max() > 0.0:
                 i, j = (int(k) for k in np.unravel_index(np.argmax(off), off.shape))
                 text = f"{matrix[i, j]:g} and {matrix[j, i]:g} across the diagonal"
                 raise InputError(None, field, text, f"a symmetric matrix (row {i + 1})")
@@ -115,12 +119,12 @@ class Matrices(FileTable):
     @property
     def mass_matrix(self) -> Array:
         """(n, n) mass matrix, symmetric to the last digit."""
-        return _symmetric(self.mass)
+        return np.array(self.mass)
 
     @property
     def stiffness_matrix(self) -> Array:
         """(n, n) stiffness matrix, symmetric to the last digit."""
-        return _symmetric(self.stiffness)
+        return np.array(self.stiffness)
 
     @property
     def damping_matrix(self) -> Array:
@@ -158,9 +162,16 @@ class Matrices(FileTable):
                     yield (name, self.names[j]), -float(even[i, j])
 
 
-def _symmetric(rows: Rows) -> Array:
+def _symmetric(rows: Rows) -> Rows:
+    """With the mean of entries that are alike across the diagonal; as it stands if some are not."""
     matrix = np.array(rows)
-    return np.asarray(0.5 * (matrix + matrix.T))
+    with np.errstate(over="ignore"):  # sizes are looked at later
+        off = np.abs(matrix - matrix.T).max()
+    if off > ALIKE * np.abs(matrix).max():
+        return rows
+    mean = matrix + 0.5 * (matrix.T - matrix)
+    even = np.triu(mean) + np.triu(mean, 1).T
+    return tuple(tuple(row) for row in even.tolist())
 
 
 def written_out(text: str, folder: Path) -> str:

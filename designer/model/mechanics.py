@@ -23,7 +23,13 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.drive_shape import SINE, Channel, Shape, channels
-from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import (
+    ForceCorner,
+    Guard,
+    Mode,
+    ModeKey,
+    PiecewiseLinearSystem,
+)
 from designer.laws.force_law import ForceLaw, Quantity
 from designer.model.clearance import Clearance
 from designer.model.dead_zones import dead_zones
@@ -609,7 +615,8 @@ class _Contact:
         touches = not (level and key[index])
         clearance = self.clearance if touches else -1
         place = -sign * constant
-        corner = f"{self.name} at {place:.6g}" if clearance < 0 and place in self.corners else ""
+        bends = clearance < 0 and place in self.corners
+        corner = ForceCorner(index, place, self.name) if bends else None
         row = sign * self.row, sign * self.on_drive, constant
         return Guard(*row, target, clearance, corner=corner)
 
@@ -641,9 +648,14 @@ class MechanicalModel(Hashable, Protocol):
         ...
 
     @property
+    def listed(self) -> frozenset[str]:
+        """Those of ``parameters`` that stand in lists, and may be very many."""
+        ...
+
+    @property
     def idle(self) -> frozenset[str]:
         """Those of ``parameters`` that a title leaves out: with the value of an element that is not
-        there, or too many."""
+        there, or ``listed``."""
         ...
 
     def parameter(self, name: str) -> float:

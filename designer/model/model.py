@@ -122,6 +122,11 @@ class Dimensionless(FileTable):
         return {"b": "m"}
 
     @property
+    def listed(self) -> frozenset[str]:
+        """None."""
+        return frozenset()
+
+    @property
     def idle(self) -> frozenset[str]:
         """None: a title has every parameter of the paper."""
         return frozenset()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -153,7 +153,12 @@ class ModelSubject:
             assert omega is not None
             return model_flow(_changed(self.model, change), omega, fast=False)
 
-        return FlowPlane(self.family(first), self.family(second), build)
+        def side(name: str) -> Family:
+            # Where one may be depends on the other: what stands in the file bounds neither.
+            family = self.family(name)
+            return family if name == "omega" else replace(family, low=-np.inf, high=np.inf)
+
+        return FlowPlane(side(first), side(second), build)
 
     def fixed(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters, in the order in which a model file has them; those

@@ -73,6 +73,16 @@ def test_the_corner_is_where_the_linear_motion_comes_to_it() -> None:
     assert (window.low.value, window.high.value) == (1.36, 1.7)
 
 
+def test_corners_that_six_digits_do_not_tell_apart_are_two() -> None:
+    law = table(
+        "law", name="F", between=list(JOINT), points=[[-1, 0], [1, 0], [1.000001, 1e-6], [2, 3]]
+    )
+    found = subject(law, 1.0, 0.8, 0.5).family("omega").flow(0.8).system.corners
+    places = [each.corner.place for each in found if each.corner is not None]
+    assert places == [1.0, 1.000001]
+    assert {str(each.corner) for each in found} == {"F at 1"}
+
+
 def test_a_corner_of_a_law_of_velocity() -> None:
     """At the resonance of the spring all of the force is that of the dampers."""
     points = [[-1.0, -0.3], [-0.5, -0.3], [0.5, 0.3], [1.0, 0.3]]
@@ -106,6 +116,26 @@ def test_a_corner_of_a_law_that_a_sweep_moves() -> None:
     assert len(curve.points) > 10
     for place, force in curve.values:
         assert force == pytest.approx(place * amplitude_at_corner(0.8), rel=1e-7)
+
+
+def test_the_curve_of_a_corner_to_the_edge_of_what_two_points_may_be() -> None:
+    """The corner stays where the linear motion has its amplitude, whatever the point behind it is;
+    a step beyond the edge would put the one behind the other."""
+    law = table(
+        "law", name="F", between=list(JOINT), points=[[-2, 0], [0.5, 0], [4, 0.1], [9, 0.2]]
+    )
+    over, amplitude = subject(law, 1.0, 0.8, 0.6), 0.6 / amplitude_at_corner(0.8)
+    family = over.family("F.x2")
+    orbit = settle(family.flow(1.8), np.zeros(2))
+    (point,) = corners(survey(family, [(1.8, orbit)], amplitude - 0.1, 1.9, depth=0).points)
+    window = PlaneWindow((0.3, amplitude + 5e-4), (amplitude + 6e-4, 4.1))
+    curve = continued(over.plane("F.x2", "F.x3"), point, 4.0, window)
+    assert curve is not None
+    assert curve.ends == ("edge of F.x3", "edge of F.x3")
+    assert curve.values[:, 0] == pytest.approx(amplitude, rel=1e-7)
+    plane = over.plane("F.x2", "F.x3")
+    pairs = [(5.0, 7.0), (-1.0, 0.0), (7.0, 5.0), (-2.5, 0.0), (1.0, 9.5)]
+    assert [plane.contains(*pair) for pair in pairs] == [True, True, False, False, False]
 
 
 def test_a_domain_that_another_parameter_bounds() -> None:
@@ -313,7 +343,7 @@ def test_a_symmetric_orbit_touches_a_corner_and_its_image_as_one() -> None:
     """The largest and the least displacement, half a period apart: whichever half of the orbit the
     followed one is in, the other is no second touch."""
     flow = subject(STIFFENING, 0.0, 1.4, 1.0).family("omega").flow(1.4)
-    assert [corner.corner for corner in flow.system.corners] == ["F at 1", "F at -1"]
+    assert [str(guard.corner) for guard in flow.system.corners] == ["F at 1", "F at -1"]
     start = settle(flow, np.zeros(2)).start
     every = grazings(flow, start, 1, corners=True)
     tips = [(each, phase) for each, phase in every if each.contact.tip]

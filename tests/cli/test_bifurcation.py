@@ -193,6 +193,17 @@ def test_a_point_of_a_law_takes_its_unit(tmp_path: Path, capfd: pytest.CaptureFi
     assert (answer["from"], answer["to"], answer["unit"]) == (5e-4, 2e-3, "m")
 
 
+def test_a_map_of_two_points_beyond_those_of_the_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Every cell may be, though F.x2 goes on beyond the F.x3 of the file."""
+    path = tmp_path / "bent.toml"
+    path.write_text(BENT, encoding="utf-8")
+    words = "--over F.x2 --from 0.004 --to 0.005 --steps 2 --map F.x3 0.006 0.007 2".split()
+    answer = _asked(capfd, path, *words, "--frequency", "8 Hz", "--periods", "40")
+    assert sum(answer["counts"].values()) == 4
+
+
 @pytest.mark.parametrize(
     ("options", "field", "part"),
     [
@@ -205,6 +216,7 @@ def test_a_point_of_a_law_takes_its_unit(tmp_path: Path, capfd: pytest.CaptureFi
             "by rising x, not x2 = 0.002 and x3 = 0.0015",
         ),
         ("--over F.x2 --from 0 --to 0.002 --and F.x3 0.0015 0.004", "--and", "by rising x"),
+        ("--over a.mass --from -1 --to 2 --map F.x3 2 4 5", "--from", "-1.0, expected a.mass: a n"),
         ("--over F.x2 --from 0 --to 0.002 --and F.f3 50 60", "--and", "about 40"),
     ],
 )

@@ -73,7 +73,10 @@ def test_entries_of_matrices_are_parameters() -> None:
         assert system.over_mass(ours) == pytest.approx(inverse @ whole, rel=1e-9, abs=1e-9)
     assert "stiffness.c.a" not in file.model.parameters
     with pytest.raises(InputError, match="positive definite"):
-        file.model.changed({"mass.b.b": -1.0})
+        file.model.changed({"mass.b.b": 1e-9})
+    for name in ("mass.b.b", "stiffness.c.c"):
+        with pytest.raises(InputError, match="a number > 0"):
+            file.model.changed({name: -1.0})
     with pytest.raises(InputError, match="found 1 N/m, expected a dimensionless number"):
         file.with_({"stiffness.a.c": "1 N/m"})
 
@@ -84,6 +87,39 @@ def test_a_mass_matrix_that_a_file_gives_by_its_diagonal_may_get_couplings() -> 
     file = parse_model_file(text.replace(f"mass = {matrices['M'].tolist()}", f"mass = {diagonal}"))
     assert file.data["matrices"]["mass"] == diagonal
     assert file.with_({"mass.a.b": 0.1}).data["matrices"]["mass"][1][0] == 0.1
+
+
+def test_only_the_entry_that_changes_is_written() -> None:
+    text = """format = 2
+[matrices]
+names = ["a", "b"]
+mass = [1, 2]
+stiffness = [[2, -1], [-1, 3]]
+damping = [[1, 0], [0, 1]]
+[[force]]
+on = "a"
+amplitude = 1
+"""
+    file = parse_model_file(text)
+    found = file.with_({"stiffness.a.b": -0.5, "mass.b.b": 2.5}).data["matrices"]
+    wanted = {
+        "names": ["a", "b"],
+        "mass": [1, 2.5],
+        "stiffness": [[2, -0.5], [-0.5, 3]],
+        "damping": [[1, 0], [0, 1]],
+    }
+    assert repr(found) == repr(wanted)
+
+
+def test_entries_that_are_alike_across_the_diagonal_are_read_as_their_mean() -> None:
+    text, matrices, *_ = drawn(2)
+    rows = matrices["K"].tolist()
+    entry = rows[0][1]
+    rows[0][1] = entry * (1.0 + 1e-10)
+    model = parse_model_file(text.replace(f"{matrices['K'].tolist()}", f"{rows}")).model
+    assert model.parameter("stiffness.a.b") == pytest.approx(entry * (1.0 + 5e-11), rel=1e-15)
+    assert model.parameter("stiffness.a.b") not in (entry, rows[0][1])
+    assert model.changed({name: model.parameter(name) for name in model.parameters}) == model
 
 
 @pytest.mark.parametrize("seed", range(6))

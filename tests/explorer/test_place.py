@@ -93,6 +93,37 @@ def test_every_parameter_has_a_slider_and_both_its_ends_can_be_had(name: str) ->
                 read_place(modelfile, {control.name: value})
 
 
+LISTS = parse_model_file(
+    """format = 2
+[matrices]
+names = ["tip", "root"]
+mass = [1, 2]
+stiffness = [[3, -1], [-1, 4]]
+damping = [[0.1, 0], [0, 0.2]]
+[[law]]
+name = "F"
+between = ["tip", "ground"]
+points = [[-1, -1], [0, 0], [2, 1]]
+[[force]]
+on = "tip"
+amplitude = 1
+"""
+)
+
+
+def test_points_and_entries_have_no_slider_and_are_in_the_address_where_they_were_asked_for() -> (
+    None
+):
+    assert [c.name for c in controls(LISTS)] == ["omega", "b", "tip.amplitude", "tip.constant"]
+    place = first_place(LISTS)
+    assert words_of(place).keys() == {"omega", "b", "tip.amplitude", "tip.constant"}
+    moved = read_place(LISTS, {"F.x3": "3", "mass.tip.tip": "1.5", "b": "2"})
+    assert words_of(moved).keys() - words_of(place).keys() == {"F.x3", "mass.tip.tip"}
+    assert read_place(LISTS, words_of(moved)) == moved
+    with pytest.raises(InputError, match="> 0"):
+        read_place(LISTS, {"mass.tip.tip": "0"})
+
+
 def test_a_file_that_wants_nothing_is_looked_at_where_the_model_resonates() -> None:
     modelfile = parse_model_file(f"format = 1\n{PAPER_TABLE}")
     assert first_place(modelfile).omega == 1.0

@@ -18,6 +18,7 @@ from designer.explorer.questions import read_question, save_model
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
 from tests.explorer.served import EXAMPLES
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.system_text import system_text, table
 
 MECHANICAL = (
     "format = 1\n[mechanical]\nM1 = '2 kg'\nM2 = 3\nC1 = 60\nC2 = 24\nK0 = '540 kN/m'\n"
@@ -25,9 +26,34 @@ MECHANICAL = (
 )
 
 
+POINTS = system_text(
+    {"tip": "2 kg"},
+    {("tip", "ground"): 900.0},
+    {("tip", "ground"): 1.0},
+    table("law", name="F", between=["tip", "ground"], points=[["-1 mm", 0], [0, 0], ["2 mm", 3]]),
+    table("force", on="tip", amplitude=1.0),
+)
+MATRICES = """
+format = 2
+[matrices]
+names = ["tip", "root"]
+mass = [1, 2]
+stiffness = [[3, -1], [-1, 4]]
+damping = [[0.1, 0.05], [-0.05, 0.2]]
+[[law]]
+name = "F"
+between = ["tip", "ground"]
+points = [[-1, -1], [0, 0], [2, 1]]
+[[force]]
+on = "tip"
+amplitude = 1
+"""
+TEXTS = {"mechanical": MECHANICAL, "points": POINTS, "matrices": MATRICES}
+
+
 def file(name: str) -> ModelFile:
-    if name == "mechanical":
-        return parse_model_file(MECHANICAL)
+    if name in TEXTS:
+        return parse_model_file(TEXTS[name])
     return read_model_file(EXAMPLES / f"{name}.toml")
 
 
@@ -40,6 +66,8 @@ FILES = (
     "preloaded",
     "aberdeen",
     "two-wells-chaos",
+    "points",
+    "matrices",
 )
 
 

@@ -69,6 +69,18 @@ def test_a_number_of_an_element_may_have_its_unit(value: object) -> None:
     assert (moved.title, moved.source, moved.responses) == (file.title, file.source, file.responses)
 
 
+@pytest.mark.parametrize("x2", ["0.001", '"1 mm"'])
+def test_a_point_of_a_law_is_written_as_the_others_are(x2: str) -> None:
+    law = '[[law]]\nname = "F"\nbetween = ["m", "ground"]\n'
+    points = f"points = [[-0.001, 0], [{x2}, 0], [1, 2]]\n"
+    text = SYSTEM.replace("mass = 1.0", 'mass = "1 kg"') + law + points
+    file = parse_model_file(text)
+    for value in (2e-3, "2 mm"):
+        moved = file.with_({"F.x2": value})
+        assert moved.model == file.model.changed({"F.x2": 2e-3})
+        assert moved.data["law"][0]["points"][1] == ["2 mm" if "mm" in x2 else 2e-3, 0]
+
+
 def test_keys_and_tables_are_set_added_and_left_out() -> None:
     wanted = [{"omega": 0.85, "expect": "1-2-2"}]
     file = parse_model_file(PAPER).with_({"response": wanted, "circuit.max_error": 0.01})

@@ -207,7 +207,7 @@ def test_points_of_laws_are_parameters() -> None:
 def test_a_file_has_the_points_that_it_is_given() -> None:
     text = ONE + FORCE + law(points=[["-1 mm", -2], ["1 mm", "2 N"], [0.003, 3]])
     moved = parse_model_file(text).with_({"L.x2": "0.5 mm", "L.f2": 1.5, "L.x3": 0.004})
-    assert moved.data["law"][0]["points"] == [["-1 mm", -2], ["0.5 mm", "1.5 N"], ["0.004 m", 3]]
+    assert moved.data["law"][0]["points"] == [["-1 mm", -2], ["0.5 mm", "1.5 N"], [0.004, 3]]
     with pytest.raises(InputError, match=r"L\.x2: found None"):
         moved.with_({"L.x2": None})
 
