@@ -79,11 +79,11 @@ REACH = {
     "reproduce": 56_850,
     "rules": 53_650,
     "explore": 51_600,
-    "bench": 56_900,
+    "bench": 56_950,
     "trade": 65_050,
     "export": 59_400,
     "synthesise": 55_600,
-    "run": 68_350,
+    "run": 68_400,
     "tolerance": 68_450,
     "search": 73_500,
 }
