@@ -51,7 +51,7 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         *_of("circuit", "coefficients", "circuit/coefficients circuit/any_system"),
         *_of(
             "linear_network",
-            "linear_block linear_terms term_conditions",
+            "linear_block linear_terms term_search",
             "linear_network/linear_block linear_network/linear_search linear_network/term_search",
         ),
         *_of("synthesis", "stop_halves", "synthesis/stop_halves"),

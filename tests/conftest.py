@@ -29,7 +29,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# The same examples in each run: a failure that one run shows, the next shows too.
+# The same examples in each run: a failure that one run shows, the next shows too. A property that
+# names no number of its own has few; the profile below has the many.
 settings.register_profile("ci", deadline=None, derandomize=True, max_examples=30)
 # New examples in each run, to look for failures: HYPOTHESIS_PROFILE=explore. Other populations are
 # larger under it too (tests/shared/exploring.py).

@@ -2,6 +2,7 @@
 
 It is started early, imports what it will need while the first one is busy, and is given functions
 and their arguments. Whatever goes wrong there is done again here: nothing depends on it but time.
+It ends at once when the first one does, however that ends.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, BinaryIO, Generic, TypeVar
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any, BinaryIO, Generic, NoReturn, TypeVar
 
 from designer.base.defaults import COLLECTION
 from designer.base.environment import python_command
@@ -25,10 +28,10 @@ Result = TypeVar("Result")
 
 
 class Awaited(Generic[Result]):
-    """What a function gives, there or here.
+    """What a function gives, there or here; the result is kept.
 
     there : its result, in a tuple, or None where that process has none. None: it is called here,
-    when its result is asked for.
+    when its result is first asked for.
     """
 
     def __init__(
@@ -38,16 +41,20 @@ class Awaited(Generic[Result]):
         there: Future[tuple[Result] | None] | None = None,
     ) -> None:
         self._function, self._arguments, self._there = function, arguments, there
+        self._known: tuple[Result] | None = None
 
     def __call__(self) -> Result:
         """The result, which is waited for; raises what the function raises."""
-        answered = None if self._there is None else self._there.result()
-        return self._function(*self._arguments) if answered is None else answered[0]
+        if self._known is None:
+            answered = None if self._there is None else self._there.result()
+            self._known = (self._function(*self._arguments),) if answered is None else answered
+        return self._known[0]
 
     @property
     def ready(self) -> bool:
-        """Whether nothing has to be waited for."""
-        return self._there is not None and self._there.done()
+        """Whether the other process has done with it, or its result is known. What is called here
+        is not ready before it is asked for."""
+        return self._known is not None or (self._there is not None and self._there.done())
 
 
 Ask = Callable[..., Awaited[Any]]
@@ -84,7 +91,7 @@ class OtherProcess:
         assert stdin is not None
         assert stdout is not None
         try:
-            pickle.dump((function, arguments), stdin)
+            pickle.dump(pickle.dumps((function, arguments)), stdin)
             stdin.flush()
             answered: tuple[Result] | None = pickle.load(stdout)
         except (OSError, EOFError, ValueError, pickle.PickleError, AttributeError, TypeError):
@@ -120,11 +127,15 @@ def other_process(jobs: int, *modules: str) -> Iterator[Ask]:
         other.close()
 
 
-def serve(modules: Sequence[str]) -> None:
+def serve(modules: Sequence[str]) -> NoReturn:
     """The process, from its own side: answers until nobody asks any more.
 
-    An answer is a tuple with the result, or None where there is none.
+    A question is the bytes of a function with its arguments; an answer is a tuple with the result,
+    or None where there is none.
     """
+    questions: SimpleQueue[bytes] = SimpleQueue()
+    asking = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    Thread(target=_listen, args=(asking, questions), daemon=True).start()
     gc.set_threshold(*COLLECTION)
     answers: BinaryIO = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a function prints is no answer
@@ -132,12 +143,22 @@ def serve(modules: Sequence[str]) -> None:
         importlib.import_module(name)
     while True:
         try:
-            function, arguments = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        try:
+            function, arguments = pickle.loads(questions.get())
             answer = pickle.dumps((function(*arguments),))
         except Exception:
             answer = pickle.dumps(None)
         answers.write(answer)
         answers.flush()
+
+
+def _listen(asking: BinaryIO, questions: SimpleQueue[bytes]) -> NoReturn:
+    """Takes questions as they come. Where they end, the first process has: even one that was killed
+    leaves nobody at work.
+
+    It makes no objects of the bytes: that imports modules, which the other thread does.
+    """
+    while True:
+        try:
+            questions.put(pickle.load(asking))
+        except (EOFError, pickle.UnpicklingError):  # the second: cut off in a question
+            os._exit(0)

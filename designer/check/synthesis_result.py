@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 
 from designer.base.frames import table_html
 from designer.base.progress import doing, note, seeking
@@ -119,7 +120,10 @@ def responses_of(
     _checked(modelfile, catalog)
     with errors_in(modelfile):
         doing("responses of the model")
-        found = None if ahead is None else ahead()
+        found = None
+        if ahead is not None:
+            import_module("cvxpy")  # takes a second, and the parts need it: better now than idle
+            found = ahead()
         found = found or find(modelfile.model, modelfile.responses)
         if all_found:
             need_found(dict(enumerate(found, start=1)), modelfile.si, modelfile.source)

@@ -34,7 +34,8 @@ def ask_responses(
     other: Ask, modelfile: ModelFile
 ) -> Callable[[], tuple[ModelResponse, ...] | None]:
     """Waits for the model's responses, as of ``find_responses.find``; what writes is imported once
-    they are found. None where that process would have to compile first."""
+    they are found. None where kernels would have to be compiled first, which this process does at
+    the same time. Where there is no other process they are found here, when they are asked for."""
     answer = other(_responses, modelfile)
     other(_import, WRITING)
     return answer

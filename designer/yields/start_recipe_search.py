@@ -70,7 +70,8 @@ def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tu
     """A recipe for each question of the plan; its seed and number of samples do not matter.
 
     other : a process that takes questions from the last one on, once it is idle, or half of the
-    trials of a single one; no recipe depends on it.
+    trials of a single one; no recipe depends on it. What only calls functions here is never idle
+    (``Awaited.ready``), and takes none.
     """
     count = len(plan.questions)
     if other is None or jobs < 2 or not count:

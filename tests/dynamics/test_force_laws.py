@@ -74,7 +74,7 @@ def drawn(seed: int) -> tuple[str, list[Law], dict[str, Array], float]:
     return text, laws, matrices, omega
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_laws_of_any_shape_against_a_tight_integrator(seed: int) -> None:
     """Newton's law with the force looked up piece by piece, DOP853 in short steps."""
     text, laws, matrices, omega = drawn(seed)

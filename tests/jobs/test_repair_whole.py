@@ -20,20 +20,14 @@ from designer.folders.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.repair_job import repair_into
 from designer.jobs.study_job import run_into
-from designer.model.model_file import read_model_file
+from designer.jobs.synthesise_job import synthesise_into
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
-from tests.shared.quick_folders import quick_folder, without_starts
+from tests.shared.quick_folders import without_starts
 
-pytestmark = pytest.mark.usefixtures("figures_are_blank", "quick_reports", "nothing_beside")
 FRESH = Options(seed=4242, samples=400, rung="exact", blame=False)
 """Of the study by which a repair is judged."""
-
-
-@pytest.fixture
-def nothing_beside(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither starts nor findings, which no repair asks for."""
-    without_starts(monkeypatch)
 
 
 def text(omega: float, expect: str, b: float = 0.25, dead_zone: str = "saturation") -> str:
@@ -71,7 +65,7 @@ class Whole:
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     """The repair of this model file's design by this kind alone."""
     design, repaired = where / "design", where / "cured"
-    quick_folder(model, design)
+    synthesise_into(parse_model_file(model), design, Options(), Progress())
     found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
     return Whole(design, repaired, found.answer)
@@ -113,8 +107,27 @@ def changed(found: Whole) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_another_b_alone(tmp_path: Path) -> None:
-    """The last of eight impacts nearly grazes at b = 0.25, at any frequency of the window."""
+def test_the_fitted_trimmer_alone(tmp_path: Path) -> None:
+    """As users have it: with starts, findings, attribution and the report, all before the fixtures
+    of the other test."""
+    found = whole(tmp_path, text(0.215, "1-8-8", 0.262, "rectifier"), TRIMMER, 0.9)
+    assert changed(found) == {"trimmer": True}
+    assert found.answer["price"] > 0.0
+    options = replace(FRESH, blame=True)
+    before, after = studied(found.design, options), studied(found.repaired, options)
+    is_kept(found, before["yield"], after["trimmed"])
+    # As built, the boards of both folders are the same ones.
+    assert after["yield"] == before["yield"]
+    for folder in (found.design, found.repaired):
+        assert "<svg" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("figures_are_blank", "quick_reports")
+def test_another_b_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last of eight impacts nearly grazes at b = 0.25, at any frequency of the window. No
+    repair asks for starts and findings."""
+    without_starts(monkeypatch)
     found = whole(tmp_path, text(0.215, "1-8-8", 0.25, "rectifier"), PLACE, 0.97)
     (place,) = changed(found)["places"]
     assert place["omega"] == 0.215
@@ -131,14 +144,3 @@ def test_another_b_alone(tmp_path: Path) -> None:
     plan = plan_of(made, question, FRESH.seed)
     along = yield_map(plan, 0, "omega", 0.25, values=(0.2125, 0.215, 0.2175), samples=30)
     assert along.rate.max() < 0.8
-
-
-@pytest.mark.slow
-def test_the_fitted_trimmer_alone(tmp_path: Path) -> None:
-    found = whole(tmp_path, text(0.215, "1-8-8", 0.262, "rectifier"), TRIMMER, 0.9)
-    assert changed(found) == {"trimmer": True}
-    assert found.answer["price"] > 0.0
-    before, after = studied(found.design), studied(found.repaired)
-    is_kept(found, before["yield"], after["trimmed"])
-    # As built, the boards of both folders are the same ones.
-    assert after["yield"] == before["yield"]

@@ -123,7 +123,7 @@ MATCHED = [
 
 
 @pytest.mark.parametrize("matched", MATCHED, ids=str)
-@pytest.mark.parametrize("seed", seeds(1))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
     t = targets_of(model)
@@ -134,7 +134,7 @@ def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], s
 
 
 @pytest.mark.parametrize("most", [2, 3, 4, 5])
-@pytest.mark.parametrize("seed", seeds(1))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_every_choice_of_few_values(most: int, seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
     t = targets_of(model)
@@ -145,7 +145,7 @@ def test_every_choice_of_few_values(most: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize("slack", [0.005, 0.05])
-@pytest.mark.parametrize("seed", seeds(1))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_slack_buys_fewer_values(slack: float, seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
     t = targets_of(model)
