@@ -46,7 +46,6 @@ SMALLER = {
     "--steps 111": "--steps 5",
     "--samples 100 --out out/rig": "--samples 4 --out out/rig --no-blame",
     "tolerance out/rig --tuned": "tolerance out/rig --tuned --no-blame",
-    "--omega 1.0 --plots": "--omega 1.0 --starts 2 --plots",
     "--shares 200": "--shares 20",
     # how many starts lead where is asked in tests/check/test_coexistence.py
     **{
