@@ -134,6 +134,7 @@ class Ensemble:
         starts: Array,
         *,
         jobs: int = 1,
+        progress: Callable[[], None] = lambda: None,
     ) -> list[Orbit | None]:
         """``settle`` as far as the compiled way goes: None where it leaves a question open.
 
@@ -144,7 +145,7 @@ class Ensemble:
         def brief(board: int, drive: Drive, start: Array) -> SettledBoard | None:
             return None if drive.is_sine else self._alone(board, drive, start, BRIEF)
 
-        every = self._settled(which, drives, starts, QUICK, brief, jobs)
+        every = self._settled(which, drives, starts, QUICK, brief, jobs, progress)
         return [None if response is None else response.orbit for response in every]
 
     def _settled(
@@ -155,7 +156,7 @@ class Ensemble:
         stages: int,
         alone: Callable[[int, Drive, Array], SettledBoard | None],
         jobs: int,
-        progress: Callable[[], None] = lambda: None,
+        progress: Callable[[], None],
     ) -> list[SettledBoard | None]:
         """What each board settles on the compiled way within so many stages, else ``alone``."""
         index = np.asarray(which, dtype=np.int64)

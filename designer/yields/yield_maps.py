@@ -321,25 +321,23 @@ def _answered(
 ) -> list[Verdict | None]:
     """Of each task; None where a forecast left it open to the last."""
 
-    def judged(
-        ask: Callable[..., Sequence[Orbit | None]], some: Sequence[int]
-    ) -> list[Verdict | None]:
-        orbits = ask(
-            [tasks[t].board for t in some],
-            [tasks[t].drive for t in some],
-            np.array([tasks[t].start for t in some]),
-            jobs=jobs,
-            progress=progress,
+    def judged(some: Sequence[int], *, settled: bool) -> list[Verdict | None]:
+        boards, drives = [tasks[t].board for t in some], [tasks[t].drive for t in some]
+        starts = np.array([tasks[t].start for t in some])
+        orbits: Sequence[Orbit | None] = (
+            ensemble.settle(boards, drives, starts, jobs=jobs, progress=progress)
+            if settled
+            else ensemble.quick(boards, drives, starts, jobs=jobs, progress=progress)
         )
         return [None if orbit is None else question.judge(orbit)[0] for orbit in orbits]
 
     everything = range(len(tasks))
     if not quick:
-        return judged(ensemble.settle, everything)
-    verdicts = judged(ensemble.quick, everything)
+        return judged(everything, settled=True)
+    verdicts = judged(everything, settled=False)
     for setting in dict.fromkeys(task.setting for task in tasks):
         left = [t for t in everything if tasks[t].setting == setting and verdicts[t] is None]
-        settle_open(verdicts, left, lambda some: judged(ensemble.settle, some))
+        settle_open(verdicts, left, lambda some: judged(some, settled=True))
     return verdicts
 
 

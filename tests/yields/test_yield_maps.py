@@ -85,6 +85,21 @@ def test_a_point_is_what_its_boards_do_from_the_nominal_orbit_there() -> None:
         assert (counted.ok, counted.lost) == (tally[Verdict.OK], tally[Verdict.LOST])
 
 
+def test_a_forecast_is_the_map_where_the_compiled_way_answers() -> None:
+    values, told = over_omega().axes[0].values[:2], list[int]()
+
+    def mapped(quick: bool) -> YieldMap:
+        return yield_map(
+            plan(), 0, "omega", B, values=values, samples=4, quick=quick,
+            progress=lambda: told.append(1),
+        )  # fmt: skip
+
+    plain, found = mapped(False), mapped(True)
+    assert (found.ok == plain.ok).all()
+    assert plain.ok.any()
+    assert len(told) >= 2 * plain.ok.sum()
+
+
 def test_boards_that_a_forecast_leaves_open_are_settled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here all of them, as in a design whose boards reach a mode that the compiled way lacks. A
     setting at which the first board shows the response is as in the plain map; at another one
