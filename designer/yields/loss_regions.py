@@ -193,7 +193,7 @@ def _led_back(
     fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
     quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
     ends = list(walk(quick, shown(False), rng))
-    commonest = max((w.share for w in quick if not w.going), default=0.0)
+    commonest = max((w.share for w in quick if w.width == 1.0), default=0.0)
     ends += walk(slow, shown(True), rng, FEW_MOVES, commonest)
     found, may = list[tuple[str, Region]](), _tiltable(drawing.names)
     for each, points in zip([*quick, *slow], ends, strict=True):
