@@ -11,10 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile
 from reports.makers.evidence import (
@@ -23,10 +21,9 @@ from reports.makers.evidence import (
     Example,
     comparison_table,
     figure_block,
-    name_axes,
 )
 from reports.makers.first_grazing import located_grazing
-from reports.makers.weight import BASE, MM, RATIOS, grazing_amplitude
+from reports.makers.weight import BASE, MM, RATIOS, grazing_amplitude, touching_figure
 
 
 def evidence(file: ModelFile) -> list[Evidence]:
@@ -65,25 +62,14 @@ def touching_amplitude(model: LumpedSystem, omega: float) -> float:
     return system.clearances[0].first.gap / passed
 
 
-@styled
 def _figure(model: LumpedSystem, compared: tuple[Comparison, ...]) -> Figure:
-    figure = new_figure(6.4, 3.0)
-    axes = figure.subplots()
     assert model.base is not None
     with_table = replace(model, base=replace(model.base, stops="base"))
-    own = model.second_order().own_frequency
-    omegas = own * np.geomspace(0.4, 2.4, 300)
-    hertz = omegas / (2.0 * math.pi)
-    stays = [MM * touching_amplitude(model, float(w)) for w in omegas]
-    moves = [MM * grazing_amplitude(with_table, float(w), weight=False) for w in omegas]
-    axes.semilogy(hertz, stays, lw=1.2, color=INK, label="on the floor")
-    axes.semilogy(hertz, moves, lw=1.2, color=MUTED, ls=(0, (4, 3)), label="on the table")
-    dots = [ratio * own / (2.0 * math.pi) for ratio in RATIOS]
-    axes.plot(dots, [c.computed for c in compared], "o", ms=4.5, mfc="none", color=INK)
-    plain_numbers(axes.yaxis)
-    name_axes(axes, "frequency [Hz]", "amplitude of the table [mm]")
-    axes.legend()
-    return figure
+    curves = {
+        "on the floor": lambda omega: touching_amplitude(model, omega),
+        "on the table": lambda omega: grazing_amplitude(with_table, omega, weight=False),
+    }
+    return touching_figure(model, compared, curves, "amplitude of the table [mm]")
 
 
 EXAMPLE = Example(

@@ -8,6 +8,7 @@ y r²/√((1 - r²)² + (2ζr)²) with r = ω/ω₀. The anvil is first touched 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -74,20 +75,36 @@ def _compared(model: LumpedSystem, omega: float) -> Comparison:
     return Comparison(f"touching amplitude at {hertz:.4g} Hz", MM * expected, MM * computed)
 
 
-@styled
 def _figure(model: LumpedSystem, compared: tuple[Comparison, ...]) -> Figure:
+    curves = {
+        "with the weight": lambda omega: grazing_amplitude(model, omega),
+        "without": lambda omega: grazing_amplitude(model, omega, weight=False),
+    }
+    return touching_figure(model, compared, curves, "base amplitude [mm]")
+
+
+@styled
+def touching_figure(
+    model: LumpedSystem,
+    compared: tuple[Comparison, ...],
+    curves: Mapping[str, Callable[[float], float]],
+    name: str,
+) -> Figure:
+    """Amplitudes in m at the first touch over ω: two named curves in closed form, the second
+    broken, and those compared, in mm at ``RATIOS``. name : of the axis."""
     figure = new_figure(6.4, 3.0)
     axes = figure.subplots()
     own = model.second_order().own_frequency
     omegas = own * np.geomspace(0.4, 2.4, 300)
-    for weight, look in ((True, {"color": INK}), (False, {"color": MUTED, "ls": (0, (4, 3))})):
-        amplitudes = [MM * grazing_amplitude(model, float(w), weight=weight) for w in omegas]
-        label = "with the weight" if weight else "without"
-        axes.semilogy(omegas / (2.0 * math.pi), amplitudes, lw=1.2, label=label, **look)
+    hertz = omegas / (2.0 * math.pi)
+    looks = ((INK, "-"), (MUTED, (0, (4, 3))))
+    for (label, amplitude), (color, dashes) in zip(curves.items(), looks, strict=True):
+        amplitudes = [MM * amplitude(float(omega)) for omega in omegas]
+        axes.semilogy(hertz, amplitudes, lw=1.2, color=color, ls=dashes, label=label)
     dots = [ratio * own / (2.0 * math.pi) for ratio in RATIOS]
     axes.plot(dots, [c.computed for c in compared], "o", ms=4.5, mfc="none", color=INK)
     plain_numbers(axes.yaxis)
-    name_axes(axes, "frequency [Hz]", "base amplitude [mm]")
+    name_axes(axes, "frequency [Hz]", name)
     axes.legend()
     return figure
 
