@@ -58,12 +58,16 @@ def test_the_figures_stand_beside_the_portrait_or_right_below_it(
     page.close()
 
 
-@pytest.mark.parametrize("width", SIZES)
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [*SIZES.items(), (400, 745)],  # the last cut half a pixel of a slider at its lower edge
+)
 def test_each_slider_and_the_portrait_are_in_sight_together(
-    browser: Browser, addresses: dict[str, str], width: int
+    browser: Browser, addresses: dict[str, str], width: int, height: int
 ) -> None:
     """Whichever has the focus: both are whole in the window, and nothing lies over the slider."""
     page = of_width(browser, addresses["three-masses"], width)
+    page.set_viewport_size({"width": width, "height": height})
     seen = page.evaluate(
         """async () => {
           const out = [], whole = (r) => r.top >= 0 && r.bottom <= innerHeight && r.height > 10;
