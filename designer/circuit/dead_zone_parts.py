@@ -8,6 +8,7 @@ depend on a reference.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -433,8 +434,9 @@ def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tupl
     of the contact the idle half's clamp carries (t + t')/R' + d (1/R' - s/F'): t and t' are the
     thresholds of the driving and the idle half, s the driving half's gain, R' and F' the idle
     half's input and feedback resistor. The clamp's resistor and two drops are what keeps the diode
-    off; a half steeper than the idle one takes from that current. values : [ohm] by name, a
-    composite's as one. Empty where no clearance has both halves on one output.
+    off; a half steeper than the idle one takes from that current, a flat one adds to it. values :
+    [ohm] by name, a composite's as one. Left out is what no voltage ends, and a clearance whose
+    halves have an output each.
     """
     out = {}
     for index, stop in enumerate(circuit.dead_zones):
@@ -447,7 +449,8 @@ def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tupl
                 feeding = diodes[driving.series].nets
                 section = next(s.name for s in circuit.sections if s.output in feeding)
                 reach = _idle_reach(circuit, values, driving, idle)
-                out[section] = (idle.series, side * reach)
+                if math.isfinite(reach):
+                    out[section] = (idle.series, side * reach)
     return out
 
 

@@ -185,17 +185,21 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         errors = coefficient_errors(circuit, model.second_order(), swing=swing)
         if abs(errors.max_error - float(document["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
-        conditions = document["conditions"]
+        conditions = document["conditions"]  # without a limit: of versions that wrote such ones
         listed = {key: conditions.get(key, ()) for key in ("checked", "at_limit", "binding")}
         design = Design(
             model=model,
             circuit=circuit,
             errors=errors,
             certificate=Certificate(**document["certificate"]),
-            conditions={k: float(v) for k, v in conditions.items() if k not in listed},
+            conditions={
+                k: float(v) for k, v in conditions.items() if k not in listed and v is not None
+            },
             solver=dict(document["solver"]),
             seconds=float(document["cost"]["synthesis_seconds"]),
-            checks=tuple(ConditionCheck(**check) for check in listed["checked"]),
+            checks=tuple(
+                ConditionCheck(**check) for check in listed["checked"] if check["limit"] is not None
+            ),
             binding=dict(listed["binding"]),
         )
     reason = str(stage.get("reason", "")) if isinstance(stage, Mapping) else ""

@@ -16,7 +16,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import BoardModes, at_rest, resting_voltages
 from designer.circuit.board_values import nominal_board
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
+from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts, idle_limits
 from designer.circuit.netlist import Circuit, Section
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
@@ -311,10 +311,11 @@ def test_how_far_unequal_halves_drive_their_output(seed: int) -> None:
     board = replace(nominal_board(circuit), inverse_gain=1e-7, bias={})
     reduction = Reduction(circuit, board)
     flow = reduction.system()
-    for diode, limit in limits.values():
-        if not np.isfinite(limit) or abs(limit) > 500.0:
-            continue
-        at = circuit.switches.index(diode)
+    ends = dict(limits.values())
+    begin = 0.3 * SCALE.volts[0] if preload > 0 else 0.05
+    for side in (1, -1):
+        idle = half_parts(0, -side).series
+        limit, at = ends.get(idle), circuit.switches.index(idle)
 
         def conducts(v: float, at: int = at) -> tuple[bool, float]:
             x = np.array([v, 0.0, 0.0, 0.0])
@@ -322,12 +323,15 @@ def test_how_far_unequal_halves_drive_their_output(seed: int) -> None:
             fv = reduction.output(key, "fv", x[None, :], np.zeros(1))[0]
             return bool(key[at]), float(fv)
 
-        high = 2e3 * np.sign(limit)
-        low = (0.3 * SCALE.volts[0] if preload > 0 else 0.05) * np.sign(limit)
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if conducts(middle)[0] else (middle, high)
-        assert conducts(low)[1] == pytest.approx(limit, rel=2e-3, abs=0.05)  # diodes resist
+        if limit is None:
+            in_contact = np.geomspace(0.5 * SCALE.volts[0], 2e3, 12)  # of the driving half
+            assert not any(conducts(v * side)[0] for v in in_contact)
+        elif abs(limit) <= 500.0:
+            low, high = begin * np.sign(limit), 2e3 * np.sign(limit)
+            for _ in range(50):
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if conducts(middle)[0] else (middle, high)
+            assert conducts(low)[1] == pytest.approx(limit, rel=2e-3, abs=0.05)  # diodes resist
 
 
 def two(**changes: object) -> SecondOrderSystem:
