@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -37,6 +37,8 @@ from designer.yields.study_plan import plan_study
 
 BOARDS = 64
 """Boards of each stage that are asked."""
+FEW = 16
+"""Of these, so many are asked about a response at a time."""
 STREAM = "stage:"
 """Stream of these boards, which no study draws."""
 
@@ -237,21 +239,38 @@ def boards_that_keep(synthesis: Synthesis, jobs: int = 1) -> int | None:
         if c.model.orbit.status is OrbitStatus.PERIODIC
     ]
     there = [c for c in checked if matches(c.circuit, c.model.spec)]
-    kept = None if not checked else 0
-    if checked and len(there) == len(checked):
-        plan = plan_study(
-            synthesis.modelfile, design, there, synthesis.catalog, samples=BOARDS, seed=0
-        )
-        drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(BOARDS), STREAM)
-        sample = Ensemble(plan.modelled(drawn), jobs=jobs)
-        counts = []
-        for question in plan.questions:
-            asked = question, question.excitation, question.start.start
-            cases: list[Case] = [(i, *asked) for i in range(BOARDS)]
-            answers = settled(sample, cases, jobs, within=BRIEF)
-            counts.append(sum(verdict is Verdict.OK for _, verdict, _ in answers))
-        kept = min(counts)
-    return kept
+    if not checked:
+        return None
+    if len(there) < len(checked):
+        return 0
+    plan = plan_study(synthesis.modelfile, design, there, synthesis.catalog, samples=BOARDS, seed=0)
+    drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(BOARDS), STREAM)
+    sample = Ensemble(plan.modelled(drawn), jobs=jobs)
+
+    def kept_by(number: int, boards: range) -> int:
+        question = plan.questions[number]
+        asked = question, question.excitation, question.start.start
+        cases: list[Case] = [(i, *asked) for i in boards]
+        answers = settled(sample, cases, jobs, within=BRIEF)
+        return sum(verdict is Verdict.OK for _, verdict, _ in answers)
+
+    return least_kept(len(plan.questions), kept_by)
+
+
+def least_kept(responses: int, kept_by: Callable[[int, range], int]) -> int:
+    """Of ``BOARDS`` boards, those that keep the response that the fewest keep.
+
+    kept_by : how many of these boards keep the response of this number. The response that the
+    fewest have kept so far is asked of further boards: most others need not be asked of all.
+    """
+    asked, kept = [0] * responses, [0] * responses
+    while True:
+        k = min(range(responses), key=lambda each: (kept[each], -asked[each]))
+        if asked[k] == BOARDS:
+            return kept[k]
+        boards = range(asked[k], min(asked[k] + FEW, BOARDS))
+        kept[k] += kept_by(k, boards)
+        asked[k] = boards.stop
 
 
 def forecast(synthesis: Synthesis, jobs: int = 1) -> StageForecast:

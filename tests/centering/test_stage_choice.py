@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from designer.base.arrays import Mask
 from designer.base.second_process import other_process
 from designer.catalog.design_rule import Finding, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
-from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast
+from designer.centering.stage_choice import BOARDS, StageForecast, chosen, forecast, least_kept
 from designer.check import checked_design, synthesis_result
 from designer.check.synthesis_result import Synthesis, with_stage
 from designer.circuit.dead_zone_parts import stage_kind
@@ -145,6 +147,23 @@ def test_a_response_that_the_nominal_circuit_does_not_show_is_kept_by_no_board(
     (response,) = plain.model_responses
     wanted = replace(response, spec=replace(response.spec, expect=Counts(5, ((2, 2),))))
     assert forecast(replace(plain, model_responses=(wanted,))).kept == 0
+
+
+def test_the_fewest_are_counted_without_asking_all_boards() -> None:
+    """Of responses that any share of the boards keeps; those that most keep are asked of few."""
+    draws = np.random.default_rng(0)
+    for _ in range(50):
+        keeps = draws.random((5, BOARDS)) < draws.random((5, 1)) ** 0.3
+        asked: list[int] = []
+
+        def kept_by(number: int, boards: range, keeps: Mask = keeps, asked: Any = asked) -> int:
+            asked.extend(BOARDS * number + board for board in boards)
+            return int(keeps[number, boards].sum())
+
+        assert least_kept(5, kept_by) == keeps.sum(axis=1).min()
+        assert len(asked) == len(set(asked))
+        if keeps.sum(axis=1).min() < BOARDS // 2:
+            assert len(asked) < keeps.size
 
 
 def test_other_verbs_show_the_circuit_that_is_synthesised(monkeypatch: pytest.MonkeyPatch) -> None:
