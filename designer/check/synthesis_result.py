@@ -94,10 +94,13 @@ def synthesise(
     with errors_in(modelfile):
         choice = modelfile.model, modelfile.circuit, catalog
         held = peaks(modelfile.model, responses)
+
+        def stand(design: Design) -> None:
+            if announced:
+                note(parts_line(design, time.perf_counter() - began))
+
         with seeking("parts"):
-            design = parts_choice.synthesise(*choice, held, responses, jobs=jobs)
-        if announced:
-            note(parts_line(design, time.perf_counter() - began))
+            design = parts_choice.synthesise(*choice, held, responses, jobs=jobs, stand=stand)
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
 

@@ -18,7 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from designer.base.errors import Unreachable
-from designer.base.progress import best_so_far, doing, part
+from designer.base.progress import best_so_far, doing, part, quiet
 from designer.base.units import format_quantity
 from designer.catalog.design_rule import ROUNDING
 from designer.catalog.entries import UNITS, Kind
@@ -142,13 +142,14 @@ def synthesise(
     aims: Aims = NO_AIMS,
     binding: bool = True,
     jobs: int = 1,
+    stand: Callable[[Design], None] = quiet,
 ) -> Design:
     """Choose the parts.
 
     responses : that are wanted; the finished circuit is held to the voltages and currents that
     they need. Without them it is held to ``peaks``. aims : inside the side conditions. binding :
     whether it is asked what each side condition costs, which changes no part. jobs : threads; no
-    part depends on it.
+    part depends on it. stand : is given the design as soon as no part of it changes any more.
 
     Raises
     ------
@@ -171,13 +172,16 @@ def synthesise(
     if isinstance(best, _Missed):
         search.refuse(best, catalog)
     design = best.design
+    if not spec.composites:
+        _check_error(design, spec)
+        stand(design)
     if binding:
         design = replace(design, binding=search.binding(best))
     if spec.composites:
         doing("composites")
         design = search.with_composites(best, design)
-    if spec.max_error is not None and design.errors.max_error > spec.max_error:
-        _refuse_error(design, spec)
+        _check_error(design, spec)
+        stand(design)
     return replace(design, seconds=time.perf_counter() - began)
 
 
@@ -607,10 +611,11 @@ def _refuse_conflicts(missed: _Missed, spec: CircuitSpec, catalog: Catalog) -> N
     raise Unreachable(None, "circuit", found, free)
 
 
-def _refuse_error(design: Design, spec: CircuitSpec) -> NoReturn:
+def _check_error(design: Design, spec: CircuitSpec) -> None:
     """Raise ``Unreachable`` for an error above ``circuit.max_error``, with what would lower it."""
     errors, certificate = design.errors, design.certificate
-    assert spec.max_error is not None
+    if spec.max_error is None or errors.max_error <= spec.max_error:
+        return
     name = max(errors.errors, key=lambda each: abs(errors.errors[each]))
     found = (
         f"{spec.max_error:g}, where the best design that was found has {errors.max_error:.3g} "

@@ -4,12 +4,13 @@ report's attractors that coexist with a response are sought from few starts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
 
+from designer.base.progress import quiet
 from designer.check import coexistence, synthesis_result
 from designer.folders import bench_tables, kicad_files
 from designer.jobs import board_routing
@@ -31,8 +32,15 @@ def made_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(coexistence, "of_model", stored(few))
+        choose = stored(parts_choice.synthesise)
+
+        def synthesise(*order: Any, stand: Callable[[Any], None] = quiet, **named: Any) -> Any:
+            design = choose(*order, **named)
+            stand(design)
+            return design
+
+        patched.setattr(parts_choice, "synthesise", synthesise)
         for module, name, of in (
-            (parts_choice, "synthesise", None),
             (synthesis_result, "find", None),
             (bench_tables, "find_recipes", 1),  # the plan; not who computes
             (kicad_files, "files", 1),

@@ -246,11 +246,14 @@ def test_level_binds_where_the_clearance_is_never_reached() -> None:
 
 
 def test_what_costs_error_is_named_with_what_it_costs() -> None:
-    """E12 without a stop between 200 kΩ and 1 MΩ: both conditions leave worse ratios."""
+    """E12 without a stop between 200 kΩ and 1 MΩ: both conditions leave worse ratios. The parts
+    stand before these are sought."""
     spec = replace(E12, resistor_range=(2e5, 1e6))
     model = replace(PAPER, k0=0.0)
-    made = parts_choice.synthesise(model, spec, CATALOG, PEAKS)
+    told: list[Design] = []
+    made = parts_choice.synthesise(model, spec, CATALOG, PEAKS, stand=told.append)
     assert set(made.binding) == {"level", "resistors"}
+    assert told == [replace(made, binding={}, seconds=0.0)]
     for name, error in made.binding.items():
         freer = replace(spec, side_conditions=without(name))
         again = synthesise(model, freer, CATALOG, PEAKS)
