@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -324,9 +325,19 @@ def _least(coefficients: dict[str, _Coefficient], states: int) -> tuple[dict[str
         wrong = [name for name, c in coefficients.items() if not np.isfinite(c.log)]
         raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
     D = _scale_slopes(coefficients, coefficients, states)
-    D = D[:, [0, *range(2, 1 + states)]]  # volts of x1 is the amplitude, which a gap sets
-    free = minimax(h, D)
-    return dict(zip(coefficients, (h + D @ free).tolist(), strict=True)), free
+    free = _best_scales(h.tobytes(), D.tobytes(), states)
+    return dict(zip(coefficients, (h + _free(D) @ free).tolist(), strict=True)), free
+
+
+@lru_cache(maxsize=1)
+def _best_scales(h: bytes, D: bytes, states: int) -> Array:
+    """Kept: a circuit is asked about again once its drive is chosen, which moves no coefficient."""
+    return minimax(np.frombuffer(h), _free(np.frombuffer(D).reshape(-1, 1 + states)))
+
+
+def _free(D: Array) -> Array:
+    """Without the volts of x1, the amplitude, which a gap sets."""
+    return D[:, [0, *range(2, D.shape[1])]]
 
 
 def _scale_slopes(

@@ -172,11 +172,11 @@ class ScaleBox:
     def _limits(self, bounds: Sequence[LinearBound]) -> tuple[Array, Array]:
         """(limits, z + 1) and (limits,): the rows, which may not exceed these ends. The last
         variable is the lowest threshold."""
-        low = [np.append(-log.weights, 1.0) for log in self.program.thresholds]
-        weights = [np.append(b.log.weights, 0.0) for b in bounds] + low
-        ends = [-b.log.constant for b in bounds]
-        ends += [log.constant for log in self.program.thresholds]
-        return np.array(weights), np.array(ends)
+        low = self.program.thresholds
+        weights = [b.log.weights for b in bounds] + [-log.weights for log in low]
+        lowest = np.repeat([0.0, 1.0], [len(bounds), len(low)])
+        ends = [-b.log.constant for b in bounds] + [log.constant for log in low]
+        return np.column_stack([np.array(weights), lowest]), np.array(ends)
 
     def _solve(self, worth: Array, bounds: Sequence[LinearBound]) -> Array | None:
         """z of one linear program, whose rows the next has not: a LinearProgram is for many solves
