@@ -78,7 +78,7 @@ REACH = {
     "bifurcation": 34_700,
     "reproduce": 57_000,
     "rules": 53_750,
-    "explore": 51_750,
+    "explore": 51_800,
     "bench": 57_050,
     "trade": 65_150,
     "export": 59_550,
