@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -225,7 +226,10 @@ def test_a_branch_goes_through_the_one_value_that_has_a_mirror(
 def test_a_grazing_curve_goes_through_equal_gaps() -> None:
     """Each stop is touched where the response without one is as large as its gap."""
     found = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))
-    free = lambda w, gap: np.hypot(1.0 - w * w, 0.1 * w) - 1.0 / gap  # noqa: E731
+
+    def free(w: float, gap: float) -> float:
+        return math.hypot(1.0 - w * w, 0.1 * w) - 1.0 / gap
+
     upper = [brentq(free, 1.2, 3.0, args=(gap,)) for gap in (0.45, 0.5, 0.55)]
     curves = [c["points"] for c in found.answer["curves"] if c["kind"] == "grazing"]
     ends = {tuple(np.round(points[k], 5)) for points in curves for k in (0, -1)}
