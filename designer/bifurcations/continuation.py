@@ -125,8 +125,8 @@ def start(family: Family, orbit: Orbit, value: float, *, symmetric: bool | None 
     curve = Curve.through(family, orbit.start, value, orbit.n, bool(symmetric))
     solved = curve.near(orbit.start, value)
     point = None if solved is None else at(curve, solved)
-    odd = orbit.n % 2 == 1 and family.flow(value).system.mirror is not None
-    if symmetric is None and odd and point is not None and point.orbit.asymmetry < SAME:
+    alike = point is not None and orbit.n % 2 == 1 and point.orbit.asymmetry < SAME
+    if symmetric is None and point is not None and alike and family.mirrored(value):
         return start(family, point.orbit, value, symmetric=True)
     if point is None:
         raise ArithmeticError(f"no {orbit.response} orbit at {family.parameter} = {value:g}")

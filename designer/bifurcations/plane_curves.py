@@ -168,9 +168,13 @@ def _begun(
     """The equations of a located point's curve, and the point solved for by them."""
     solved, flow = bifurcation.point.solved, plane.flow(bifurcation.value, second)
     x, n = solved.x, bifurcation.point.orbit.n
-    halved = bifurcation.symmetric and flow.system.mirror is not None
+    by_half = bifurcation.symmetric and flow.system.mirror is not None
+    halved = by_half and plane.mirrored(bifurcation.value, second)
+    if by_half and not halved and bifurcation.kind is PointKind.PITCHFORK:
+        return None  # where the second parameter breaks the symmetry there is none
     peaks = peaks_near(flow, x)
-    jacobian = solved.jacobian * peaks / peaks[:, None]
+    jacobian = solved.jacobian if halved or not by_half else solved.jacobian @ solved.jacobian
+    jacobian = jacobian * peaks / peaks[:, None]
     values = (bifurcation.value, second)
     for condition, extra in _conditions(bifurcation, jacobian, flow, symmetric=halved):
         system = system_at(plane, values, x, n, extra, window, symmetric=halved)

@@ -183,7 +183,7 @@ class _Tally:
         of them lead to no attractor."""
         met, unsettled = settled(self._flow, states), 0
         new = all(orbit.status is not OrbitStatus.APERIODIC for orbit in self._orbits)
-        for orbit in outlived(self._flow, met, measure=new):
+        for orbit in outlived(self._flow, met, measure=new, known=self._orbits):
             if orbit.status not in ANSWERS:
                 unsettled += 1
                 continue

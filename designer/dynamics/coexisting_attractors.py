@@ -36,8 +36,12 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
     """
     attractors: list[Orbit] = []
     for orbit in outlived(flow, settled(flow, states)):
-        if not any(same(flow, orbit, other) for other in attractors):
+        met = (k for k, other in enumerate(attractors) if same(flow, orbit, other))
+        k = next(met, len(attractors))
+        if k == len(attractors):
             attractors.append(orbit)
+        longest = max(orbit.transient, attractors[k].transient)
+        attractors[k] = replace(attractors[k], transient=longest)
     return attractors
 
 
@@ -54,17 +58,20 @@ def settled(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
     return orbits
 
 
-def outlived(flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False) -> list[Orbit]:
+def outlived(
+    flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False, known: Sequence[Orbit] = ()
+) -> list[Orbit]:
     """Motions of one system, those without a period followed until it is known whether their chaos
     ends: without an end of one of them together for ``CALM`` drive periods, and each for
     ``OUTLIVED`` times as long as those lived on the average that did end.
 
     measure : the first that is chaotic in the end gets its exponent (``with_exponent``), which is
-    one more long look. What is chaotic still when ``step_budget.STARTS`` more steps are spent,
+    one more long look. known : attractors of other starts, whose chaos may have ended on them
+    (``Orbit.transient``). What is chaotic still when ``step_budget.STARTS`` more steps are spent,
     although others ended, is not settled.
     """
     out, left = list(orbits), float(step_budget.STARTS)
-    lives: list[int] = []
+    lives = [orbit.transient for orbit in known if orbit.transient]
     length, calm, each = 0, 0, 0
     while True:
         chaotic = [k for k, o in enumerate(out) if o.status is OrbitStatus.APERIODIC]
@@ -77,7 +84,7 @@ def outlived(flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False) -> l
             out[k] = with_exponent(flow, before)
             if out[k].status is OrbitStatus.APERIODIC:
                 return out
-            lives.append(each + out[k].periods - before.periods)
+            out[k] = _ended(out[k], each + out[k].periods - before.periods, lives)
             calm = 0
             continue
         length = 2 * length or max(SHORTEST, min(2 * LOOK, CALM // len(chaotic)))
@@ -91,9 +98,15 @@ def outlived(flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False) -> l
                 continue
             out[k], calm = later, calm + length
             if later.status is not OrbitStatus.APERIODIC:
-                lives.append(each + later.periods - before.periods)
+                out[k] = _ended(later, each + later.periods - before.periods, lives)
                 calm = 0
         each += length
+
+
+def _ended(orbit: Orbit, life: int, lives: list[int]) -> Orbit:
+    """What chaos has ended on, with its life, which is added to those of others."""
+    lives.append(life)
+    return replace(orbit, transient=life)
 
 
 def _mean(lives: Sequence[int]) -> float:

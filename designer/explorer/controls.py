@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from designer.base.errors import InputError
 from designer.base.si_unit import quantity_text, value_text
 from designer.base.units import parse_quantity
 from designer.explorer.place import OMEGA, ModelPlace, first_place
@@ -119,11 +120,29 @@ def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Co
             continue
         value = model.parameter(name)
         low, high, logarithmic = _range(value, least, most)
+        low, high = (_nearer(model, name, value, end) for end in (low, high))
         factor = name == "b" and "b" not in model.units
         label = FACTOR if factor else LABELS.get(name, name)
         drive = name == "b" or name.endswith(".amplitude")
         unit, scale = _shown_in(value, units.get(name, ""))
         yield Control(name, label, unit, low, high, value, logarithmic, drive, scale)
+
+
+def _nearer(model: MechanicalModel, name: str, value: float, end: float) -> float:
+    """An end of a slider: the furthest, to a thousandth of the way, that the model may have beside
+    its other numbers."""
+    good, bad, share = 0.0, 1.0, 1.0
+    while bad - good > MARGIN:
+        try:
+            model.changed({name: value + share * (end - value)})
+        except InputError:
+            bad = share
+        else:
+            good = share
+            if share == 1.0:
+                return end
+        share = 0.5 * (good + bad)
+    return value + good * (end - value)
 
 
 def _range(value: float, least: float, most: float) -> tuple[float, float, bool]:

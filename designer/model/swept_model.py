@@ -110,7 +110,11 @@ class ModelSubject:
             self.model.changed({name: value})
         except InputError as error:
             expected = error.expected if math.isfinite(value) else "a finite number"
-            raise InputError(None, option, value, f"{name}: {expected}") from None
+            expected = f"{name}: {expected}"
+            if isinstance(error.found, float) and error.found != value:  # that of another key
+                beside = f"{error.field} = {error.found:g}, which is to be {error.expected}"
+                expected = f"another {name}: it stands beside {beside}"
+            raise InputError(None, option, value, expected) from None
 
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from designer.dynamics.counts import Counts, read_counts
+from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 
 BLACK, RED = "#000000", "#d40000"
@@ -40,8 +40,9 @@ def response_palette(counts: Mapping[str, int]) -> dict[str, str]:
     counts : points of the map by response.
     """
     frequent = sorted(counts, key=lambda response: (-counts[response], response))
-    periodic = [response for response in frequent if read_counts(response)]
-    looks = dict(zip(sorted(periodic[:NAMED], key=Counts.parse), OTHERS, strict=False))
+    periodic = {r: read for r in frequent if (read := read_counts(r))}
+    named = sorted(list(periodic)[:NAMED], key=periodic.__getitem__)
+    looks = dict(zip(named, OTHERS, strict=False))
     others = {response: REST for response in periodic if response not in looks}
     plain = [response for response in frequent if response not in periodic]
     return looks | others | {r: WITHOUT_N.get(r, OPEN) for r in plain}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from designer import bifurcation
 from designer.bifurcations import basins, parameter_map, sweep
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.branch_survey import survey
@@ -179,3 +181,57 @@ def test_a_map_and_basins(tmp_path: Path) -> None:
     found = basins.run(BasinPlan(subject(), {}, "x1", few, "x3'", few, np.zeros(6), BRIEF))
     assert sum(a.share for a in found.attractors) == pytest.approx(1.0)
     assert {c.response for c in found.cells} == {a.response for a in found.attractors}
+
+
+ALIKE = parse_model_file(
+    """format = 2
+[[mass]]
+name = "m"
+mass = 1.0
+[[spring]]
+between = ["m", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["m", "ground"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["m", "ground"]
+upper = 0.5
+lower = 0.5
+stiffness = 30.0
+[[force]]
+on = "m"
+amplitude = 1.0
+"""
+)
+"""Its two gaps are equal, so that it has a mirror; with any others it has none."""
+
+
+@pytest.mark.parametrize(("parameter", "value"), [("A.upper", 0.5), ("m.constant", 0.0)])
+def test_a_branch_goes_through_the_one_value_that_has_a_mirror(
+    parameter: str, value: float
+) -> None:
+    family = ModelSubject(ALIKE.model, 1.3).family(parameter)
+    orbit = settle(family.flow(value), np.zeros(2))
+    assert orbit.symmetric
+    branch = trace(start(family, orbit, value), value - 0.1, value + 0.1)
+    assert branch.ends == (End.LIMIT, End.LIMIT)
+    for point in (branch.points[0], branch.points[-1]):
+        reached = settle(family.flow(point.value), orbit.start)
+        assert point.orbit.start == pytest.approx(reached.start, abs=1e-8)
+        assert reached.symmetric is False
+
+
+def test_a_grazing_curve_goes_through_equal_gaps() -> None:
+    """Each stop is touched where the response without one is as large as its gap."""
+    found = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))
+
+    def free(w: float, gap: float) -> float:
+        return math.hypot(1.0 - w * w, 0.1 * w) - 1.0 / gap
+
+    upper = [brentq(free, 1.2, 3.0, args=(gap,)) for gap in (0.45, 0.5, 0.55)]
+    curves = [c["points"] for c in found.answer["curves"] if c["kind"] == "grazing"]
+    ends = {tuple(np.round(points[k], 5)) for points in curves for k in (0, -1)}
+    assert (round(upper[0], 5), 0.45) in ends
+    assert (round(upper[1], 5), 0.55) in ends

@@ -55,6 +55,19 @@ def test_chaos_that_lasts_is_chaos_after_a_longer_run_too() -> None:
     assert plainly(flow, after[1].start, 20_000) == 0
 
 
+def test_chaos_that_ended_once_is_no_chaos_of_other_starts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Watched too shortly by themselves, they are outlived by what is known of another one."""
+    flow = flow_at(TRANSIENT)
+    (ended,) = coexisting(flow, starts(SCALE, 16))
+    assert ended.transient > 1000
+    chaotic = chaotic_starts(flow, 3)[::2]
+    monkeypatch.setattr(coexisting_attractors, "CALM", 60)
+    assert {o.status for o in outlived(flow, chaotic)} == {OrbitStatus.APERIODIC}
+    assert [o.response for o in outlived(flow, chaotic, known=[ended])] == ["1-1-1"] * 2
+
+
 def test_the_attractors_of_many_starts_have_no_transient_among_them() -> None:
     flow = flow_at(TRANSIENT)
     assert [o.response for o in coexisting(flow, starts(SCALE, 16))] == ["1-1-1"]

@@ -88,9 +88,63 @@ def test_every_parameter_has_a_slider_and_both_its_ends_can_be_had(name: str) ->
     for control in each:
         assert control.low <= control.value <= control.high, control.name
         assert not control.logarithmic or control.low > 0.0
-        if not control.name.endswith((".damping", ".upper", ".lower")):  # one alone may not do
-            for value in (control.low, control.high):
-                read_place(modelfile, {control.name: value})
+        for value in (control.low, control.high):
+            read_place(modelfile, {control.name: value})
+
+
+BOUND = parse_model_file(
+    """format = 2
+[[mass]]
+name = "m"
+mass = 1.0
+[[spring]]
+between = ["m", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["m", "ground"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["m", "ground"]
+upper = 0.3
+lower = 0.2
+stiffness = 20.0
+restitution = 0.5
+[[cubic_spring]]
+between = ["m", "ground"]
+k3 = 0.1
+range = 2.0
+[[friction]]
+between = ["m", "ground"]
+force = 0.2
+velocity = 0.01
+static = 0.3
+stribeck = 0.04
+[[force]]
+on = "m"
+amplitude = 1.0
+"""
+)
+"""Numbers that bound each other."""
+
+
+def test_sliders_end_where_other_numbers_of_the_model_bound_theirs() -> None:
+    sliders = {c.name: c for c in controls(BOUND)}
+    assert "A.damping" not in sliders  # the restitution decides it
+    for control in sliders.values():
+        for value in (control.low, control.high):
+            read_place(BOUND, {control.name: value})
+    ends = {name: (c.low, c.high) for name, c in sliders.items()}
+    assert ends["m-ground.force"] == pytest.approx((0.04, 0.3), rel=0.01)
+    assert ends["m-ground.static"] == pytest.approx((0.2, 1.5), rel=0.01)
+    assert ends["m-ground.velocity"] == pytest.approx((0.002, 0.04), rel=0.01)
+    assert ends["A.upper"] == pytest.approx((-0.2, 0.9), rel=0.01)
+
+
+def test_a_number_that_another_one_bounds_is_refused_by_the_name_of_both() -> None:
+    words = "m-ground.force: found 0.4, expected another m-ground.force: it stands beside"
+    with pytest.raises(InputError, match=f"{words} friction m-ground.static = 0.3, which is to be"):
+        read_place(BOUND, {"m-ground.force": 0.4})
 
 
 LISTS = parse_model_file(

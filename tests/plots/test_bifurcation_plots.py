@@ -11,6 +11,7 @@ from designer.dynamics.steady_state import TransientSettings
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.bifurcation_plots import diagram
+from designer.plots.response_colours import response_palette
 from tests.shared.figure_text import clipped, overlapping
 from tests.shared.house import ROOT
 from tests.shared.mechanism_file import HAMMER
@@ -43,6 +44,13 @@ def test_a_sweep_in_hertz_has_no_axis_in_radians() -> None:
         assert "rad/s" not in title
         assert "e-0" not in title
         assert "drive frequency" in title
+
+
+def test_a_map_has_a_colour_for_a_period_that_cannot_be_wanted() -> None:
+    counts = {"17-4-0": 5, "3-1-0": 4, "aperiodic": 2, "40-9-1": 1}
+    looks = response_palette(counts)
+    assert list(looks) == ["3-1-0", "17-4-0", "40-9-1", "aperiodic"]
+    assert len(set(looks.values())) == 4
 
 
 def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
