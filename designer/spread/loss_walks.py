@@ -22,9 +22,9 @@ MOVES = 2
 """Moves of each board at a width."""
 LAST_MOVES, KEPT = 120, 20
 """Moves at the last width, and between two of which the boards are kept."""
-MINOR, FAINT = 0.01, 1e-3
-"""Shares of the commonest kind's losses below which a walk is kept after ``KEPT`` last moves, since
-what it finds adds next to nothing, and below which it ends on its way."""
+MINOR = 0.01
+"""Share of the commonest kind's losses below which a walk is kept after ``KEPT`` last moves: what
+it finds adds next to nothing."""
 FEWEST_APART, MOST_APART = 0.08, 0.5
 """Independent boards for each that is kept, at least and at most: copies have much in common."""
 CHI = 0.455
@@ -126,22 +126,22 @@ def walk(
 ) -> tuple[Array, ...]:
     """Lead all walks to the width 1, as far as they come. moves : of each board at that width;
     fewer of a walk whose share is minor beside another's, or beside that of the ``commonest`` loss
-    that is known; a share that is faint beside it, which falls with the width, is not followed.
+    that is known.
 
     Returns for each walk (N, coordinates) lost boards of width 1, spread as lost boards of its kind
     are; none where it ended on its way. Boards that are near each other in it are not independent.
     """
-    while going := [w for w in walks if w.going and w.share >= FAINT * commonest]:
+    while going := [w for w in walks if w.going]:
         shows = _asked(going, [w.points for w in going], shown, [w.next_width for w in going])
         for each, mine in zip(going, shows, strict=True):
             each.narrow(mine)
         for _ in range(MOVES):
             _moved(going, shown, rng)
-        commonest = max([commonest, *(w.share for w in going if w.width == 1.0)])
-    there = [w for w in walks if w.width == 1.0 and w.share >= FAINT * commonest]
+    there = [w for w in walks if w.width == 1.0]
+    telling = MINOR * max([commonest, *(w.share for w in there)])
     for move in range(moves):
         if move == KEPT:
-            there = [w for w in there if w.share >= MINOR * commonest]
+            there = [w for w in there if w.share >= telling]
         if not there:
             break
         _moved(there, shown, rng)

@@ -27,7 +27,7 @@ from benchmarks.bench_rare import (
     widened,
 )
 from benchmarks.bench_strangers import whole_lines
-from benchmarks.stranger_systems import FAMILIES
+from benchmarks.stranger_systems import FAMILIES, draw
 from designer.catalog.parts_catalog import load_catalog
 from designer.spread.spread import Spread, draw_many
 from tests.shared.stages import bought, rectifier, stage
@@ -159,5 +159,7 @@ def test_strangers_have_few_masses() -> None:
     found = strangers(12)
     assert len({case.name for case in found}) == len(found) > 6
     assert {case.family for case in found} == set(FAMILIES)
-    counts = [len(found[k].file.model.masses) for k in (0, -1)]
-    assert max(counts) <= bench_rare.MOST_MASSES
+    numbers = {int(case.name.rpartition("-")[2]) for case in found if case.family == "plain"}
+    for number in range(4):
+        masses = draw(bench_rare.SEED_DRAWN, number).text.count("[[mass]]")
+        assert (masses <= bench_rare.MOST_MASSES) is (number in numbers)
