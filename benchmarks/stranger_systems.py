@@ -112,14 +112,18 @@ def draw(seed: int, number: int, family: Family = "plain") -> Stranger:
     drive = None
     if family == "driven":
         drive = _one_of(DRIVES, np.random.default_rng([seed, number // 10, 4]), number % 10)
-    shape = _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
     size = _one_of(SIZES, np.random.default_rng([seed, number // 10, 2]), number % 10)
     rng = np.random.default_rng([seed, number])
     while True:  # a drawn system may be refused as a model, or never meet a stop
-        drawn = _Drawn(rng, *shape, size, law, linked=family == "linked", drive=drive)
+        drawn = _Drawn(rng, *shape(seed, number), size, law, linked=family == "linked", drive=drive)
         text = drawn.with_response(f"Stranger {seed}-{number}")
         if text is not None:
             return Stranger(number, *drawn.shape, drawn.kinds, size.name, text)
+
+
+def shape(seed: int, number: int) -> tuple[int, int]:
+    """Masses and clearances of the system of this number."""
+    return _one_of(SHAPES, np.random.default_rng([seed, number // 30, 1]), number % 30)
 
 
 def _one_of(choices: Sequence[tuple[T, int]], rng: np.random.Generator, place: int) -> T:

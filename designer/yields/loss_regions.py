@@ -1,8 +1,9 @@
 """Where in the spread of the parts boards lose a response, and the tilts that lead there.
 
 Found in three ways: the linear limits of the nominal board (``margins``), boards whose parts are
-off by more than they may be (``loss_walks``), and the lost boards of pilot rounds, to whose means
-the tilts are moved (the cross-entropy method: R. Y. Rubinstein, D. P. Kroese, 2004).
+off by more than they may be (``loss_walks``), and the lost boards of all pilot rounds so far, to
+whose means the tilts are moved (the cross-entropy method: R. Y. Rubinstein, D. P. Kroese, 2004; the
+rounds weighed together: J.-M. Cornuet et al., Scand. J. Stat. 39, 2012, 798).
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from designer.spread.tilted_cube import STEEPEST, TiltedCube, mean_of, tilt_of, 
 from designer.yields.drawn_boards import Drawing, Sample, kind_of
 from designer.yields.margins import nominal_limits
 
-PILOTS, PILOT = 3, 600
-"""Rounds in which the tilts are moved, and boards of each."""
+PILOTS, MOST_PILOTS, PILOT = 3, 9, 600
+"""Rounds in which the tilts are moved, at least and at most, and boards of each."""
+SEEN = 25.0
+"""Effective number of lost boards of a round after which there is no other."""
 FEWEST = 6
 """Lost boards of one kind that begin a region."""
 TELLING = 12.0
@@ -85,16 +88,23 @@ def find_regions(drawing: Drawing, rng: np.random.Generator) -> FoundRegions:
     limits = list(_by_limits(drawing))
     wide, spent = _by_wider_boards(drawing, rng)
     regions, asked = [*wide, *limits], len(PATH) * len(limits) + spent
-    clear, strays = 0, list[Array]()
-    for _ in range(PILOTS):
+    rounds, pool = list[TiltedCube](), None
+    while True:
         cube = mixture(regions, 0.3, len(drawing.names))
         sample = drawing.scouted(*cube.drawn(PILOT, rng))
-        asked += len(sample.points)
-        clear += int((sample.component == 0).sum())
-        strays.append(sample.points[(sample.component == 0) & sample.lost])
-        moved = _moved(regions, cube, sample, drawing.names) or regions
-        regions = sorted(moved, key=lambda region: -region.adds)[:MOST_REGIONS]
-    return FoundRegions(regions, asked, clear, np.concatenate(strays))
+        rounds.append(cube)
+        pool = sample if pool is None else pool.joined(sample)
+        # As if each had been drawn of all rounds together.
+        densities = [each.densities(pool.points).sum(axis=1) for each in rounds]
+        moved = _moved(regions, cube, pool, 1.0 / np.mean(densities, axis=0), drawing.names)
+        regions = sorted(moved or regions, key=lambda region: -region.adds)[:MOST_REGIONS]
+        hits = cube.weights(sample.points)[sample.lost]
+        seen = effective_number(hits) >= SEEN if hits.any() else not pool.lost.any()
+        if len(rounds) == MOST_PILOTS or (len(rounds) >= PILOTS and seen):
+            break
+    plain = pool.component == 0
+    asked += len(pool.points)
+    return FoundRegions(regions, asked, int(plain.sum()), pool.points[plain & pool.lost])
 
 
 def mixture(regions: Sequence[Region], plain: float, size: int) -> TiltedCube:
@@ -161,10 +171,11 @@ def _by_wider_boards(drawing: Drawing, rng: np.random.Generator) -> tuple[list[R
     in the end, so that of two regions of one kind it may leave one: lost boards that lie in no
     region of their kind begin walks again."""
     wider, asked = _wider_boards(drawing, rng)
-    regions = dict[str, list[Region]]()
+    regions, commonest = dict[str, list[Region]](), 0.0
     walks = _begun(wider)
     for _ in range(SEARCHES):
-        found, spent = _led_back(drawing, walks, rng)
+        found, spent = _led_back(drawing, walks, rng, commonest)
+        commonest = max([commonest, *(w.share for w in walks if w.width == 1.0)])
         asked += spent
         for kind, region in found:
             regions.setdefault(kind, []).append(region)
@@ -176,9 +187,10 @@ def _by_wider_boards(drawing: Drawing, rng: np.random.Generator) -> tuple[list[R
 
 
 def _led_back(
-    drawing: Drawing, walks: Sequence[LossWalk], rng: np.random.Generator
+    drawing: Drawing, walks: Sequence[LossWalk], rng: np.random.Generator, commonest: float
 ) -> tuple[list[tuple[str, Region]], int]:
-    """Regions at the ends of these walks, each with the kind of loss, and the boards asked."""
+    """Regions at the ends of these walks, each with the kind of loss, and the boards asked.
+    commonest : as of ``walk``."""
     asked = 0
 
     def shown(whole: bool) -> Shown:
@@ -192,8 +204,8 @@ def _led_back(
     # It takes long to say what clips or has no n-p-q: those walks are shorter.
     fast = [drawing.quick and each.kind[:1].isdigit() for each in walks]
     quick, slow = list(compress(walks, fast)), list(compress(walks, map(not_, fast)))
-    ends = list(walk(quick, shown(False), rng))
-    commonest = max((w.share for w in quick if w.width == 1.0), default=0.0)
+    ends = list(walk(quick, shown(False), rng, commonest=commonest))
+    commonest = max([commonest, *(w.share for w in quick if w.width == 1.0)])
     ends += walk(slow, shown(True), rng, FEW_MOVES, commonest)
     found, may = list[tuple[str, Region]](), _tiltable(drawing.names)
     for each, points in zip([*quick, *slow], ends, strict=True):
@@ -331,12 +343,15 @@ def _tilt(
 
 
 def _moved(
-    regions: Sequence[Region], cube: TiltedCube, sample: Sample, names: Sequence[str]
+    regions: Sequence[Region],
+    cube: TiltedCube,
+    sample: Sample,
+    weights: Array,
+    names: Sequence[str],
 ) -> list[Region]:
     """The regions moved to the means of their own lost boards; those of new kinds of loss join
     them, those without a loss leave."""
-    densities = cube.densities(sample.points)
-    weights, likeliest = 1.0 / densities.sum(axis=1), densities.argmax(axis=1)
+    likeliest = cube.densities(sample.points).argmax(axis=1)
     may, out = _tiltable(names), list[Region]()
     for k, region in enumerate(regions, start=1):
         mine = sample.lost & (likeliest == k)

@@ -22,7 +22,7 @@ RULES = {
     "trimmed": 2,
     "blame": 2,
     "maps": 1,
-    "rare": 6,
+    "rare": 7,
     "checks": 2,
 }
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from designer.base.arrays import Array
-from designer.spread.loss_walks import LossWalk, independent, walk
+from designer.spread.loss_walks import BOARDS, KEPT, LossWalk, independent, walk
 from tests.shared.closed_forms import irwin_hall
 
 SIZE, SUMMED = 60, 12
@@ -55,6 +55,15 @@ def test_boards_that_have_walked_have_the_law_of_lost_boards() -> None:
         middle = points[:, SUMMED:-SUMMED]
         assert middle.mean(axis=0) == pytest.approx(0.5, abs=0.15)
         assert middle.std() == pytest.approx(12**-0.5, abs=0.02)
+
+
+def test_a_loss_that_adds_next_to_nothing_walks_less() -> None:
+    """Beside a loss that is known: far rarer than it, and half as common."""
+    rng = np.random.default_rng(4)
+    share = irwin_hall(SUMMED, 9.5)
+    for known, count in ((1e4 * share, 1), (2.0 * share, 2)):
+        (large,) = walk([begun("2-2-2", 2.0, rng)], shown, rng, 2 * KEPT, known)
+        assert len(large) == count * BOARDS
 
 
 def test_a_loss_that_is_called_otherwise_on_better_parts_is_followed() -> None:

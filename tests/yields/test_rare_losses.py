@@ -172,6 +172,22 @@ def test_two_regions_of_one_kind_of_loss_are_found(
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
 
 
+def test_the_rounds_find_a_region_that_walks_know_badly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lost where twelve coordinates are large together and another is within a tenth of its
+    middle, which no tilt leads to. Walks know the means of the 47 others badly; each round adds to
+    what those before said of them. Of 12 intervals of 95 % at least 8 cover (fewer have a chance of
+    1 in 5000)."""
+    truth = 0.2 * irwin_hall(12, 9.0)
+
+    def lost(points: Array) -> list[str]:
+        each = zip(points[:, :12].sum(axis=1), points[:, 20], strict=True)
+        return ["1-0-0" if s > 9.0 and abs(u - 0.5) < 0.1 else "" for s, u in each]
+
+    found = [estimated(monkeypatch, 60, lost, seed) for seed in range(12)]
+    assert sum(r.low <= truth <= r.high for r in found) >= 8
+    assert np.median([r.boards for r in found]) < 5000
+
+
 def test_a_limit_of_the_nominal_board_leads_to_the_losses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where wider boards show nothing, and in fewer coordinates than there are: of 60 intervals of
     95 % at least 52 cover."""
