@@ -140,8 +140,7 @@ def _peak(flow: Flow, orbit: Orbit) -> Array:
     """(states,) as `peaks_near`, from the orbit's extremes where it has them."""
     if not len(orbit.extremes):
         return peaks_near(flow, orbit.start, orbit.mode or None)
-    peak = np.abs(orbit.extremes).max(axis=1)
-    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+    return orbit.peaks
 
 
 def _kick(flow: Flow, peak: Array) -> float:

@@ -16,6 +16,8 @@ SURE = 4.0
 """Standard errors that a measured exponent has to be away from a value to be told from it."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
+STILL = 1e-9
+"""Of the largest peak: the least that a state which hardly moves is measured against."""
 MOST_COUNTED = 1_000_000
 """Drive periods or impacts that a stored motion may have."""
 
@@ -160,9 +162,21 @@ class Orbit(Motion):
         return bool(self.asymmetry < SYMMETRY_TOLERANCE) if np.isfinite(self.asymmetry) else None
 
     @property
+    def peaks(self) -> Array:
+        """(states,) ``peaks_of`` the extremes."""
+        return peaks_of(self.extremes)
+
+    @property
     def radius(self) -> float:
         """Largest modulus of the multipliers; nan where there are none."""
         return float(np.abs(self.multipliers).max()) if len(self.multipliers) else float("nan")
+
+
+def peaks_of(values: Array) -> Array:
+    """(states,) what distances of states are measured in: the largest size of each state's values
+    (states, k), of one that hardly moves ``STILL`` of the largest."""
+    peak = np.abs(values).max(axis=1)
+    return np.asarray(np.maximum(peak, max(STILL * float(peak.max()), 1e-300)))
 
 
 def largest_speeds(velocities: Array, sides: Array | Index, clearances: Index, count: int) -> Array:
