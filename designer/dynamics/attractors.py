@@ -289,10 +289,8 @@ def _too_long(flow: Flow, spent: int, budget: Budget) -> str:
 
 
 def peaks_near(flow: Flow, x: Array, mode: ModeKey | None = None, points: int = 32) -> Array:
-    """(states,) peak of each state over the drive period that starts at x.
-
-    A state's value at the strobe may be tiny beside its peak, so strobes alone give no scale.
-    """
+    """(states,) peak of each state over the drive period that starts at x: at the strobe alone a
+    value may be tiny beside it."""
     return peaks_of(flow.run(x, 1, mode=mode, points=points).strobes.T)
 
 

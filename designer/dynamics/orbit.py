@@ -16,8 +16,6 @@ SURE = 4.0
 """Standard errors that a measured exponent has to be away from a value to be told from it."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
-STILL = 1e-9
-"""Of the largest peak: the least that a state which hardly moves is measured against."""
 MOST_COUNTED = 1_000_000
 """Drive periods or impacts that a stored motion may have."""
 
@@ -174,9 +172,9 @@ class Orbit(Motion):
 
 def peaks_of(values: Array) -> Array:
     """(states,) what distances of states are measured in: the largest size of each state's values
-    (states, k), of one that hardly moves ``STILL`` of the largest."""
+    (states, k), of one that hardly moves 1e-9 of the largest."""
     peak = np.abs(values).max(axis=1)
-    return np.asarray(np.maximum(peak, max(STILL * float(peak.max()), 1e-300)))
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
 
 
 def largest_speeds(velocities: Array, sides: Array | Index, clearances: Index, count: int) -> Array:

@@ -30,7 +30,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus, peaks_of
+from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.fidelity import runge_kutta, system_runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.kernels.kernel_boards import POINTS
@@ -388,8 +388,7 @@ def passes(subject: GateSubject, own: Run, others: tuple[Run, Run]) -> bool:
         return False
     if orbit.status is not OrbitStatus.PERIODIC:
         return True  # there is no strobe and no wave to compare
-    extremes = exact.extremes if exact.status is OrbitStatus.PERIODIC else orbit.extremes
-    peak = peaks_of(extremes)
+    peak = (exact if exact.status is OrbitStatus.PERIODIC else orbit).peaks
     last = [run.strobes[-orbit.n :] for run in read]
     apart = max(
         float((np.abs(a - b) / peak).max()) for i, a in enumerate(last) for b in last[i + 1 :]

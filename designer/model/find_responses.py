@@ -33,8 +33,6 @@ LARGEST_START = 1e9
 """Of a state that a motion may be asked to begin at: far past any motion, and no overflow."""
 LEAST_SHARE = 0.1
 """Of the widest start of a mass: the least of another, where a law may be all that moves it."""
-STILL = 1e-6
-"""Of the largest displacement or velocity: a mass with less hardly moves."""
 DENSE = 1024
 """Points a drive period at which a displacement between two masses is looked at."""
 
@@ -206,7 +204,7 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
                 for j, (reach, stop) in enumerate(zip(reaches, stops, strict=True))
             ]
     for own in (states[0::2], states[1::2]):  # a mass at rest has no size: that of the others
-        own[own <= STILL * own.max()] = own.max()
+        own[own <= 1e-6 * own.max()] = own.max()
     return Peaks(states, tuple(reaches), fastest)
 
 
