@@ -223,9 +223,8 @@ class _Tally:
                 continue
             if orbit.status is not OrbitStatus.PERIODIC:
                 return number, 0
-            peak = np.abs(other.extremes).max(axis=1)
             for twin, images in enumerate(self._images[number]):
-                if (np.abs(images - orbit.start) < NEAR * peak).all(axis=1).any():
+                if (np.abs(images - orbit.start) < NEAR * other.peaks).all(axis=1).any():
                     return number, twin
             if self._alike and alike(other, orbit, ALIKE, mirrored=True):
                 return number, 1
@@ -238,5 +237,4 @@ def alike(a: Orbit, b: Orbit, within: float, *, mirrored: bool = False) -> bool:
     mirrored : take the mirror image of the second one.
     """
     other = -b.extremes[:, ::-1] if mirrored else b.extremes
-    peak = np.abs(a.extremes).max(axis=1)
-    return bool((np.abs(a.extremes - other).max(axis=1) < within * peak).all())
+    return bool((np.abs(a.extremes - other).max(axis=1) < within * a.peaks).all())

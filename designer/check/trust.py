@@ -98,7 +98,7 @@ def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
     if not len(orbit.start):
         return Trust()
     n, size, mode = max(orbit.n, 1), flow.system.size, orbit.mode or None
-    peak = _peak(flow, orbit)
+    peak = orbit.peaks if len(orbit.extremes) else peaks_near(flow, orbit.start, mode)
     general = Flow(flow.system, flow.drive, fast=False)
     apart = APART * ROUNDING * peak * np.random.default_rng(0).choice([-1, 1], (len(SPLITS), size))
     runs = [flow.run(orbit.start, n, mode=mode, tangent=np.eye(size))]
@@ -134,14 +134,6 @@ def of_gate(gate: GateResult) -> Trust:
 
 
 # ---------------------------------------------------------------------------------------------
-
-
-def _peak(flow: Flow, orbit: Orbit) -> Array:
-    """(states,) as `peaks_near`, from the orbit's extremes where it has them."""
-    if not len(orbit.extremes):
-        return peaks_near(flow, orbit.start, orbit.mode or None)
-    peak = np.abs(orbit.extremes).max(axis=1)
-    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
 
 
 def _kick(flow: Flow, peak: Array) -> float:

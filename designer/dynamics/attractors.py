@@ -28,7 +28,7 @@ from designer.dynamics.lyapunov_exponent import (
     lyapunov,
     sign,
 )
-from designer.dynamics.orbit import SURE, Orbit, OrbitStatus
+from designer.dynamics.orbit import SURE, Orbit, OrbitStatus, peaks_of
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.quasi_periodic import DRIFT, closed_curve, frequencies
 from designer.dynamics.step_budget import Budget
@@ -289,13 +289,9 @@ def _too_long(flow: Flow, spent: int, budget: Budget) -> str:
 
 
 def peaks_near(flow: Flow, x: Array, mode: ModeKey | None = None, points: int = 32) -> Array:
-    """(states,) peak of each state over the drive period that starts at x.
-
-    A state's value at the strobe may be tiny beside its peak, so strobes alone give no scale.
-    States that hardly move are measured against the largest.
-    """
-    peak = np.abs(flow.run(x, 1, mode=mode, points=points).strobes).max(axis=0)
-    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+    """(states,) peak of each state over the drive period that starts at x: at the strobe alone a
+    value may be tiny beside it."""
+    return peaks_of(flow.run(x, 1, mode=mode, points=points).strobes.T)
 
 
 def shoot(
@@ -340,7 +336,7 @@ def describe(
     run = flow.run(x, laps * n, mode=mode, measure=True)
     if run.status is not FlowStatus.DONE:
         return Orbit(OrbitStatus.NOT_SETTLED, reason=f"while classifying period {n}: {run.status}")
-    peak = np.abs(run.extremes).max(axis=1)
+    peak = peaks_of(run.extremes)
     drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
     # Entries at the very strobe may fall into one lap or the next: judge them together.
@@ -431,12 +427,11 @@ def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
         return False
     if a.status is not OrbitStatus.PERIODIC:
         return True
-    peak = np.abs(b.extremes).max(axis=1)
     laps = flow.run(b.start, b.n).strobes[:-1]
     candidates = [laps]
     if flow.system.mirror is not None:
         candidates.append(mirrored_strobes(flow, b))
-    return any(bool((np.abs(c - a.start) < 1e-6 * peak).all(axis=1).any()) for c in candidates)
+    return any(bool((np.abs(c - a.start) < 1e-6 * b.peaks).all(axis=1).any()) for c in candidates)
 
 
 def mirrored_strobes(flow: Flow, orbit: Orbit) -> Array:

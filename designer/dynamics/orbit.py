@@ -162,9 +162,21 @@ class Orbit(Motion):
         return bool(self.asymmetry < SYMMETRY_TOLERANCE) if np.isfinite(self.asymmetry) else None
 
     @property
+    def peaks(self) -> Array:
+        """(states,) ``peaks_of`` the extremes."""
+        return peaks_of(self.extremes)
+
+    @property
     def radius(self) -> float:
         """Largest modulus of the multipliers; nan where there are none."""
         return float(np.abs(self.multipliers).max()) if len(self.multipliers) else float("nan")
+
+
+def peaks_of(values: Array) -> Array:
+    """(states,) what distances of states are measured in: the largest size of each state's values
+    (states, k), of one that hardly moves 1e-9 of the largest."""
+    peak = np.abs(values).max(axis=1)
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
 
 
 def largest_speeds(velocities: Array, sides: Array | Index, clearances: Index, count: int) -> Array:

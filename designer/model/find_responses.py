@@ -203,6 +203,8 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
                 reach.widened(stop, scale, *span.within(j, stop))
                 for j, (reach, stop) in enumerate(zip(reaches, stops, strict=True))
             ]
+    for own in (states[0::2], states[1::2]):  # a mass at rest has no size: that of the others
+        own[own <= 1e-6 * own.max()] = own.max()
     return Peaks(states, tuple(reaches), fastest)
 
 
@@ -337,7 +339,8 @@ class Peaks:
     """What the circuit has to hold, in model units."""
 
     states: Array
-    """(states,) peaks of x1, x1', x2, … over all wanted responses and the starts from rest."""
+    """(states,) peaks of x1, x1', x2, … over all wanted responses and the starts from rest; of a
+    mass that hardly moves the largest displacement and velocity of any."""
     reaches: tuple[Reach, ...] = ()
     """How far the displacement in each clearance goes."""
     fastest: float = 0.0

@@ -426,8 +426,8 @@ def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject
     for k, outcome in remedies.run(pool, tasks):
         s = subjects[indices[k]]
         if isinstance(outcome.result, Read):
-            peak = np.abs(s.orbit.extremes).max(axis=1)
-            periods, _ = settling_periods(outcome.result.strobes, s.orbit.n, s.orbit.radius, peak)
+            read, orbit = outcome.result, s.orbit
+            periods, _ = settling_periods(read.strobes, orbit.n, orbit.radius, orbit.peaks)
             out[indices[k]] = replace(s, discard=min(max(periods, DISCARD), MOST_DISCARDED))
     return out
 
@@ -447,7 +447,7 @@ def wave_error(subject: GateSubject, read: Read) -> float:
     if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
         return float("nan")
     flow = Flow(subject.system, subject.excitation.drive)
-    peak = np.abs(orbit.extremes).max(axis=1)
+    peak = orbit.peaks
     time, states = read.trace
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
@@ -482,7 +482,7 @@ def _judge(
         passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
         wave = wave_error(subject, good[0])
         if wanted.status is OrbitStatus.PERIODIC:
-            peak = np.abs(wanted.extremes).max(axis=1)
+            peak = wanted.peaks
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND

@@ -265,7 +265,7 @@ def size(
     picked = pick(t, least.error, least.u, ranking, LAST_LEVEL)
     if picked is None:
         without = replace(ranking, most=None)
-        free = pick(t, least.error, least.u, without, LAST_LEVEL)
+        free = None if without == ranking else pick(t, least.error, least.u, without, LAST_LEVEL)
         rule = "noise gain" if np.isfinite(target.noise_gain) else "dead-zone bias"
         return rule if free is None else "distinct values"
     values, status = picked

@@ -51,8 +51,6 @@ HIGHEST = 0.95
 within reach of the displacement too."""
 EQUAL = 1e-9
 """Relative: values that differ by less are one."""
-STILL = 1e-6
-"""Peaks below this share of the largest count as so much: those of a state that hardly moves."""
 
 
 CATALOGUE, TRIED, STAGE = "catalogue", "tried", "stage"
@@ -262,8 +260,7 @@ class _Maker:
         self.places: tuple[DeadZonePlace, ...] = every if rectifies else ()
         self.constants = np.flatnonzero(self.system.wired.constant).tolist() if rectifies else []
         self.heavy = order.resistors[order.resistors >= within.load]
-        peaks = order.peaks.states
-        self.peaks = np.log(np.maximum(peaks, STILL * peaks.max()))
+        self.peaks = np.log(order.peaks.states)
         self.lists: list[Array] = [np.zeros(0)] * (1 + self.states)
         self.shared: dict[str, int] = {}
         self._choose()

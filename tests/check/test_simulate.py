@@ -173,6 +173,24 @@ def test_without_stops(tmp_path: Path, capfd: Captured) -> None:
     assert len(list(out.iterdir())) == 10
 
 
+def test_a_mass_that_nothing_moves(tmp_path: Path, capfd: Captured) -> None:
+    """Its peak is 0, and no distance may be a share of that."""
+    k, c, omega, force = 1.0, 0.2, 0.8, 0.5
+    text = system_text(
+        {"hammer": 1.0, "anvil": 0.7},
+        {("hammer", "ground"): k, ("anvil", "ground"): 1.3},
+        {("hammer", "ground"): c, ("anvil", "ground"): 0.15},
+        clearance("G", "hammer", "anvil", upper=5.0, stiffness=12.0),
+        table("force", on="hammer", amplitude=force),
+        table("response", omega=omega),
+    )
+    (found,) = _answer(["simulate", _model(tmp_path, text)], capfd)["responses"]
+    peak = force / abs(k - omega**2 + 1j * c * omega)
+    assert found["x_max"] == pytest.approx([peak, 0.0], rel=1e-9)
+    assert (found["response"], found["symmetric"], found["others"]) == ("1-0-0", True, [])
+    assert [each["share"] for each in found["starts"]["attractors"]] == [1.0]
+
+
 def test_chattering_ends_with_a_status(
     tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -298,6 +298,18 @@ def test_a_stop_that_is_never_met_is_within_reach(stops: str) -> None:
     assert all(check.holds for check in made.checks)
 
 
+def test_a_mass_that_nothing_moves_has_the_voltages_of_one_that_moves() -> None:
+    """No level of its own is to be had: a circuit was refused for want of it."""
+    joints = {("a", "ground"): 1.0, ("b", "ground"): 1.3}
+    dampers = {("a", "ground"): 0.2, ("b", "ground"): 0.15}
+    stops = clearance("A", "a", "b", upper=5.0, stiffness=12.0)
+    two = system_text({"a": 1.0, "b": 0.7}, joints, dampers, stops, FORCE)
+    made = design(two + table("response", omega=0.8))
+    assert made.errors.max_error <= 0.005
+    assert "level" in {check.name for check in made.checks}
+    assert all(check.holds for check in made.checks)
+
+
 def test_an_idle_clamp_carries_what_the_other_half_does_at_the_deepest() -> None:
     # (t + t') / R' + d (1 / R' - s / F') of circuit.dead_zone_parts.idle_limits, over its first
     # term; s / (F' / R') is the ratio of the stiffnesses.
