@@ -70,7 +70,8 @@ def _pin(modelfile: ModelFile, text: str) -> PinnedResponse:
 def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedResponse] = ()) -> str:
     """The model file with the values of a place; the pins take the place of its responses.
 
-    Comments are lost. The factor ``b`` of a system goes to the pins.
+    Comments are lost. The factor ``b`` of a system has no key of its own: it goes to the pins, or to
+    the responses that state none.
 
     Raises
     ------
@@ -82,6 +83,8 @@ def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedRes
     if pins:
         key = _frequency_key(data.get("response", ()), modelfile.si)
         data["response"] = [_table(pin, own, key, modelfile.si) for pin in pins]
+    elif place.model.b != own:
+        data |= {"response": [{"b": place.model.b, **r} for r in data.get("response", ())]}
     text = f"# Saved by designer explore from {_one_line(modelfile.title)}\n{toml_text(data)}"
     parse_model_file(text)
     return text

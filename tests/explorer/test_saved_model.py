@@ -108,6 +108,13 @@ def test_an_unchanged_place_changes_no_number() -> None:
         )
 
 
+def test_the_factor_of_gaps_goes_to_the_responses_that_have_none() -> None:
+    modelfile = file("three-masses")
+    again = parse_model_file(saved_text(modelfile, read_place(modelfile, {"b": 0.8})))
+    assert [r.b for r in modelfile.responses] == [None] * len(again.responses)
+    assert [r.b for r in again.responses] == [0.8] * len(again.responses)
+
+
 def test_pins_become_the_wanted_responses_and_are_looked_for() -> None:
     modelfile = file("paper")
     pins = read_pins(modelfile, ["0.85~1-2-2~0.25", "1.55~1-1-1~0.3", "0.54~1-7-7~0.25"])
