@@ -37,6 +37,7 @@ from benchmarks.bench_flow import commit, machine, table
 from benchmarks.bench_strangers import filled, whole_lines
 from benchmarks.stranger_systems import FAMILIES, Family, draw, shape
 from designer.base.defaults import cores
+from designer.base.errors import DesignerError
 from designer.base.proportion import mid_p
 from designer.check.synthesis_result import synthesise
 from designer.dynamics.orbit import SETTLED
@@ -116,7 +117,10 @@ def _plan(case: Case) -> StudyPlan:
     """Of laws as they are."""
     file = case.file
     file = replace(file, responses=(file.responses[case.number - 1],))
-    made = synthesise(file)
+    try:
+        made = synthesise(file)
+    except DesignerError as error:
+        raise Unfit(f"{case.name}: {error}") from error
     checked = check(made, None)
     nominal = checked[0].circuit
     if nominal.status not in SETTLED or not matches(nominal, checked[0].model.spec):
@@ -170,7 +174,8 @@ def strangers(count: int) -> list[Case]:
 
 
 def fitting(case: Case) -> float:
-    """The width at which `SOME` of `TRIED` boards lose the response; the widest if that loses less.
+    """The width at which `SOME` of `TRIED` boards lose the response; the widest of those tried that
+    lose less, if none does.
 
     Raises
     ------

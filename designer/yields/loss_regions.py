@@ -67,7 +67,8 @@ class Region:
     tilt: Array
     found_by: str
     adds: float = 0.0
-    """Weight of its lost boards in the last round; 0 where none was drawn yet."""
+    """Weight of its lost boards, as if those of all rounds so far were of one; 0 where none was drawn
+    yet."""
 
 
 @dataclass(frozen=True)
@@ -350,7 +351,7 @@ def _moved(
     names: Sequence[str],
 ) -> list[Region]:
     """The regions moved to the means of their own lost boards; those of new kinds of loss join
-    them, those without a loss leave."""
+    them, those that are the likeliest of no lost board leave."""
     likeliest = cube.densities(sample.points).argmax(axis=1)
     may, out = _tiltable(names), list[Region]()
     for k, region in enumerate(regions, start=1):

@@ -172,6 +172,27 @@ def test_two_regions_of_one_kind_of_loss_are_found(
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
 
 
+def test_a_search_knows_the_commonest_loss_of_those_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What is rare beside it walks less: here the second of two regions begins walks again."""
+    known, walk = list[float](), loss_regions.walk
+
+    def recorded(walks: Any, shown: Any, rng: Any, moves: int = 120, commonest: float = 0.0) -> Any:
+        known.append(commonest)
+        return walk(walks, shown, rng, moves, commonest)
+
+    def lost(points: Array) -> list[str]:
+        sums = points[:, :12].sum(axis=1), points[:, -12:].sum(axis=1)
+        return ["1-0-0" if a > 10.0 or b > 9.7 else "" for a, b in zip(*sums, strict=True)]
+
+    monkeypatch.setattr(loss_regions, "walk", recorded)
+    estimated(monkeypatch, 60, lost, 0)
+    quick = known[::2]  # each search leads those back first that are quick to tell
+    assert quick[0] == 0.0
+    assert quick[1] == pytest.approx(irwin_hall(12, 9.7), rel=0.9)
+
+
 def test_the_rounds_find_a_region_that_walks_know_badly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lost where twelve coordinates are large together and another is within a tenth of its
     middle, which no tilt leads to. Walks know the means of the 47 others badly; each round adds to
