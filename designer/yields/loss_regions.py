@@ -67,8 +67,7 @@ class Region:
     tilt: Array
     found_by: str
     adds: float = 0.0
-    """Weight of its lost boards, as if those of all rounds so far were of one; 0 where none was drawn
-    yet."""
+    """Weight of its lost boards of all rounds so far, as if these were one; 0 before the first."""
 
 
 @dataclass(frozen=True)
