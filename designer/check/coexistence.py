@@ -114,12 +114,16 @@ def random_starts(box: Array, count: int, seed: int) -> Array:
 
 @lru_cache(maxsize=64)
 def of_model(
-    model: MechanicalModel, omega: float, starts: int = DRAWN_STARTS, seed: int = SEED
+    model: MechanicalModel,
+    omega: float,
+    starts: int = DRAWN_STARTS,
+    seed: int = SEED,
+    lives: tuple[int, ...] = (),
 ) -> Coexistence:
     """The attractors of the model under a drive of frequency ``omega``, by the exact flow; the
-    largest share first."""
+    largest share first. lives : as of ``of_flow``."""
     flow = model_flow(model, omega)
-    result = of_flow(flow, scale_of(model, omega), starts, seed)
+    result = of_flow(flow, scale_of(model, omega), starts, seed, lives=lives)
     return replace(result, basins=tuple(sorted(result.basins, key=lambda b: -b.count)))
 
 
@@ -130,7 +134,8 @@ def coexisting_with(model: MechanicalModel, response: ModelResponse) -> tuple[Ba
     model : with the clearance of the response.
     """
     flow = model_flow(model, response.omega)
-    basins = of_model(model, response.omega).basins
+    lives = tuple(n for o in (response.orbit, *response.others) for n in o.transients)
+    basins = of_model(model, response.omega, lives=lives).basins
     rest = [
         Basin(o, 0, None)
         for o in response.others
@@ -148,17 +153,18 @@ def of_flow(
     unit: Array | None = None,
     *,
     even: bool = True,
+    lives: Sequence[int] = (),
 ) -> Coexistence:
     """Where the starts end under a flow.
 
     box : (states,) half-widths in model units. orbits : attractors that are listed first, in this
     order. unit : (states,) size of a model unit in the states of a circuit, whose twins are those
     that look like mirror images; None for a model. even : of a circuit, whether its model has
-    mirror twins.
+    mirror twins. lives : of the chaos of other starts, which ended (``Orbit.transients``).
     """
     states = random_starts(box, starts, seed) * (1.0 if unit is None else unit)
     tally = _Tally(flow, orbits, alike=unit is not None and even)
-    run, unsettled = tally.take(states)
+    run, unsettled = tally.take(states, lives)
     return Coexistence(run, starts, seed, box, tally.basins(), unsettled)
 
 
@@ -178,12 +184,12 @@ class _Tally:
         for orbit in orbits:
             self._add(orbit)
 
-    def take(self, states: Array) -> tuple[int, int]:
+    def take(self, states: Array, lives: Sequence[int]) -> tuple[int, int]:
         """Settle these starts while there are steps left; returns how many were run, and how many
-        of them lead to no attractor."""
+        of them lead to no attractor. lives : of the chaos of others."""
         met, unsettled = settled(self._flow, states), 0
         new = all(orbit.status is not OrbitStatus.APERIODIC for orbit in self._orbits)
-        for orbit in outlived(self._flow, met, measure=new, known=self._orbits):
+        for orbit in outlived(self._flow, met, measure=new, known=lives):
             if orbit.status not in ANSWERS:
                 unsettled += 1
                 continue

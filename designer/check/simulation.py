@@ -324,9 +324,10 @@ def _on_model(
         (r,) = find(modelfile.model, [spec], start)
     model = modelfile.model.at(r.b)
     flow = model_flow(model, r.omega)
-    orbits = _apart(flow, [_measured(flow, o) for o in (r.orbit, *_attractors(r.others))])
-    first = _attractors(orbits)
-    result, met = _drawn(flow, scale_of(model, r.omega), *sampling, first)
+    measured = [_measured(flow, o) for o in (r.orbit, *_attractors(r.others))]
+    orbits = _apart(flow, measured)
+    box, first = scale_of(model, r.omega), _attractors(orbits)
+    result, met = _drawn(flow, box, *sampling, first, measured)
     orbits += met
     twins = [None if flow.system.mirror is None else _twin(flow, o) for o in orbits]
     units = np.ones(flow.system.size)
@@ -363,15 +364,17 @@ def _drawn(
     starts: int,
     seed: int,
     known: Sequence[Orbit],
+    seen: Sequence[Orbit],
     unit: Array | None = None,
     *,
     even: bool = True,
 ) -> tuple[Coexistence | None, list[Orbit]]:
     """Where drawn starts end, None of none, and the attractors that are not among the known; as of
-    ``coexistence.of_flow``."""
+    ``coexistence.of_flow``. seen : where each start led that was run before."""
     if not starts:
         return None, []
-    result = coexistence.of_flow(flow, box, starts, seed, known, unit, even=even)
+    lives = [n for o in seen for n in o.transients]
+    result = coexistence.of_flow(flow, box, starts, seed, known, unit, even=even, lives=lives)
     return result, [_measured(flow, b.orbit) for b in result.basins[len(known) :]]
 
 
@@ -459,9 +462,11 @@ def _circuit_orbits(
         model = synthesis.modelfile.model.at(r.b)
         states = sobol_starts(scale_of(model, r.omega), STARTS, first=scan.first)
         return r, flow, coexisting(flow, states * volts)
-    starts = [o.start * volts for o in (r.orbit, *r.others) if len(o.start)]
-    settled = [settle(flow, x, watch=0) for x in starts or [np.zeros(flow.system.size)]]
-    return r, flow, outlived(flow, settled)
+    found = [o for o in (r.orbit, *r.others) if len(o.start)]
+    settled = [
+        replace(settle(flow, o.start * volts, watch=0), transients=o.transients) for o in found
+    ] or [settle(flow, np.zeros(flow.system.size), watch=0)]
+    return r, flow, outlived(flow, settled, known=[n for o in settled for n in o.transients])
 
 
 def _on_circuit(
@@ -477,7 +482,7 @@ def _on_circuit(
     model = synthesis.modelfile.model.at(r.b)
     box = scale_of(model, r.omega)
     even = model.second_order().even
-    result, more = _drawn(flow, box, *sampling, first, volts, even=even)
+    result, more = _drawn(flow, box, *sampling, first, measured, volts, even=even)
     rows += range(len(measured), len(measured) + len(more))
     measured += more
     scaled += [design.in_model_units(o, volts) for o in more]

@@ -393,7 +393,7 @@ def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> f
 
 def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
     """An aperiodic motion with its exponent to ``lyapunov_exponent.Bound``, or what it is where
-    that shows that its chaos was a transient; any other as it is."""
+    that shows that its chaos was a transient, with the life of that; any other as it is."""
     if orbit.status is not OrbitStatus.APERIODIC or not len(orbit.start):
         return orbit
     if Bound().holds(orbit.lyapunov, orbit.lyapunov_error, flow.drive.period):
@@ -403,12 +403,18 @@ def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
         spent = orbit.periods + BLOCK * len(growth.rates)
         if min(growth.sign, sign(growth.rates[-len(growth.rates) // 4 :])) <= 0:
             later = _settle(flow, growth.start, growth.mode, budget, WATCH)
-            return replace(later, periods=spent + later.periods)
+            return _outgrown(later, spent + later.periods)
         run = flow.run(growth.start, 2 * MAX_PERIOD, mode=growth.mode)
         found, cost = _polish(flow, run) if run.status is FlowStatus.DONE else (None, 0)
         if found is not None:
-            return replace(found, periods=spent + len(run.strobes) - 1 + cost)
+            return _outgrown(found, spent + len(run.strobes) - 1 + cost)
         return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
+
+
+def _outgrown(orbit: Orbit, periods: int) -> Orbit:
+    """Where a chaotic motion is found after these drive periods, its life if it has ended."""
+    ended = orbit.status not in (OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED)
+    return replace(orbit, periods=periods, transients=(periods,) if ended else ())
 
 
 def starts(scale: Array, count: int, seed: int = 0, first: Array | None = None) -> Array:
@@ -447,7 +453,9 @@ def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
         return None
     x = mirrored_strobes(flow, orbit)[0]
     shot = shoot(flow, x, orbit.n)
-    return None if shot is None else describe(flow, shot[0], orbit.n, shot[1])
+    if shot is None:
+        return None
+    return replace(describe(flow, shot[0], orbit.n, shot[1]), transients=orbit.transients)
 
 
 def _polish(

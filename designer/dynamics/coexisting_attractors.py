@@ -40,8 +40,9 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
         k = next(met, len(attractors))
         if k == len(attractors):
             attractors.append(orbit)
-        longest = max(orbit.transient, attractors[k].transient)
-        attractors[k] = replace(attractors[k], transient=longest)
+        else:
+            lives = attractors[k].transients + orbit.transients
+            attractors[k] = replace(attractors[k], transients=lives)
     return attractors
 
 
@@ -59,19 +60,19 @@ def settled(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
 
 
 def outlived(
-    flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False, known: Sequence[Orbit] = ()
+    flow: Flow, orbits: Sequence[Orbit], *, measure: bool = False, known: Sequence[int] = ()
 ) -> list[Orbit]:
     """Motions of one system, those without a period followed until it is known whether their chaos
     ends: without an end of one of them together for ``CALM`` drive periods, and each for
     ``OUTLIVED`` times as long as those lived on the average that did end.
 
     measure : the first that is chaotic in the end gets its exponent (``with_exponent``), which is
-    one more long look. known : attractors of other starts, whose chaos may have ended on them
-    (``Orbit.transient``). What is chaotic still when ``step_budget.STARTS`` more steps are spent,
-    although others ended, is not settled.
+    one more long look. known : lives of the chaos of other starts (``Orbit.transients``). What
+    is chaotic still when ``step_budget.STARTS`` more steps are spent, although others ended, is not
+    settled.
     """
     out, left = list(orbits), float(step_budget.STARTS)
-    lives = [orbit.transient for orbit in known if orbit.transient]
+    lives = list(known)
     length, calm, each = 0, 0, 0
     while True:
         chaotic = [k for k, o in enumerate(out) if o.status is OrbitStatus.APERIODIC]
@@ -106,7 +107,7 @@ def outlived(
 def _ended(orbit: Orbit, life: int, lives: list[int]) -> Orbit:
     """What chaos has ended on, with its life, which is added to those of others."""
     lives.append(life)
-    return replace(orbit, transient=life)
+    return replace(orbit, transients=(life,))
 
 
 def _mean(lives: Sequence[int]) -> float:

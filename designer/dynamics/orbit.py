@@ -134,8 +134,9 @@ class Orbit(Motion):
     frequencies: tuple[float, ...] = ()
     """Of a quasi-periodic motion the drive's angular frequency and the second one, per unit of the
     system's time (``quasi_periodic.frequencies``); () of any other."""
-    transient: int = 0
-    """Drive periods for which chaos was watched that ended on it (``coexisting_attractors``)."""
+    transients: tuple[int, ...] = ()
+    """Of each start whose chaos was seen to end on it, the drive periods for which that was
+    watched (``coexisting_attractors``)."""
 
     def __post_init__(self) -> None:
         if not len(self.impact_clearances):

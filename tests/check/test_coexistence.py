@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +15,17 @@ from designer import parse_model_file, simulate
 from designer.base.arrays import Array
 from designer.base.defaults import SEED
 from designer.base.proportion import wilson
-from designer.check import coexistence
+from designer.check import coexistence, simulation
 from designer.cli import entry
+from designer.dynamics import coexisting_attractors
+from designer.dynamics.coexisting_attractors import outlived
 from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.find_responses import scale_of
+from designer.model.find_responses import find, scale_of
 from designer.model.model import Dimensionless
-from tests.shared.model_text import dimensionless
+from designer.model.response_table import Response
+from tests.shared.model_text import SMALL, dimensionless
 
 SI = """format = 1
 [mechanical]
@@ -107,6 +113,44 @@ def test_starts_that_do_not_settle_are_counted() -> None:
     assert (met.basins, met.not_settled) == ((), 3)
     said = met.as_dict()["not_settled"]
     assert (said["share"], said["low"], said["high"]) == (1.0, *wilson(3, 3))
+
+
+CHAOS = 1.22
+ENDING = parse_model_file(SMALL.replace("0.85", str(CHAOS)).replace("1-2-2", "1-1-1"))
+"""Chaos of ``ENDING`` lives here for some hundreds of periods, and ends on 1-1-1."""
+
+
+@pytest.fixture
+def briefly_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawn starts alone are hardly watched; those of the search for a response are."""
+
+    def briefly(*arguments: Any, **named: Any) -> list[Orbit]:
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(coexisting_attractors, "CALM", 60)
+            patched.setattr(coexisting_attractors, "with_exponent", lambda _, orbit: orbit)
+            return outlived(*arguments, **named)
+
+    monkeypatch.setattr(coexistence, "outlived", briefly)
+
+
+@pytest.mark.usefixtures("briefly_watched")
+@pytest.mark.parametrize("engine", ["model", "circuit"])
+def test_drawn_starts_know_of_chaos_that_ended_before(engine: Any) -> None:
+    (found,) = simulation.simulate(ENDING, engine=engine, starts=4)
+    assert (found.orbit.response, found.others) == ("1-1-1", ())
+    assert found.coexistence is not None
+    assert [(b.orbit.response, b.count) for b in found.coexistence.basins] == [("1-1-1", 4)]
+
+
+@pytest.mark.usefixtures("briefly_watched")
+def test_a_report_lists_no_chaos_that_ended_beside_a_response(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (response,) = find(ENDING.model, [Response(omega=CHAOS)])
+    few = partial(coexistence.of_model.__wrapped__, starts=4)
+    assert "aperiodic" in [b.orbit.response for b in few(ENDING.model, CHAOS).basins]
+    monkeypatch.setattr(coexistence, "of_model", few)
+    assert coexistence.coexisting_with(ENDING.model, response) == ()
 
 
 def test_table_and_json_say_how_many_starts_went_where(

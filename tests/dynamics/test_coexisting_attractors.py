@@ -61,11 +61,29 @@ def test_chaos_that_ended_once_is_no_chaos_of_other_starts(
     """Watched too shortly by themselves, they are outlived by what is known of another one."""
     flow = flow_at(TRANSIENT)
     (ended,) = coexisting(flow, starts(SCALE, 16))
-    assert ended.transient > 1000
+    assert max(ended.transients) > 1000
     chaotic = chaotic_starts(flow, 3)[::2]
     monkeypatch.setattr(coexisting_attractors, "CALM", 60)
     assert {o.status for o in outlived(flow, chaotic)} == {OrbitStatus.APERIODIC}
-    assert [o.response for o in outlived(flow, chaotic, known=[ended])] == ["1-1-1"] * 2
+    assert [o.response for o in outlived(flow, chaotic, known=ended.transients)] == ["1-1-1"] * 2
+
+
+def test_chaos_has_to_outlive_the_average_of_all_lives_not_the_longest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flow = flow_at(LASTING)
+    orbit = settle(flow_at(0.85), REST)
+    ended = [replace(orbit, transients=(life,)) for life in (50, 60, 2183)]
+    chaos = replace(orbit, status=OrbitStatus.APERIODIC, n=0, periods=0)
+    with monkeypatch.context() as patched:
+        patched.setattr(coexisting_attractors, "outlived", lambda *_: ended)
+        (met,) = coexisting(flow_at(0.85), [])
+    assert met.transients == (50, 60, 2183)
+    monkeypatch.setattr(coexisting_attractors, "CALM", 60)
+    longer = "designer.dynamics.coexisting_attractors.followed"
+    monkeypatch.setattr(longer, lambda _, o, more, _b: replace(o, periods=o.periods + more))
+    (watched,) = outlived(flow, [chaos], known=met.transients)
+    assert 10 * np.mean(met.transients) <= watched.periods < 10 * 2183
 
 
 def test_the_attractors_of_many_starts_have_no_transient_among_them() -> None:
@@ -76,7 +94,10 @@ def test_the_attractors_of_many_starts_have_no_transient_among_them() -> None:
 def test_an_exponent_measured_over_the_end_of_chaos_is_of_no_chaos() -> None:
     flow = flow_at(TRANSIENT)
     orbit = chaotic_starts(flow, 6)[0]
-    assert with_exponent(flow, orbit).response == "1-1-1"
+    after = with_exponent(flow, orbit)
+    assert after.response == "1-1-1"
+    (life,) = after.transients
+    assert plainly(flow, orbit.start, life) == 1
 
 
 def test_an_exponent_that_is_known_closely_is_not_measured_again() -> None:

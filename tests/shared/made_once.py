@@ -27,8 +27,8 @@ def made_once() -> Iterator[None]:
     """Inside, equal arguments have the answer that they had before; errors are raised anew."""
     attractors = coexistence.of_model
 
-    def few(model: Any, omega: float) -> Any:
-        return attractors(model, omega, FEW)
+    def few(model: Any, omega: float, lives: tuple[int, ...] = ()) -> Any:
+        return attractors(model, omega, FEW, lives=lives)
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(coexistence, "of_model", stored(few))
