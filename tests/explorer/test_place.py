@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from hypothesis import given, strategies as st
 from designer import InputError, ModelFile, parse_model_file, read_model_file
 from designer.explorer.controls import controls
 from designer.explorer.place import first_place, read_place, words_of
+from designer.model.swept_model import ModelSubject
 from tests.shared.model_text import PAPER_TABLE
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -145,6 +147,13 @@ def test_a_number_that_another_one_bounds_is_refused_by_the_name_of_both() -> No
     words = "m-ground.force: found 0.4, expected another m-ground.force: it stands beside"
     with pytest.raises(InputError, match=f"{words} friction m-ground.static = 0.3, which is to be"):
         read_place(BOUND, {"m-ground.force": 0.4})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_no_finite_number_is_refused_as_such(value: float) -> None:
+    for name in ("A.upper", "m-ground.force"):
+        with pytest.raises(InputError, match=f"{name}: a finite number$"):
+            ModelSubject(BOUND.model).check("over", name, value)
 
 
 LISTS = parse_model_file(
