@@ -70,8 +70,8 @@ def _pin(modelfile: ModelFile, text: str) -> PinnedResponse:
 def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedResponse] = ()) -> str:
     """The model file with the values of a place; the pins take the place of its responses.
 
-    Comments are lost. The factor ``b`` of a system has no key of its own: it goes to the pins, or to
-    the responses that state none or that of the first place.
+    Comments are lost. The factor ``b`` of a system has no key of its own: it goes to the pins, or
+    to the responses that state none or that of the first place.
 
     Raises
     ------
