@@ -18,7 +18,8 @@ Key = TypeVar("Key")
 MOST_FLOWS = 8
 """Flows that a family remembers."""
 ASIDE = 1e-3
-"""Of a value, or of its domain where that is narrower: how far aside it is looked whether a mirror is that of all values."""
+"""Of a value, or of its domain where that is narrower: how far aside it is looked whether a mirror
+is that of all values."""
 
 
 @dataclass(frozen=True)
