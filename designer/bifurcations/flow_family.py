@@ -18,7 +18,8 @@ Key = TypeVar("Key")
 MOST_FLOWS = 8
 """Flows that a family remembers."""
 ASIDE = 1e-3
-"""Of a value: how far aside it is looked whether a mirror is that of all values."""
+"""Of a value, or of its domain where that is narrower: how far aside it is looked whether a mirror
+is that of all values."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,13 @@ class Family:
     def mirrored(self, value: float) -> bool:
         """Whether the flows at a value and beside it have a mirror: one value alone may have one,
         such as that at which two gaps are equal."""
-        near = (v for v in _beside(value) if self.contains(v))
+        near = (v for v in self.beside(value) if self.contains(v))
         return all(self.flow(v).system.mirror is not None for v in near)
+
+    def beside(self, value: float) -> tuple[float, float, float]:
+        """A value, and one on either side of it."""
+        step = ASIDE * min(abs(value) or 1.0, self.high - self.low)
+        return value, value - step, value + step
 
     def check(self, value: float) -> None:
         """InputError unless the value lies inside the domain."""
@@ -110,7 +116,8 @@ class FlowPlane:
 
     def mirrored(self, first: float, second: float) -> bool:
         """Whether the flows at both values and beside them have a mirror."""
-        pairs = [(v, second) for v in _beside(first)] + [(first, v) for v in _beside(second)]
+        pairs = [(v, second) for v in self.first.beside(first)]
+        pairs += [(first, v) for v in self.second.beside(second)]
         near = (self.flow(*pair) for pair in pairs if self.contains(*pair))
         return all(flow.system.mirror is not None for flow in near)
 
@@ -118,12 +125,6 @@ class FlowPlane:
         """The family over the first parameter, at a value of the second."""
         one = self.first
         return Family(one.parameter, one.low, one.high, lambda v: self.build(v, second))
-
-
-def _beside(value: float) -> tuple[float, float, float]:
-    """A value, and one on either side of it."""
-    step = ASIDE * (abs(value) or 1.0)
-    return value, value - step, value + step
 
 
 def _remembered(flows: dict[Key, Flow], key: Key, flow: Flow) -> Flow:

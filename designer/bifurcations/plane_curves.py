@@ -107,7 +107,8 @@ def continued(
     """The curve through a point that was located on a branch over the first parameter.
 
     second : value of the second parameter on the branch. None where the extended equations have no
-    solution at the point. progress : called once a point.
+    solution at the point, and for a pitchfork where the second parameter breaks the symmetry.
+    progress : called once a point.
     """
     begun = _begun(plane, bifurcation, second, window)
     if begun is None:

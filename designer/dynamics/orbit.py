@@ -165,7 +165,7 @@ class Orbit(Motion):
     @property
     def peaks(self) -> Array:
         """(states,) ``peaks_of`` the extremes."""
-        return peaks_of(self.extremes)
+        return peaks_of(self.extremes) if len(self.extremes) else np.zeros(0)
 
     @property
     def radius(self) -> float:

@@ -4,7 +4,7 @@ stand in lists."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.base.errors import InputError
 from designer.base.si_unit import quantity_text, value_text
@@ -19,6 +19,8 @@ REACH = 5.0
 """How far a slider without finite ends goes: from 1/5 of the file's value to 5 times it."""
 MARGIN = 1e-3
 """How far from the ends of an open interval a slider stays."""
+SENT = 6
+"""Digits of what the page sends when a slider is moved."""
 LOWEST, HIGHEST = 0.1, 2.5
 """Ends of the slider of ω over the first mass's own frequency; wider where a response is."""
 LABELS = {
@@ -120,29 +122,30 @@ def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Co
             continue
         value = model.parameter(name)
         low, high, logarithmic = _range(value, least, most)
-        low, high = (_nearer(model, name, value, end) for end in (low, high))
         factor = name == "b" and "b" not in model.units
         label = FACTOR if factor else LABELS.get(name, name)
         drive = name == "b" or name.endswith(".amplitude")
         unit, scale = _shown_in(value, units.get(name, ""))
-        yield Control(name, label, unit, low, high, value, logarithmic, drive, scale)
+        own = Control(name, label, unit, low, high, value, logarithmic, drive, scale)
+        low, high = (_nearer(model, own, end) for end in (low, high))
+        if low < high:  # or another number decides it
+            yield replace(own, low=low, high=high)
 
 
-def _nearer(model: MechanicalModel, name: str, value: float, end: float) -> float:
+def _nearer(model: MechanicalModel, control: Control, end: float) -> float:
     """An end of a slider: the furthest, to a thousandth of the way, that the model may have beside
-    its other numbers."""
-    good, bad, share = 0.0, 1.0, 1.0
+    its other numbers; of as many digits as the page sends."""
+    best, good, bad, share = control.value, 0.0, 1.0, 1.0
     while bad - good > MARGIN:
+        there = control.rounded(control.value + share * (end - control.value), SENT)
         try:
-            model.changed({name: value + share * (end - value)})
+            model.changed({control.name: there})
         except InputError:
             bad = share
         else:
-            good = share
-            if share == 1.0:
-                return end
+            best, good = there, share
         share = 0.5 * (good + bad)
-    return value + good * (end - value)
+    return best
 
 
 def _range(value: float, least: float, most: float) -> tuple[float, float, bool]:

@@ -11,6 +11,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import reading
 from designer.base.rare_words import any_lost_words, boards_at, loss_words
 from designer.base.si_unit import drive_text
+from designer.explorer.place import first_place
 from designer.explorer.wire import Message
 from designer.folders.model_source import design_inputs_of
 from designer.model.model_file import ModelFile
@@ -37,7 +38,7 @@ class FolderLosses:
     words: str
     """Which boards these are."""
     b: float
-    """The model's own clearance."""
+    """The clearance, or factor on gaps, that the page starts at."""
     rows: tuple[ResponseLosses, ...]
     """One for each response with an estimate."""
 
@@ -84,7 +85,8 @@ def _read(study: Mapping[str, Any], modelfile: ModelFile) -> FolderLosses | None
     )
     if any_lost := study.get("any_lost"):
         words += f" {any_lost_words(any_lost)}."
-    return FolderLosses(words, own, tuple(_row(*pair, own) for pair in asked))
+    shown = first_place(modelfile).model.b
+    return FolderLosses(words, shown, tuple(_row(*pair, own) for pair in asked))
 
 
 def _row(spec: Response, response: Mapping[str, Any], own: float) -> ResponseLosses:

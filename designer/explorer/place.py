@@ -45,10 +45,14 @@ class ModelPlace:
 
 
 def first_place(modelfile: ModelFile) -> ModelPlace:
-    """The model file's own values, at the frequency of its first response, or the model's own."""
-    omegas = [r.omega for r in modelfile.responses if r.omega is not None]
-    omega = omegas[0] if omegas else _own(modelfile.model)
-    return ModelPlace(modelfile.model, omega, in_si=in_si(modelfile.si, modelfile.model))
+    """The model file's own values, at the frequency of its first response, or the model's own; a
+    factor ``b``, which has no other place in a file, is that response's."""
+    model = modelfile.model
+    wanted = next((r for r in modelfile.responses if r.omega is not None), None)
+    if wanted is not None and isinstance(wanted.b, float) and "b" not in model.units:
+        model = model.changed({"b": wanted.b})
+    omega = _own(model) if wanted is None or wanted.omega is None else wanted.omega
+    return ModelPlace(model, omega, in_si=in_si(modelfile.si, model))
 
 
 def read_place(modelfile: ModelFile, words: Mapping[str, object]) -> ModelPlace:

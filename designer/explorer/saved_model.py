@@ -15,7 +15,7 @@ from designer.base.errors import InputError
 from designer.base.toml_writer import toml_text
 from designer.base.units import shortest
 from designer.dynamics.counts import Counts
-from designer.explorer.place import ModelPlace, read_place
+from designer.explorer.place import ModelPlace, first_place, read_place
 from designer.model.find_responses import find
 from designer.model.model import SiScales
 from designer.model.model_file import ModelFile, parse_model_file
@@ -71,11 +71,11 @@ def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedRes
     """The model file with the values of a place; the pins take the place of its responses.
 
     Comments are lost. The factor ``b`` of a system has no key of its own: it goes to the pins, or
-    to the responses that state none.
+    to the responses that state none or that of the first place.
 
     Raises
     ------
-    InputError : the text would be no model file.
+    InputError : the text would be no model file, or no response can take a changed factor.
     """
     data = modelfile.data
     modelfile.numbers.put(data, place.model)
@@ -83,11 +83,22 @@ def saved_text(modelfile: ModelFile, place: ModelPlace, pins: Sequence[PinnedRes
     if pins:
         key = _frequency_key(data.get("response", ()), modelfile.si)
         data["response"] = [_table(pin, own, key, modelfile.si) for pin in pins]
-    elif place.model.b != own:
-        data |= {"response": [{"b": place.model.b, **r} for r in data.get("response", ())]}
+    elif "b" not in place.model.units:
+        _put_factor(data, first_place(modelfile).model.b, place.model.b)
     text = f"# Saved by designer explore from {_one_line(modelfile.title)}\n{toml_text(data)}"
     parse_model_file(text)
     return text
+
+
+def _put_factor(data: Mapping[str, Any], first: float, b: float) -> None:
+    """Give a changed factor to the responses that have the first place's."""
+    if b == first:
+        return
+    following = [r for r in data.get("response", ()) if r.get("b", first) == first]
+    if not following:
+        raise InputError(None, "b", b, f"{first:g}, or a pin: no wanted response here can have it")
+    for response in following:
+        response["b"] = b
 
 
 def _one_line(title: str) -> str:

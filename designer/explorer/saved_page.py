@@ -4,7 +4,7 @@ its yields, recorded."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -38,7 +38,6 @@ from designer.explorer.wire import Message, short_columns
 from designer.jobs.options import Options
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
-from designer.model.si_units import in_si
 from designer.model.swept_model import ModelSubject
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import Answer, StudyPlan
@@ -199,17 +198,17 @@ def record(
 
     omegas : drive frequencies, ascending, in the model's units.
     """
-    model = modelfile.model
+    first = first_place(modelfile)
 
     def visit(omega: float) -> tuple[Orbit, Message]:
-        orbit, view = _visit(ModelPlace(model, omega, in_si=in_si(modelfile.si, model)))
+        orbit, view = _visit(replace(first, omega=omega))
         step()
         return orbit, view
 
     step = progress.stage("what each drive frequency shows", len(omegas))
     visits = list(parallel(visit, omegas, jobs))
     orbits = [orbit for orbit, _ in visits]
-    settings = ModelSubject(model).settings([{OMEGA: omega} for omega in omegas])
+    settings = ModelSubject(first.model).settings([{OMEGA: omega} for omega in omegas])
     drawn = [k for k, orbit in enumerate(orbits) if len(orbit.start)]
     steps = [settings[k].steady(orbits[k].start, COURSE) for k in drawn]
     return BranchRecording(
@@ -273,12 +272,13 @@ def _window(
     modelfile: ModelFile, omega: float, orbit: Orbit, span: tuple[float, float]
 ) -> RecordedWindow | None:
     """None where continuation does not follow the orbit."""
-    family = ModelSubject(modelfile.model, omega).family(OMEGA)
+    first = first_place(modelfile)
+    family = ModelSubject(first.model, omega).family(OMEGA)
     try:
         found = window(family, orbit, omega, *span)
     except ArithmeticError:
         return None
-    return RecordedWindow(omega, orbit, found, in_si(modelfile.si, modelfile.model))
+    return RecordedWindow(omega, orbit, found, first.in_si)
 
 
 def _distinct(windows: Sequence[RecordedWindow]) -> list[RecordedWindow]:

@@ -185,7 +185,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         errors = coefficient_errors(circuit, model.second_order(), swing=swing)
         if abs(errors.max_error - float(document["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
-        conditions = document["conditions"]  # without a limit: of versions that wrote such ones
+        conditions = document["conditions"]
         listed = {key: conditions.get(key, ()) for key in ("checked", "at_limit", "binding")}
         design = Design(
             model=model,
@@ -193,17 +193,24 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             errors=errors,
             certificate=Certificate(**document["certificate"]),
             conditions={
-                k: float(v) for k, v in conditions.items() if k not in listed and v is not None
+                k: float(v) for k, v in conditions.items() if k not in listed and not _endless(k, v)
             },
             solver=dict(document["solver"]),
             seconds=float(document["cost"]["synthesis_seconds"]),
             checks=tuple(
-                ConditionCheck(**check) for check in listed["checked"] if check["limit"] is not None
+                ConditionCheck(**check | {"limit": float(check["limit"])})
+                for check in listed["checked"]
+                if not _endless(check["quantity"], check["limit"])
             ),
             binding=dict(listed["binding"]),
         )
     reason = str(stage.get("reason", "")) if isinstance(stage, Mapping) else ""
     return Synthesis(modelfile, catalog, responses, design, stage_reason=reason)
+
+
+def _endless(quantity: str, limit: object) -> bool:
+    """Whether a condition has no limit, as versions wrote that of a rectifier's idle half."""
+    return quantity == "rectifier_fv_v" and limit is None
 
 
 def _size(value: object, file: Path, name: str) -> float:

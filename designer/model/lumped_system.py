@@ -558,8 +558,9 @@ class LumpedSystem(Elements):
             for index, name in enumerate(names)
             for key in LEAST[group]
             if getattr(self._elements(group)[index], key) is not None
-            and not (
-                key == "damping" and getattr(self._elements(group)[index], "restitution", None)
+            and (
+                key != "damping"
+                or getattr(self._elements(group)[index], "restitution", None) is None
             )
         }
         for index, law in enumerate(self.laws):

@@ -109,9 +109,10 @@ class ModelSubject:
         try:
             self.model.changed({name: value})
         except InputError as error:
-            expected = error.expected if math.isfinite(value) else "a finite number"
-            expected = f"{name}: {expected}"
-            if isinstance(error.found, float) and error.found != value:  # that of another key
+            expected = f"{name}: {error.expected}"
+            if not math.isfinite(value):
+                expected = f"{name}: a finite number"
+            elif isinstance(error.found, float) and error.found != value:  # that of another key
                 beside = f"{error.field} = {error.found:g}, which is to be {error.expected}"
                 expected = f"another {name}: it stands beside {beside}"
             raise InputError(None, option, value, expected) from None

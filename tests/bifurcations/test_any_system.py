@@ -223,6 +223,12 @@ def test_a_branch_goes_through_the_one_value_that_has_a_mirror(
         assert reached.symmetric is False
 
 
+def test_a_domain_narrower_than_a_thousandth_hides_no_mirror_of_one_value_alone() -> None:
+    family = ModelSubject(ALIKE.model, 1.3).family("m.constant")
+    assert family.flow(0.0).system.mirror is not None
+    assert not replace(family, low=-1e-4, high=1e-4).mirrored(0.0)
+
+
 def test_a_grazing_curve_goes_through_equal_gaps() -> None:
     """Each stop is touched where the response without one is as large as its gap."""
     found = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))

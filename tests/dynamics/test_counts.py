@@ -73,6 +73,7 @@ def test_numbers_that_are_stored_may_be_no_counts(orbit: Orbit, countable: bool)
 def test_an_orbit_that_could_not_be_computed_has_nothing() -> None:
     """Arrays of no entry have the rest of their shape, so that what reads them reads nothing."""
     orbit = failed("why")
+    assert orbit.peaks.shape == (0,)
     assert (str(orbit.status), orbit.reason, str(orbit.counts)) == ("failed", "why", "0-0-0")
     pairs = (orbit.extremes, orbit.spans, orbit.speeds, orbit.graze)
     assert [each.shape for each in pairs] == [(0, 2)] * 4

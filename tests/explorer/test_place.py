@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from hypothesis import given, strategies as st
 from designer import InputError, ModelFile, parse_model_file, read_model_file
 from designer.explorer.controls import controls
 from designer.explorer.place import first_place, read_place, words_of
+from designer.explorer.saved_model import saved_text
+from designer.model.swept_model import ModelSubject
 from tests.shared.model_text import PAPER_TABLE
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -133,7 +136,7 @@ def test_sliders_end_where_other_numbers_of_the_model_bound_theirs() -> None:
     assert "A.damping" not in sliders  # the restitution decides it
     for control in sliders.values():
         for value in (control.low, control.high):
-            read_place(BOUND, {control.name: value})
+            read_place(BOUND, {control.name: control.rounded(value, 6)})  # as the page sends it
     ends = {name: (c.low, c.high) for name, c in sliders.items()}
     assert ends["m-ground.force"] == pytest.approx((0.04, 0.3), rel=0.01)
     assert ends["m-ground.static"] == pytest.approx((0.2, 1.5), rel=0.01)
@@ -141,10 +144,28 @@ def test_sliders_end_where_other_numbers_of_the_model_bound_theirs() -> None:
     assert ends["A.upper"] == pytest.approx((-0.2, 0.9), rel=0.01)
 
 
+def test_what_another_number_decides_has_no_slider() -> None:
+    """The stops of one restitution have one stiffness."""
+    text = saved_text(BOUND, read_place(BOUND, {}))
+    modelfile = parse_model_file(
+        text.replace("\nstiffness = 20.0", "\nupper_stiffness = 20.0\nlower_stiffness = 20.0")
+    )
+    assert modelfile.model.parameter("A.upper_stiffness") == 20.0
+    names = {c.name for c in controls(modelfile)}
+    assert names == {c.name for c in controls(BOUND)} - {"A.stiffness"}
+
+
 def test_a_number_that_another_one_bounds_is_refused_by_the_name_of_both() -> None:
     words = "m-ground.force: found 0.4, expected another m-ground.force: it stands beside"
     with pytest.raises(InputError, match=f"{words} friction m-ground.static = 0.3, which is to be"):
         read_place(BOUND, {"m-ground.force": 0.4})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_no_finite_number_is_refused_as_such(value: float) -> None:
+    for name in ("A.upper", "m-ground.force"):
+        with pytest.raises(InputError, match=f"{name}: a finite number$"):
+            ModelSubject(BOUND.model).check("over", name, value)
 
 
 LISTS = parse_model_file(

@@ -13,7 +13,7 @@ import pytest
 
 from designer import InputError, ModelFile, parse_model_file, read_model_file
 from designer.explorer.job_processes import Job, JobProcesses
-from designer.explorer.place import read_place
+from designer.explorer.place import first_place, read_place
 from designer.explorer.questions import read_question, save_model
 from designer.explorer.saved_model import not_found, place_for, read_pins, save, saved_text
 from tests.explorer.served import EXAMPLES
@@ -113,6 +113,19 @@ def test_the_factor_of_gaps_goes_to_the_responses_that_have_none() -> None:
     again = parse_model_file(saved_text(modelfile, read_place(modelfile, {"b": 0.8})))
     assert [r.b for r in modelfile.responses] == [None] * len(again.responses)
     assert [r.b for r in again.responses] == [0.8] * len(again.responses)
+    assert first_place(again).model.b == 0.8
+    for b in (0.9, 1.0):
+        again = parse_model_file(saved_text(again, read_place(again, {"b": b})))
+        assert [r.b for r in again.responses] == [b] * len(again.responses)
+    assert saved_text(again, read_place(again, {})) == saved_text(again, first_place(again))
+
+
+def test_a_factor_that_no_response_can_have_is_refused() -> None:
+    modelfile = file("points")
+    assert not modelfile.responses
+    assert "response" not in saved_text(modelfile, read_place(modelfile, {}))
+    with pytest.raises(InputError, match=r"b: found 0\.8, expected 1, or a pin"):
+        saved_text(modelfile, read_place(modelfile, {"b": 0.8}))
 
 
 def test_pins_become_the_wanted_responses_and_are_looked_for() -> None:

@@ -85,19 +85,29 @@ def test_windows_hold_the_places_that_show_them(
         assert (view.orbit.response == "1-2-2") == shown
 
 
+BLOCK = """
+format = 2
+mass = [{ name = "block", mass = 1.0 }]
+spring = [{ between = ["block", "ground"], stiffness = 1.0 }]
+damper = [{ between = ["block", "ground"], damping = 0.2 }]
+clearance = [{ name = "A", between = ["block", "ground"], upper = 5.0, stiffness = 9.0 }]
+force = [{ on = "block", amplitude = 0.5 }]
+"""
+"""One stop, out of reach."""
+
+
 def test_a_window_without_impacts_is_as_symmetric_as_its_places() -> None:
     """One stop has no mirror, and what does not reach it is a sine all the same."""
-    text = """
-        format = 2
-        mass = [{ name = "block", mass = 1.0 }]
-        spring = [{ between = ["block", "ground"], stiffness = 1.0 }]
-        damper = [{ between = ["block", "ground"], damping = 0.2 }]
-        clearance = [{ name = "A", between = ["block", "ground"], upper = 5.0, stiffness = 9.0 }]
-        force = [{ on = "block", amplitude = 0.5 }]
-    """
-    recorded = record(parse_model_file(text), (0.4, 0.5, 0.6), 1, Progress())
+    recorded = record(parse_model_file(BLOCK), (0.4, 0.5, 0.6), 1, Progress())
     assert {view["summary"] for view in recorded.views} == {"1-0-0, symmetric"}
     assert [each.message()["summary"] for each in recorded.windows] == ["1-0-0, symmetric"]
+
+
+def test_a_page_shows_the_factor_of_gaps_of_the_first_response() -> None:
+    nearer = f"{BLOCK}response = [{{ omega = 0.5, b = 0.1 }}]"  # the block moves by 0.65
+    recorded = record(parse_model_file(nearer), (0.4, 0.5, 0.6), 1, Progress())
+    assert {view["summary"] for view in recorded.views} == {"1-1-0, asymmetric"}
+    assert [each.message()["summary"] for each in recorded.windows] == ["1-1-0, asymmetric"]
 
 
 def test_every_place_of_the_file_is_among_those_of_the_slider(modelfile: ModelFile) -> None:

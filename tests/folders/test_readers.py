@@ -396,13 +396,20 @@ def test_other_types_in_a_design(design: Path, monkeypatch: pytest.MonkeyPatch) 
         path.write_text("[" * 100_000)
         with pytest.raises(InputError, match="nested too deeply"):
             load(folder, made.modelfile, catalog)
-        first = whole["conditions"]["checked"][0]  # as versions wrote what has no limit
-        endless = with_other(whole, ("conditions", "checked", 0, "limit"), None)
-        endless = with_other(endless, ("conditions", first["quantity"]), None)
-        path.write_text(json.dumps(endless))
-        again = load(folder, made.modelfile, catalog).design
-        assert again.checks == made.design.checks[1:]
-        assert first["quantity"] not in again.conditions
+        conditions = whole["conditions"]
+        first, *others = conditions["checked"]
+        for quantity in (first["quantity"], "rectifier_fv_v"):  # as versions wrote the second
+            endless = {**first, "quantity": quantity, "limit": None}
+            for more in ({quantity: None}, {}):
+                changed = {**conditions, "checked": [endless, *others], **more}
+                path.write_text(json.dumps({**whole, "conditions": changed}))
+                if quantity == first["quantity"]:
+                    with pytest.raises(InputError, match=r"design\.json"):
+                        load(folder, made.modelfile, catalog)
+                else:
+                    again = load(folder, made.modelfile, catalog).design
+                    assert again.checks == made.design.checks[1:]
+                    assert quantity not in again.conditions
     finally:
         path.write_bytes(before)
 
