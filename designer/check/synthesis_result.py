@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from importlib import import_module
 
@@ -95,13 +96,16 @@ def synthesise(
         choice = modelfile.model, modelfile.circuit, catalog
         held = peaks(modelfile.model, responses)
 
-        def stand(design: Design) -> None:
-            if announced:
-                note(parts_line(design, time.perf_counter() - began))
+        with ExitStack() as search:
+            search.enter_context(seeking("parts"))
 
-        with seeking("parts"):
+            def stand(design: Design) -> None:
+                spread_of(modelfile, design.circuit, catalog)  # refuses what no board of it can be
+                search.close()  # what comes is no search for parts
+                if announced:
+                    note(parts_line(design, time.perf_counter() - began))
+
             design = parts_choice.synthesise(*choice, held, responses, jobs=jobs, stand=stand)
-        spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
 
 

@@ -332,7 +332,9 @@ def _least(coefficients: dict[str, _Coefficient], states: int) -> tuple[dict[str
 @lru_cache(maxsize=1)
 def _best_scales(h: bytes, D: bytes, states: int) -> Array:
     """Kept: a circuit is asked about again once its drive is chosen, which moves no coefficient."""
-    return minimax(np.frombuffer(h), _free(np.frombuffer(D).reshape(-1, 1 + states)))
+    free = minimax(np.frombuffer(h), _free(np.frombuffer(D).reshape(-1, 1 + states)))
+    free.flags.writeable = False
+    return free
 
 
 def _free(D: Array) -> Array:

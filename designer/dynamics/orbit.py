@@ -16,6 +16,8 @@ SURE = 4.0
 """Standard errors that a measured exponent has to be away from a value to be told from it."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
+STILL = 1e-9
+"""A state with a peak below this share of the largest hardly moves: rounding is not far below."""
 MOST_COUNTED = 1_000_000
 """Drive periods or impacts that a stored motion may have."""
 
@@ -175,9 +177,14 @@ class Orbit(Motion):
 
 def peaks_of(values: Array) -> Array:
     """(states,) what distances of states are measured in: the largest size of each state's values
-    (states, k), of one that hardly moves 1e-9 of the largest."""
+    (states, k), of one that hardly moves `STILL` of the largest displacement or velocity; of the
+    largest state where none of these moves beside it."""
     peak = np.abs(values).max(axis=1)
-    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+    top = float(peak.max())
+    for own in (peak[0::2], peak[1::2]):
+        largest = float(own.max(initial=0.0))
+        np.maximum(own, STILL * (largest if largest > STILL * top else top), out=own)
+    return np.asarray(np.maximum(peak, 1e-300))
 
 
 def largest_speeds(velocities: Array, sides: Array | Index, clearances: Index, count: int) -> Array:

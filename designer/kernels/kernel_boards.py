@@ -36,6 +36,8 @@ IMPACTS = 512
 """Impacts of an orbit over two laps that there is room for."""
 STAGES = (20, 20, 100, 660)
 """Drive periods that are run between two looks for a period, as in ``dynamics.attractors``."""
+STILL = 1e-9
+"""Share of the largest below which a state hardly moves, as in ``dynamics.orbit``."""
 ASK, BUILD, NOWHERE = 1, 2, 3
 """Answers beside FOUND: nothing that the compiled code decides, the caller settles it; a mode that
 has to be built before the question is put again; no mode that has been built holds at the start."""
@@ -130,19 +132,31 @@ def _trace(board: DrivenBoard, x: Float, mode: int, anchor: Float, strobes: Floa
 
 
 @callee
+def _raise(peak: Float) -> None:
+    """peak (states,) ← what ``orbit.peaks_of`` makes of it."""
+    top = 0.0
+    for i in range(len(peak)):
+        top = max(top, peak[i])
+    for kind in range(2):
+        own = 0.0
+        for i in range(kind, len(peak), 2):
+            own = max(own, peak[i])
+        least = STILL * (own if own > STILL * top else top)
+        for i in range(kind, len(peak), 2):
+            peak[i] = max(peak[i], max(least, 1e-300))
+
+
+@callee
 def _peaks(board: DrivenBoard, x: Float, mode: int, peak: Float) -> bool:
     """``attractors.peaks_near``; False where the run does not come to its end."""
     strobes = np.zeros((33, len(x)))
     if _trace(board, x, mode, board.anchors.few, strobes) != DONE:
         return False
-    top = 0.0
     for i in range(len(x)):
         peak[i] = 0.0
         for k in range(33):
             peak[i] = max(peak[i], abs(strobes[k, i]))
-        top = max(top, peak[i])
-    for i in range(len(x)):
-        peak[i] = max(peak[i], max(1e-9 * top, 1e-300))
+    _raise(peak)
     return True
 
 
@@ -208,6 +222,7 @@ def _describe(board: DrivenBoard, x: Float, e: int, answers: Answers) -> bool:
         extremes[i, 0], extremes[i, 1] = trail.extremes[i, 0], trail.extremes[i, 1]
         if i < len(x):
             peak[i] = max(abs(extremes[i, 0]), abs(extremes[i, 1]))
+    _raise(peak)
     if not count_impacts(strobes, impacts, n, peak, counted):
         return False
     facts[UNDECIDED], whole[MET] = trail.undecided[0], met

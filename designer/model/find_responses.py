@@ -33,6 +33,9 @@ LARGEST_START = 1e9
 """Of a state that a motion may be asked to begin at: far past any motion, and no overflow."""
 LEAST_SHARE = 0.1
 """Of the widest start of a mass: the least of another, where a law may be all that moves it."""
+STILL = 1e-6
+"""Of the largest displacement or velocity: a state with a peak below it is taken to be at rest. No
+circuit could show it: a part in a million of some volts is far below an op-amp's offset."""
 DENSE = 1024
 """Points a drive period at which a displacement between two masses is looked at."""
 
@@ -203,8 +206,8 @@ def peaks(model: MechanicalModel, responses: Sequence[ModelResponse]) -> Peaks:
                 reach.widened(stop, scale, *span.within(j, stop))
                 for j, (reach, stop) in enumerate(zip(reaches, stops, strict=True))
             ]
-    for own in (states[0::2], states[1::2]):  # a mass at rest has no size: that of the others
-        own[own <= 1e-6 * own.max()] = own.max()
+    for own in (states[0::2], states[1::2]):
+        own[own <= STILL * own.max()] = own.max()
     return Peaks(states, tuple(reaches), fastest)
 
 
@@ -339,8 +342,9 @@ class Peaks:
     """What the circuit has to hold, in model units."""
 
     states: Array
-    """(states,) peaks of x1, x1', x2, … over all wanted responses and the starts from rest; of a
-    mass that hardly moves the largest displacement and velocity of any."""
+    """(states,) peaks of x1, x1', x2, … over all wanted responses and the starts from rest. A state
+    within `STILL` of rest has no size to be scaled by: it is assumed to move as far as the one that
+    moves most, so ``level`` and ``swing`` hold of it by assumption."""
     reaches: tuple[Reach, ...] = ()
     """How far the displacement in each clearance goes."""
     fastest: float = 0.0

@@ -106,6 +106,8 @@ room too."""
 WAVE_BOUND = 2e-3
 """The bound on the wave, over the peak: RMS over the last n periods of ngspice, with ideal op-amps,
 less the exact circuit's."""
+STILL = 1e-3
+"""Of the largest peak: what moves less is ngspice's tolerances, which no bound below them asks."""
 RELTOL = 1e-5
 """ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
@@ -427,9 +429,16 @@ def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject
         s = subjects[indices[k]]
         if isinstance(outcome.result, Read):
             read, orbit = outcome.result, s.orbit
-            periods, _ = settling_periods(read.strobes, orbit.n, orbit.radius, orbit.peaks)
+            peak = peaks_in_ngspice(orbit)
+            periods, _ = settling_periods(read.strobes, orbit.n, orbit.radius, peak)
             out[indices[k]] = replace(s, discard=min(max(periods, DISCARD), MOST_DISCARDED))
     return out
+
+
+def peaks_in_ngspice(orbit: Orbit) -> Array:
+    """(states,) what distances of ngspice's states are measured in: ``Orbit.peaks``, of a state
+    that hardly moves `STILL` of the largest."""
+    return np.asarray(np.maximum(orbit.peaks, STILL * orbit.peaks.max()))
 
 
 def wave_bound(orbit: Orbit) -> float:
@@ -447,7 +456,7 @@ def wave_error(subject: GateSubject, read: Read) -> float:
     if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
         return float("nan")
     flow = Flow(subject.system, subject.excitation.drive)
-    peak = orbit.peaks
+    peak = peaks_in_ngspice(orbit)
     time, states = read.trace
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
@@ -482,7 +491,7 @@ def _judge(
         passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
         wave = wave_error(subject, good[0])
         if wanted.status is OrbitStatus.PERIODIC:
-            peak = wanted.peaks
+            peak = peaks_in_ngspice(wanted)
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND

@@ -172,16 +172,15 @@ def synthesise(
     if isinstance(best, _Missed):
         search.refuse(best, catalog)
     design = best.design
-    if not spec.composites:
-        _check_error(design, spec)
-        stand(design)
-    if binding:
-        design = replace(design, binding=search.binding(best))
     if spec.composites:
         doing("composites")
-        design = search.with_composites(best, design)
-        _check_error(design, spec)
-        stand(design)
+        design = search.with_composites(best)
+    _check_error(design, spec)
+    stand(design)
+    least = design.errors.max_error - EXACT
+    if binding and least > 0.0:
+        costs = search.binding(best)
+        design = replace(design, binding={n: cost for n, cost in costs.items() if cost < least})
     return replace(design, seconds=time.perf_counter() - began)
 
 
@@ -266,9 +265,9 @@ class _Search:
                 costs[name] = without(frozenset({name}))
         return {name: cost for name, cost in costs.items() if cost < least}
 
-    def with_composites(self, best: _Verified, design: Design) -> Design:
+    def with_composites(self, best: _Verified) -> Design:
         """The design with resistors of two parts where that lowers its error; or as it was."""
-        spec, costs = self.order.spec, design.binding
+        spec, design = self.order.spec, best.design
         for made in self._in_pairs(best):
             if isinstance(made, Shortfall) or _error(made) >= design.errors.max_error - EXACT:
                 continue
@@ -286,8 +285,7 @@ class _Search:
                 if least <= 0.0
                 else "composites near the best single parts; no lower bound but 0",
             )
-            binding = {name: cost for name, cost in costs.items() if cost < least}
-            design = replace(improved, certificate=certificate, binding=binding)
+            design = replace(improved, certificate=certificate)
             if least <= 0.0:
                 break
         return design

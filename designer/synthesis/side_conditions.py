@@ -56,7 +56,8 @@ def verify(
     amplitudes: Sequence[float],
     loads: Loads | None,
 ) -> tuple[ConditionCheck, ...]:
-    """These conditions on the finished circuit, in the order of ``SIDE_CONDITIONS``.
+    """These conditions on the finished circuit, in the order of ``SIDE_CONDITIONS``; the voltages
+    of a mass at rest are assumed (``Peaks.states``).
 
     amplitudes : of the generator, the largest of each channel [V peak]. loads : peak voltages and
     currents of the sections; None where no response was wanted, and then only the states' peaks

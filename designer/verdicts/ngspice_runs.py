@@ -263,6 +263,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0
+    peak = numerics_gate.peaks_in_ngspice(orbit)
     stay = max(STRETCH, least)
     while periods - arrived < stay:
         if arrived > MOST_PERIODS:
@@ -270,7 +271,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
         way = flow.run(x, stay - (periods - arrived), mode=mode)
         if way.status is not FlowStatus.DONE:
             return math.inf
-        gap = (np.abs(way.strobes[:, None] - laps) / orbit.peaks).max(axis=2).min(axis=1)
+        gap = (np.abs(way.strobes[:, None] - laps) / peak).max(axis=2).min(axis=1)
         far = np.flatnonzero(gap > REMAINDER)
         arrived = periods + int(far[-1]) + 1 if len(far) else arrived
         periods += len(way.strobes) - 1

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from designer.circuit.board_values import nominal_board
-from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.coefficients import _best_scales, coefficient_errors
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.oracles import Plain, coefficient_error, dead_zone_gains, minimax
@@ -226,3 +226,9 @@ def test_the_lp_of_the_oracle_is_a_minimax(seed: int) -> None:
     best = minimax(h, D)
     assert best <= crude + 1e-9
     assert best >= crude - 0.01 * np.abs(D).max()
+
+
+def test_scales_that_are_kept_cannot_be_changed() -> None:
+    kept = _best_scales(np.array([0.1, -0.1]).tobytes(), np.eye(2, 3).tobytes(), 2)
+    with pytest.raises(ValueError, match="read-only"):
+        kept[0] = 1.0

@@ -86,6 +86,29 @@ def test_every_clearance_is_counted_as_by_the_general_kernel() -> None:
     assert len(fast._reductions) <= 1, "the compiled way serves all but what settles slowly"
 
 
+def test_boards_with_a_mass_that_nothing_moves_are_served() -> None:
+    """Its peaks are rounding, which is no measure: both ways say the same of it."""
+    system = SecondOrderSystem(
+        mass=np.ones(2),
+        damping=np.diag([0.2, 0.15]),
+        stiffness=np.diag([1.0, 1.3]),
+        force=np.array([0.5, 0.0]),
+        clearances=(Clearance.even(0, 9.0, 5.0),),
+    )
+    circuit = exact_circuit(system, Scale(1e-3, np.full(4, 2.0), 1.3))
+    drive = Drive(0.8 / SCALE.seconds, -SCALE.generator)
+    boards = draw_many(circuit, Spread(0.01, 0.01, 0.0, 0.0), 7, range(2))
+    boards = replace(boards, bias={name: np.zeros(2) for name in boards.bias})
+    fast, slow = Ensemble(boards), Ensemble(boards, fast=False)
+    asked = range(2), [drive] * 2, np.full((2, 4), 0.1)
+    for a, b in zip(fast.settle(*asked), slow.settle(*asked), strict=True):
+        assert np.abs(b.extremes[3]).max() < 1e-9 * np.abs(b.extremes[1]).max()
+        assert a.status is b.status is OrbitStatus.PERIODIC
+        assert a.counts == b.counts
+        assert a.asymmetry == pytest.approx(b.asymmetry, rel=1e-3)
+    assert not fast._reductions
+
+
 def test_boards_whose_states_move_together_are_served() -> None:
     made = synthesise(parse_model_file(TOGETHER))
     (first,) = checked_design.check(made.design, made.model_responses, None)

@@ -26,7 +26,7 @@ from designer.dynamics.coexisting_attractors import coexisting
 from designer.dynamics.counts import MAX_PERIOD, Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.lyapunov_exponent import lyapunov
-from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus, peaks_of
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.find_responses import find
 from designer.model.mechanics import SecondOrderSystem
@@ -438,3 +438,15 @@ def test_the_exponent_is_the_divergence_of_two_trajectories() -> None:
             grown += math.log(distance / gap)
         away = x + (away - x) * (gap / distance)
     assert exponent == pytest.approx(grown / (periods * flow.drive.period), rel=0.05)
+
+
+def test_a_state_that_hardly_moves_is_measured_in_its_own_kind() -> None:
+    """In SI a velocity is ω times a displacement: 1e-9 of it may be no small displacement."""
+    omega = 6e6
+    moving, still = np.array([-1e-9, 1e-9]), np.array([1e-30, 0.0])
+    values = np.stack([moving, omega * moving, still, omega * still])
+    peaks = [1e-9, omega * 1e-9, 1e-18, omega * 1e-18]
+    assert peaks_of(values) == pytest.approx(peaks, rel=1e-12, abs=0.0)
+    at_rest = np.array([[2.0, 2.0], [1e-17, -1e-17], [0.5, 0.5], [0.0, 0.0]])
+    assert peaks_of(at_rest) == pytest.approx([2.0, 2e-9, 0.5, 2e-9], rel=1e-12, abs=0.0)
+    assert (peaks_of(np.zeros((4, 2))) > 0.0).all()

@@ -203,6 +203,28 @@ def test_the_wave_at_every_p(pool: SpicePool) -> None:
         assert rms(who, result.read) < 2e-3
 
 
+@pytest.mark.parametrize(("share", "passes"), [(4e-7, True), (1e-4, False)])
+def test_of_a_state_at_rest_no_more_is_asked_than_ngspice_gives(share: float, passes: bool) -> None:
+    """4 µV beside 10 V is no error of a state whose own peak is 10 nV; 1 mV is one."""
+    who = subject(1)
+    extremes = who.orbit.extremes.copy()
+    extremes[2:] *= 1e-9
+    still = replace(who, orbit=replace(who.orbit, extremes=extremes))
+    points = numerics_gate.WAVE_POINTS
+    states = Flow(who.system, who.excitation.drive).run(who.orbit.start, 1, points=points).strobes
+    time = np.arange(points + 1) * who.period / points
+    noise = share * np.abs(extremes).max() * np.eye(4)[2]
+
+    def run(off: float) -> AidedRun[Read]:
+        read = Read(still.orbit, states[[0, 0]] + off * noise, (time, states + off * noise))
+        return AidedRun(read, SolverSettings("trap", who.period / 400.0))
+
+    result = numerics_gate._judge(still, [run(1.0), run(0.0), run(-1.0)], (400,), who.period)
+    assert result.passed is passes
+    assert (result.wave <= result.wave_bound) is passes
+    assert (result.difference <= BOUND) is passes
+
+
 def test_a_generator_with_an_offset(pool: SpicePool) -> None:
     """Its DC shifts the orbit by a tenth of the peak, in ngspice as on the exact circuit: the
     opposite sign would be twice that away."""

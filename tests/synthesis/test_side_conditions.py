@@ -245,10 +245,11 @@ def test_level_binds_where_the_clearance_is_never_reached() -> None:
     assert free.volts()[0] * PEAKS.states[0] < 10.0 * TL074C.offset_limit
 
 
-def test_what_costs_error_is_named_with_what_it_costs() -> None:
+@pytest.mark.parametrize("composites", [(), ("R4",)])
+def test_what_costs_error_is_named_with_what_it_costs(composites: tuple[str, ...]) -> None:
     """E12 without a stop between 200 kΩ and 1 MΩ: both conditions leave worse ratios. The parts
     stand before these are sought."""
-    spec = replace(E12, resistor_range=(2e5, 1e6))
+    spec = replace(E12, resistor_range=(2e5, 1e6), composites=composites)
     model = replace(PAPER, k0=0.0)
     told: list[Design] = []
     made = parts_choice.synthesise(model, spec, CATALOG, PEAKS, stand=told.append)
