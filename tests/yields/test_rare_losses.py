@@ -176,7 +176,7 @@ def test_a_search_knows_the_commonest_loss_of_those_before_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What is rare beside it walks less: here the second of two regions begins walks again."""
-    known, walk = list[float](), loss_regions.walk
+    known, walk = list[float](), loss_walks.walk
 
     def recorded(walks: Any, shown: Any, rng: Any, moves: int = 120, commonest: float = 0.0) -> Any:
         known.append(commonest)
