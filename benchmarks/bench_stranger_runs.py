@@ -212,6 +212,11 @@ def _words(row: Row) -> str:
     return f"wall {row['wall']:.0f} s, yields {rate}: {said}"
 
 
+def _engines(of: Row) -> str:
+    """A response in model and circuit, and in ngspice where that was asked."""
+    return f"{of['model']} → {of['circuit']}, {of['ngspice'] or 'not asked'}"
+
+
 def _cells(row: Row) -> list[str]:
     of = row.get("responses", ())
     return [
@@ -219,7 +224,7 @@ def _cells(row: Row) -> list[str]:
         f"{row['masses']}, {row['clearances']}",
         ", ".join([row["size"], *row["kinds"]]),
         f"{100 * row['max_error']:.2g} %" if "max_error" in row else "–",
-        "; ".join(f"{r['model']} → {r['circuit']}, {r['ngspice']}" for r in of) or "–",
+        "; ".join(map(_engines, of)) or "–",
         "; ".join("–" if r["rate"] is None else f"{100 * r['rate']:.1f} %" for r in of) or "–",
         f"{row['cpu']:.0f}",
         f"{row['wall']:.0f}",
