@@ -16,8 +16,8 @@ SURE = 4.0
 """Standard errors that a measured exponent has to be away from a value to be told from it."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
-STILL = 1e-9
-"""A state with a peak below this share of the largest hardly moves: rounding is not far below."""
+STILL, COARSE = 1e-9, 1e-3
+"""Shares of the largest peak below which a state hardly moves: by rounding, and by tolerances."""
 MOST_COUNTED = 1_000_000
 """Drive periods or impacts that a stored motion may have."""
 
@@ -168,6 +168,11 @@ class Orbit(Motion):
     def peaks(self) -> Array:
         """(states,) ``peaks_of`` the extremes."""
         return peaks_of(self.extremes) if len(self.extremes) else np.zeros(0)
+
+    @property
+    def coarse_peaks(self) -> Array:
+        """(states,) ``peaks``, of a state that hardly moves `COARSE` of the largest."""
+        return np.asarray(np.maximum(self.peaks, COARSE * self.peaks.max(initial=0.0)))
 
     @property
     def radius(self) -> float:

@@ -388,7 +388,7 @@ def passes(subject: GateSubject, own: Run, others: tuple[Run, Run]) -> bool:
         return False
     if orbit.status is not OrbitStatus.PERIODIC:
         return True  # there is no strobe and no wave to compare
-    peak = gate.peaks_in_ngspice(exact if exact.status is OrbitStatus.PERIODIC else orbit)
+    peak = (exact if exact.status is OrbitStatus.PERIODIC else orbit).coarse_peaks
     last = [run.strobes[-orbit.n :] for run in read]
     apart = max(
         float((np.abs(a - b) / peak).max()) for i, a in enumerate(last) for b in last[i + 1 :]

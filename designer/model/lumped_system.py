@@ -558,11 +558,9 @@ class LumpedSystem(Elements):
             for index, name in enumerate(names)
             for key in LEAST[group]
             if getattr(self._elements(group)[index], key) is not None
-            and (
-                key != "damping"
-                or getattr(self._elements(group)[index], "restitution", None) is None
-            )
         }
+        for gap in (gap for gap in self.gaps if gap.restitution is not None):  # decides the damping
+            places.pop(f"{gap.name}.damping", None)
         for index, law in enumerate(self.laws):
             for i in range(len(law.corners)):
                 for k, letter in enumerate("xf"):

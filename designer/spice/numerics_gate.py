@@ -106,8 +106,6 @@ room too."""
 WAVE_BOUND = 2e-3
 """The bound on the wave, over the peak: RMS over the last n periods of ngspice, with ideal op-amps,
 less the exact circuit's."""
-STILL = 1e-3
-"""Of the largest peak: what moves less is ngspice's tolerances, which no bound below them asks."""
 RELTOL = 1e-5
 """ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
@@ -429,16 +427,10 @@ def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject
         s = subjects[indices[k]]
         if isinstance(outcome.result, Read):
             read, orbit = outcome.result, s.orbit
-            peak = peaks_in_ngspice(orbit)
+            peak = orbit.coarse_peaks
             periods, _ = settling_periods(read.strobes, orbit.n, orbit.radius, peak)
             out[indices[k]] = replace(s, discard=min(max(periods, DISCARD), MOST_DISCARDED))
     return out
-
-
-def peaks_in_ngspice(orbit: Orbit) -> Array:
-    """(states,) what distances of ngspice's states are measured in: ``Orbit.peaks``, of a state
-    that hardly moves `STILL` of the largest."""
-    return np.asarray(np.maximum(orbit.peaks, STILL * orbit.peaks.max()))
 
 
 def wave_bound(orbit: Orbit) -> float:
@@ -456,7 +448,7 @@ def wave_error(subject: GateSubject, read: Read) -> float:
     if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
         return float("nan")
     flow = Flow(subject.system, subject.excitation.drive)
-    peak = peaks_in_ngspice(orbit)
+    peak = orbit.coarse_peaks
     time, states = read.trace
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
@@ -491,7 +483,7 @@ def _judge(
         passed = all(r.orbit.response == name_in_ngspice(wanted.response) for r in good)
         wave = wave_error(subject, good[0])
         if wanted.status is OrbitStatus.PERIODIC:
-            peak = peaks_in_ngspice(wanted)
+            peak = wanted.coarse_peaks
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND

@@ -263,7 +263,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0
-    peak = numerics_gate.peaks_in_ngspice(orbit)
+    peak = orbit.coarse_peaks
     stay = max(STRETCH, least)
     while periods - arrived < stay:
         if arrived > MOST_PERIODS:

@@ -36,8 +36,6 @@ BESIDE = 24
 """Boards whose modes are solved together, where one of them enters these."""
 WAITS = (8, 8, 4)
 """The parts of the last drive's periods after which a start may have come to its orbit."""
-STILL = 1e-3
-"""Peaks below this share of the largest count as so much."""
 STREAM = "phase:"
 """Sets the generator's phase apart from the other draws of a sample."""
 
@@ -313,8 +311,7 @@ def come_to(orbit: Orbit, states: Array, swept: Swept, drive: Drive) -> Mask:
     while laps[1].all() and len(on_it) < orbit.n:
         on_it.append(laps[0][0])
         laps = swept([(drive, 1)], laps[0])
-    peaks = np.abs(orbit.extremes).max(axis=1)
-    peaks = np.maximum(peaks, STILL * peaks.max())
+    peaks = orbit.coarse_peaks
 
     def distances(of: Array) -> Array:
         apart = np.abs(of[:, None] - np.array(on_it)[None]) / peaks

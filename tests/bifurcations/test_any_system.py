@@ -183,27 +183,15 @@ def test_a_map_and_basins(tmp_path: Path) -> None:
     assert {c.response for c in found.cells} == {a.response for a in found.attractors}
 
 
+TO_GROUND = ("m", "ground")
 ALIKE = parse_model_file(
-    """format = 2
-[[mass]]
-name = "m"
-mass = 1.0
-[[spring]]
-between = ["m", "ground"]
-stiffness = 1.0
-[[damper]]
-between = ["m", "ground"]
-damping = 0.1
-[[clearance]]
-name = "A"
-between = ["m", "ground"]
-upper = 0.5
-lower = 0.5
-stiffness = 30.0
-[[force]]
-on = "m"
-amplitude = 1.0
-"""
+    system_text(
+        {"m": 1.0},
+        {TO_GROUND: 1.0},
+        {TO_GROUND: 0.1},
+        clearance("A", *TO_GROUND, upper=0.5, lower=0.5, stiffness=30.0),
+        table("force", on="m", amplitude=1.0),
+    )
 )
 """Its two gaps are equal, so that it has a mirror; with any others it has none."""
 

@@ -15,6 +15,7 @@ from designer.explorer.place import first_place, read_place, words_of
 from designer.explorer.saved_model import saved_text
 from designer.model.swept_model import ModelSubject
 from tests.shared.model_text import PAPER_TABLE
+from tests.shared.system_text import clearance, system_text, table
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FILES = ("paper", "three-masses", "hammer-base", "backlash", "aberdeen")
@@ -95,38 +96,17 @@ def test_every_parameter_has_a_slider_and_both_its_ends_can_be_had(name: str) ->
             read_place(modelfile, {control.name: value})
 
 
+TO_GROUND = ("m", "ground")
 BOUND = parse_model_file(
-    """format = 2
-[[mass]]
-name = "m"
-mass = 1.0
-[[spring]]
-between = ["m", "ground"]
-stiffness = 1.0
-[[damper]]
-between = ["m", "ground"]
-damping = 0.1
-[[clearance]]
-name = "A"
-between = ["m", "ground"]
-upper = 0.3
-lower = 0.2
-stiffness = 20.0
-restitution = 0.5
-[[cubic_spring]]
-between = ["m", "ground"]
-k3 = 0.1
-range = 2.0
-[[friction]]
-between = ["m", "ground"]
-force = 0.2
-velocity = 0.01
-static = 0.3
-stribeck = 0.04
-[[force]]
-on = "m"
-amplitude = 1.0
-"""
+    system_text(
+        {"m": 1.0},
+        {TO_GROUND: 1.0},
+        {TO_GROUND: 0.1},
+        clearance("A", *TO_GROUND, upper=0.3, lower=0.2, stiffness=20.0, restitution=0.5),
+        table("cubic_spring", between=TO_GROUND, k3=0.1, range=2.0),
+        table("friction", between=TO_GROUND, force=0.2, velocity=0.01, static=0.3, stribeck=0.04),
+        table("force", on="m", amplitude=1.0),
+    )
 )
 """Numbers that bound each other."""
 
