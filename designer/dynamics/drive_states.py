@@ -57,4 +57,5 @@ def with_drive_states(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseL
         displacement=tuple(np.insert(r, n, r[n] * drives) for r in system.displacement),
         velocity=tuple(np.insert(r, n, r[n] * rate) for r in system.velocity),
         continuous=system.continuous,
+        working=system.working,
     )

@@ -5,7 +5,7 @@ step is a matrix exponential; boundaries are found to rounding error and grazing
 absent or found (see ``kernels.kernel_general``). Four states with one stop pair take the modal
 fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
 every other system of few states, and a circuit that keeps to its working modes, takes that of
-``kernels.kernel_propagators``. A drive with harmonics is the general kernel's alone.
+``kernels.kernel_propagators``; the waves of a drive that is no sine are states of it there.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.threads import heed
 from designer.dynamics import modal_tables, mode_tables, working_modes
+from designer.dynamics.drive_shape import SINE
+from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow_result import FlowResult, FlowStatus, Impacts
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
@@ -66,15 +68,21 @@ class Flow:
             system = replace(system, mirror=None)
         self.system = system
         self.drive = drive
-        fast = fast and not system.orders and drive.is_sine
-        self._modal = modal_tables.tables(system, drive) if fast and not system.working else None
-        tabulated = fast and self._modal is None and system.size <= MOST_STATES
-        self._tabulated = TabulatedModes(system, drive) if tabulated else None
+        self.orders = system.orders or drive.orders
+        is_sine = drive.is_sine and not self.orders
+        modal = fast and is_sine and not system.working
+        self._modal = modal_tables.tables(system, drive) if modal else None
+        self._waves = () if is_sine else (1, *self.orders)
+        alone, rest = system, drive
+        if self._waves:
+            alone = with_drive_states(system, drive)
+            rest = replace(drive, amplitude=0.0, shape=SINE, second=None)
+        tabulated = fast and self._modal is None and alone.size <= MOST_STATES
+        self._tabulated = TabulatedModes(alone, rest) if tabulated else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
-        alone = zip(system.displacement, system.state_in, strict=True)
-        self.orders = system.orders or drive.orders
-        self._watched = [row for row, state in alone if state is None]
+        rows = zip(system.displacement, system.state_in, strict=True)
+        self._watched = [row for row, state in rows if state is None]
         self._tables = self._room(4, 2)
         self._budget: Budget | None = None
 
@@ -285,10 +293,13 @@ class Flow:
             cursor = np.array([modes.number(key), 0, measure, 0], dtype=np.int64)
         except ArithmeticError:
             return None
-        log, met = self._log(x, stretches, room), np.zeros(1, dtype=np.int64)
+        more = 2 * len(self._waves)  # at a strobe each has a sine of 0 and a cosine of 1
+        driven = np.concatenate([x, np.arange(more) % 2])
+        phi = np.concatenate([phi, np.zeros((more if phi.size else 0, phi.shape[1]))])
+        log, met = self._log(driven, stretches, room), np.zeros(1, dtype=np.int64)
         undecided = np.zeros(1)
         trail = RunTrail(log.extremes, log.graze, undecided, log.when, log.at, log.stop, met)
-        anchor = working_modes.anchors(points)
+        anchor = working_modes.anchors(points, self._waves)
 
         def advance(part: slice, start: Array) -> int:
             strobes = log.strobes[part.start : part.stop + 1]
@@ -317,7 +328,7 @@ class Flow:
                 log.extremes[:], log.graze[:] = [np.inf, -np.inf], np.inf
 
         chunk = stretches if measure else self._chunk() * points
-        before = phi.copy()
+        before = phi[: len(x)].copy()
         code, done = self._in_chunks(advance, log, cursor, chunk, points)
         if code == kernel_orbit.LEFT:
             if not modes.look_closely():
@@ -333,11 +344,19 @@ class Flow:
             log.tangencies[0] = int(undecided[0])
         else:
             log.graze[:] = np.inf
+        if more:
+            n = len(x)
+            log = log._replace(
+                strobes=log.strobes[:, :n].copy(),
+                at=log.at[:, :n],
+                extremes=np.delete(log.extremes, np.s_[n : n + more], axis=0),
+            )
+            phi = phi[:n]
         return self._result(code, log, done, int(met[0]), modes.targets.keys[int(cursor[0])], phi)
 
     def _log(self, x: Array, stretches: int, room: int) -> Log:
-        """Room for what a run writes; the fast paths write a part of it."""
-        n, c = self.system.size, len(self.system.clearances)
+        """Room for what a run from x (n,) writes; the fast paths write a part of it."""
+        n, c = len(x), len(self.system.clearances)
         log = Log(
             strobes=np.empty((stretches + 1, n)),
             impacts=np.zeros((stretches, c, 2), dtype=np.int64),

@@ -564,7 +564,8 @@ def advance(
 
     cursor : (4,) mode (-1: the one that holds at x) and stretches done, both written, 1 to measure,
     and on UNKNOWN_MODE the guard of the mode beyond which there is none yet. anchor : (stretches a
-    period, 2) the drive's sine and cosine at the start of each. impacts : (stretches, 2 C) lower
+    period, 2 + w) the drive's sine and cosine at the start of each, then the last w states, which
+    are waves of it. impacts : (stretches, 2 C) lower
     and upper of each clearance, added to. phi : (n, k) tangent vectors, (0, 0) for none.
     """
     n, unit, far = len(driven.unit), driven.unit, driven.far
@@ -652,6 +653,8 @@ def advance(
             done += 1
             here = done % anchor.shape[0]
             data[NOW + n], data[NOW + n + 1] = anchor[here, 0], anchor[here, 1]
+            for j in range(2, anchor.shape[1]):
+                data[NOW + n + j - anchor.shape[1]] = anchor[here, j]
             for i in range(n):
                 strobes[done, i] = data[NOW + i]
                 if measure:

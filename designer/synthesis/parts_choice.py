@@ -326,6 +326,8 @@ class _Search:
         free = FREES.get(missed.short.what, "a wider choice of parts")
         if guilty:
             free += "; or circuit.side_conditions without " + " or ".join(guilty)
+        if self.order.spec.most_values is not None and missed.short.what != "distinct values":
+            free += "; or raise circuit.most_values: with few values anything may bind"
         # Conditions that were made narrower on the way shut out choices that the file allows.
         whole = missed.short.whole and not missed.broken
         searched = "" if whole else " within the search's count of steps"

@@ -144,7 +144,7 @@ def test_the_flow_under_a_shape_is_the_integrator_s() -> None:
     """Its stop moves with the drive too: the guards see the shape."""
     drive = Drive(0.9, 1.3, 0.1, SHAPE)
     flow, start = Flow(moving_stop(), drive), np.array([0.2, -0.1])
-    assert flow.kernel == "general"
+    assert flow.kernel == "tabulated"
     run = flow.run(start, 3, points=200, measure=True)
     times = np.arange(601) / 200 * drive.period
     wanted = by_integrator(drive, start, times)
@@ -152,6 +152,23 @@ def test_the_flow_under_a_shape_is_the_integrator_s() -> None:
     assert run.counts.sum() == 3
     late = flow.to_strobe(wanted[50], 0.5 * np.pi)
     assert np.abs(late.strobes[-1] - wanted[200]).max() < 1e-8
+
+
+@pytest.mark.parametrize("points", [1, 7])
+def test_the_fast_path_under_a_shape_is_the_general_kernel(points: int) -> None:
+    """Tangents, impacts, extremes and misses too, of a stop that moves with the drive."""
+    drive, start = Drive(0.9, 1.3, 0.1, SHAPE), np.array([0.2, -0.1])
+    fast, general = (
+        Flow(moving_stop(), drive, fast=fast).run(
+            start, 12, points=points, tangent=np.eye(2), measure=True
+        )
+        for fast in (True, False)
+    )
+    assert fast.counts.tolist() == general.counts.tolist()
+    assert fast.impacts.time == pytest.approx(general.impacts.time, abs=1e-10)
+    for name in ("strobes", "tangent", "extremes", "spans", "graze"):
+        np.testing.assert_allclose(getattr(fast, name), getattr(general, name), atol=1e-9)
+    np.testing.assert_allclose(fast.impacts.velocity, general.impacts.velocity, atol=1e-9)
 
 
 def test_turning_points_see_the_shape() -> None:

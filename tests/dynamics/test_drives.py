@@ -90,8 +90,7 @@ def test_any_phases_and_harmonics_against_a_tight_integrator(seed: int) -> None:
     found = by_newton(waves, base, omega, periods * flow.drive.period, start + ground)
     np.testing.assert_allclose(run.strobes[-1] + ground, found[-1], atol=3e-8)
     assert run.counts.sum() > 0
-    harmonics = any(n > 1 for _, n, _, _ in waves)
-    assert flow.kernel == ("general" if harmonics else "tabulated")
+    assert flow.kernel == "tabulated"
 
 
 @pytest.mark.parametrize("seed", [1, 4])

@@ -13,6 +13,7 @@ import pytest
 from designer.base.errors import InputError, Unreachable
 from designer.catalog.parts_catalog import load_catalog
 from designer.circuit.design import Design
+from designer.linear_network.linear_terms import Shortfall
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model import Dimensionless
@@ -232,6 +233,17 @@ def test_a_limit_on_distinct_values_is_kept_or_refused_by_name() -> None:
     assert kinds(synthesise(PAPER, replace(E12, most_values=most), CATALOG, PEAKS)) <= most
     with pytest.raises(Unreachable, match="distinct values"):
         synthesise(PAPER, replace(E12, most_values=3), CATALOG, PEAKS)
+
+
+def test_a_refusal_beside_a_limit_on_values_names_the_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With few values left the stage of a clearance may fail for any reason."""
+    missed = parts_choice._Missed(Shortfall("stop slope", False))
+    monkeypatch.setattr(parts_choice._Search, "best", lambda *_: missed)
+    for most, match in ((9, "raise circuit.most_values"), (None, "finer series$")):
+        with pytest.raises(Unreachable, match=match):
+            synthesise(PAPER, replace(E12, most_values=most), CATALOG, PEAKS)
 
 
 def test_preferred_values_are_used_more() -> None:
