@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from importlib import import_module
 
 from designer.base.frames import table_html
 from designer.base.progress import doing, note, seeking
@@ -18,6 +17,7 @@ from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.dead_zone_parts import stage_kind
 from designer.circuit.design import Design, settings
+from designer.linear_network.milp import import_cvxpy
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import ModelResponse, find, need_found, peaks
 from designer.model.model_file import ModelFile, errors_in
@@ -129,7 +129,7 @@ def responses_of(
         doing("responses of the model")
         found = None
         if ahead is not None:
-            import_module("cvxpy")  # takes a second, and the parts need it: better now than idle
+            import_cvxpy()  # the parts need it: better now than idle
             found = ahead()
         found = found or find(modelfile.model, modelfile.responses)
         if all_found:

@@ -12,11 +12,15 @@ quasi-periodic, weakly chaotic, or not settled.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
+from designer.base import jit
 from designer.base.arrays import Array
+from designer.base.atomic_write import NotWritten, appearing
 from designer.dynamics import step_budget
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
@@ -420,11 +424,31 @@ def _outgrown(orbit: Orbit, periods: int) -> Orbit:
 def starts(scale: Array, count: int, seed: int = 0, first: Array | None = None) -> Array:
     """(count, n) initial states: rest, or ``first``, then a scrambled Sobol set in the box
     ± scale."""
-    from scipy.stats import qmc
-
-    box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
+    box = _sobol(len(scale), max(1, 1 << (count - 1).bit_length()), seed)
     rest = np.zeros(len(scale)) if first is None else first
     return np.vstack([rest, scale * (2.0 * box - 1.0)])[:count]
+
+
+def _sobol(size: int, count: int, seed: int) -> Array:
+    """(count, size) points of a scrambled Sobol set in [0, 1).
+
+    Those of seed 0 are kept beside the compiled kernels: most models take less time to find a
+    response than SciPy's statistics to import.
+    """
+    folder = jit.CACHE if seed == 0 else None
+    kept = None if folder is None else folder / f"sobol-{scipy.__version__}-{size}-{count}.npy"
+    if kept is not None:
+        with suppress(OSError, ValueError, EOFError):
+            known = np.load(kept)
+            if known.shape == (count, size):
+                return np.asarray(known)
+    from scipy.stats import qmc
+
+    points = np.asarray(qmc.Sobol(size, seed=seed).random(count))
+    if kept is not None:
+        with suppress(NotWritten), appearing(kept) as partial, partial.open("wb") as file:
+            np.save(file, points)
+    return points
 
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:

@@ -26,7 +26,10 @@ ROUNDING = 1e-9
 
 def wave(shape: Shape, angle: Array) -> Array:
     """(k,) the shape at angles ωt (k,)."""
-    terms = (sine * np.sin(n * angle) + cosine * np.cos(n * angle) for n, sine, cosine in shape)
+    terms = (
+        sine * np.sin(n * angle) + (cosine * np.cos(n * angle) if cosine else 0.0)
+        for n, sine, cosine in shape
+    )
     return np.asarray(sum(terms, np.zeros_like(angle)))
 
 

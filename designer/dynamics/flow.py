@@ -424,9 +424,11 @@ class Flow:
     def _impacts(self, log: Log, met: int) -> Impacts:
         """The impacts in the log, with their velocities."""
         when, at, stop = log.when[:met], log.at[:met], log.stop[:met]
-        rates = np.column_stack([at, self.drive.rate_at(self.drive.omega * when)])
-        rows = np.array(self.system.velocity)[stop[:, 0]] if met else np.zeros(rates.shape)
-        return Impacts(when, stop[:, 0], stop[:, 1], (rates * rows).sum(axis=1), at)
+        velocity = np.zeros(0)
+        if met:
+            rates = np.column_stack([at, self.drive.rate_at(self.drive.omega * when)])
+            velocity = (rates * np.array(self.system.velocity)[stop[:, 0]]).sum(axis=1)
+        return Impacts(when, stop[:, 0], stop[:, 1], velocity, at)
 
     def _spans(self, extremes: Array) -> Array:
         """(clearances, 2) extremes of the displacements among what was watched."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +29,41 @@ NODES = 3000
 answers do not depend on time."""
 PRICE_WEIGHT = 1e-3
 """Of one price class against one distinct value: price only breaks ties."""
+STATISTICS = "scipy.stats"
+
+
+class _Deferred(ModuleType):
+    """A module, or something of one, that is imported when it is called or something is asked of
+    it that it has."""
+
+    def __init__(self, module: str, name: str = "") -> None:
+        super().__init__(module)
+        self._of = module, name
+
+    def __getattr__(self, name: str) -> Any:
+        module, own = self._of
+        if name.startswith("__"):  # what an import looks for
+            raise AttributeError(name)
+        return getattr(self._real, name) if own else _Deferred(module, name)
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self._real(*arguments, **named)
+
+    @property
+    def _real(self) -> Any:
+        module, name = self._of
+        return getattr(import_module(module), name)
+
+
+def import_cvxpy() -> None:
+    """Import cvxpy without SciPy's statistics, which take four times as long as all else of it:
+    one of its atoms calls one function of theirs."""
+    known = sys.modules.setdefault(STATISTICS, _Deferred(STATISTICS))
+    try:
+        import_module("cvxpy")
+    finally:
+        if isinstance(known, _Deferred):
+            del sys.modules[STATISTICS]
 
 
 def chosen_row(choice: cp.Variable) -> int | None:

@@ -15,7 +15,7 @@ begins and the voltages of their integrators have a corner there: a peak just th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +45,8 @@ RESOLUTION = 0.1
 LEAST_POINTS, MOST_POINTS = 64, 16384
 """Strobes a drive period: of the first look at the modes, and at most."""
 NEAR = 0.02
-"""A peak this near to the largest, over the span, is refined too, since it may be the larger
-one."""
+"""A peak this near to the largest of all runs so far, over the span of its own, is refined too,
+since it may be the larger one."""
 BRACKET, ROUNDS = 16, 4
 """Parts of a bracket, and how often the best one is divided again."""
 WALK = 64
@@ -143,7 +143,8 @@ def over(
     best: dict[tuple[str, str], tuple[float, str]] = {}
     for run in wanted:
         try:
-            extremes = Sampled(reduction, run).extremes()
+            so_far = {key: value for key, (value, _) in best.items()}
+            extremes = Sampled(reduction, run).extremes(so_far)
         except ArithmeticError as error:
             missing[run.name] = str(error)
             continue
@@ -183,18 +184,21 @@ class Sampled:
             fastest = max(self.flow.fastest, *rates)
             needed = min(int(np.ceil(run.drive.period * fastest / resolution)), MOST_POINTS)
 
-    def extremes(self) -> dict[tuple[str, str], float]:
+    def extremes(self, known: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
         """The extremes of each section: -lowest and highest voltage, largest current out of and
-        into the output."""
+        into the output.
+
+        known : those of other runs; one that is well inside them is that of the strobes.
+        """
         names = [
             (s.name, quantity)
             for s in self.reduction.circuit.sections
             for quantity in ("low", "high", "source", "sink")
         ]
         values = self._outputs()
-        which, left, right = _brackets(values)
+        which, left, right = _brackets(values, np.array([known.get(n, -np.inf) for n in names]))
         best, row = values.max(axis=0), np.arange(len(which))
-        for _ in range(ROUNDS):
+        for _ in range(ROUNDS if len(which) else 0):
             time = left[:, None] + (right - left)[:, None] * np.linspace(0.0, 1.0, BRACKET + 1)
             x, angle = self._between(time.ravel())
             at = modes_at(self.flow, x, angle, self.keys)
@@ -287,18 +291,21 @@ class Sampled:
         return cubic, self._angle(steps)
 
 
-def _brackets(values: Array) -> tuple[Index, Array, Array]:
-    """Where a quantity (columns) may have its largest value: column, left and right strobe."""
+def _brackets(values: Array, known: Array) -> tuple[Index, Array, Array]:
+    """Where a quantity (columns) may have its largest value: column, left and right strobe.
+    known : (columns,) a value that it has elsewhere."""
     top = values.max(axis=0)
-    floor = top - NEAR * (top - values.min(axis=0))
+    floor = np.maximum(top, known) - NEAR * (top - values.min(axis=0))
+    own = np.flatnonzero(top >= floor)
+    values, floor = values[:, own], floor[own]
     inner = np.pad(values, ((1, 1), (0, 0)), constant_values=-np.inf)
     local = (values >= inner[:-2]) & (values >= inner[2:]) & (values >= floor)
     # A flat top, such as a limit that is reached, is one candidate, not a thousand.
     local[1:] &= values[1:] > inner[:-2][1:]
-    local[np.argmax(values, axis=0), np.arange(values.shape[1])] = True
+    local[np.argmax(values, axis=0), np.arange(len(own))] = True
     at, which = np.nonzero(local)
     last = len(values) - 1
-    return which, np.maximum(at - 1, 0).astype(float), np.minimum(at + 1, last).astype(float)
+    return own[which], np.maximum(at - 1, 0).astype(float), np.minimum(at + 1, last).astype(float)
 
 
 def modes_at(flow: Flow, x: Array, angle: Array, keys: list[ModeKey]) -> Index:

@@ -20,6 +20,7 @@ from designer.synthesis.equal_parts import EqualParts, with_equal_parts
 from designer.synthesis.saturating_tables import (
     MOST_SHIFT,
     TABLES,
+    Dividers,
     SaturatingTables,
     SearchBox,
     bias,
@@ -247,13 +248,13 @@ def size(
     resistors that only set a level [ohm]."""
     if target.shift[0] >= MOST_SHIFT:
         return "dead-zone bias"
-    so_far = _Found(None, 0.0, "stop slope")
+    so_far, dividers = _Found(None, 0.0, "stop slope"), Dividers()
     stages = _stages(target, resistors, base, ranking.free, equal)
     for number, stage in enumerate(stages, start=1):
         doing(f"dead zone, tables {number}")
         if stage.rescue and so_far.best is not None:
             break
-        so_far = _search(target, stage, equal, ranking.free | {base}, so_far)
+        so_far = _search(target, stage, equal, ranking.free | {base}, so_far, dividers)
         if so_far.best is not None and so_far.error <= max(so_far.bound, 0.0) + EXACT:
             break
         if so_far.best is not None and stage.whole:
@@ -279,15 +280,17 @@ def _search(
     equal: EqualParts,
     free: frozenset[float],
     so_far: _Found,
+    dividers: Dividers,
 ) -> _Found:
-    """One stage, for every value of the parts that are equal across tables."""
+    """One stage, for every value of the parts that are equal across tables. dividers : as of
+    ``tables``."""
     best, binding, bound = so_far.best, so_far.binding, np.inf
     for lists in with_equal_parts(stage.lists, equal, TABLES):
         if lists is None:
             bound = 0.0
             break
         level = LAST_LEVEL if best is None else best[1].error
-        t = tables(target, lists, equal, stage.box, free, level)
+        t = tables(target, lists, equal, stage.box, free, level, dividers)
         why = t.empty()
         if why is not None:
             binding = why if best is None else binding

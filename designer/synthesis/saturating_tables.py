@@ -53,6 +53,8 @@ TABLES = (
     ("R200", "R211", "R212"),
 )
 """Parts of each table."""
+Dividers = dict[tuple[bool | bytes, ...], ValueTable]
+"""Tables of R204, R205 and R208 by whether noise counts, and the values of each."""
 
 
 def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, float]:
@@ -261,9 +263,13 @@ def tables(
     box: SearchBox,
     free: frozenset[float],
     level: float = np.inf,
+    dividers: Dividers | None = None,
 ) -> SaturatingTables:
     """The tables of these lists. Of rows with the same logarithm, that with the fewest values that
-    are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``."""
+    are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``.
+
+    dividers : those of the same groups and free values; what is missing is added.
+    """
     noisy = bool(np.isfinite(box.noise_gain))
     right = combinations(("R210", "R50"), lists, equal.group)
     right = right.take(inside(right["R50"], box.stop))
@@ -291,16 +297,28 @@ def tables(
         right,
         first,
         fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
-        combinations(("R204", "R205", "R208"), lists, equal.group),
+        _divider(lists, equal, noisy, free, {} if dividers is None else dividers),
         shift,
     )
     loud = t.left["R209"] if noisy else None
-    light = source_resistance(t.divider.columns) if noisy else None
-    return replace(
-        t,
-        left=fewest_of_each(t.left, t.left_logs, free, loud),
-        divider=fewest_of_each(t.divider, t.divider_logs, free, light),
-    )
+    return replace(t, left=fewest_of_each(t.left, t.left_logs, free, loud))
+
+
+def _divider(
+    lists: Mapping[str, Array],
+    equal: EqualParts,
+    noisy: bool,
+    free: frozenset[float],
+    known: Dividers,
+) -> ValueTable:
+    """Rows of R204, R205 and R208."""
+    names = "R204", "R205", "R208"
+    key = (noisy, *(lists[name].tobytes() for name in names))
+    if key not in known:
+        every = combinations(names, lists, equal.group)
+        light = source_resistance(every.columns) if noisy else None
+        known[key] = fewest_of_each(every, np.log(divider(every.columns)), free, light)
+    return known[key]
 
 
 def _left(

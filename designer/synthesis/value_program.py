@@ -227,4 +227,6 @@ def _solve(
 def fewest(rows: TableRows, free: frozenset[float], most: int) -> Index:
     """Places of the ``most`` rows with the fewest new values, then the smallest error."""
     count = new_values(rows.table.values, free)
-    return np.lexsort((rows.error, count))[:most]
+    enough = np.partition(count, most - 1)[most - 1] if most < len(count) else np.inf
+    few = np.flatnonzero(count <= enough)
+    return np.asarray(few[np.lexsort((rows.error[few], count[few]))[:most]])

@@ -113,11 +113,12 @@ def how_many_between(table: Array, low: Array, high: Array) -> Index:
 
 def new_values(values: Array, free: frozenset[float]) -> Index:
     """(rows,) how many different values each row has that are not free."""
-    known = np.isin(values, np.array(sorted(free), dtype=float))
-    # Free values become one common value, which is not counted.
-    ordered = np.sort(np.where(known, 0.0, values), axis=-1)
-    kinds = 1 + (np.diff(ordered, axis=-1) > 0.0).sum(axis=-1)
-    return np.asarray(kinds - known.any(axis=-1))
+    columns = np.ascontiguousarray(np.moveaxis(values, -1, 0))  # row by row takes twice as long
+    fresh = ~np.isin(columns, np.array(sorted(free), dtype=float))
+    for k, column in enumerate(columns):
+        for before in columns[:k]:
+            fresh[k] &= column != before
+    return np.asarray(fresh.sum(axis=0))
 
 
 def fewest_of_each(

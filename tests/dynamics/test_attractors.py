@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import brentq
+from scipy.stats import qmc
 
+from designer.base import jit
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.attractors import (
@@ -397,6 +400,21 @@ def test_starts_are_rest_and_then_the_box() -> None:
     assert len(np.unique(states, axis=0)) == 16
     assert np.array_equal(states, starts(scale, 16))
     assert (np.abs(states[1:]).max(axis=0) > 0.5 * scale).all()
+
+
+def test_kept_starts_are_those_that_scipy_draws(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drawn and kept, read, drawn again where the file is no table, and where none can be kept."""
+    box = 2.0 * qmc.Sobol(3, seed=0).random(8) - 1.0
+    monkeypatch.setattr(jit, "CACHE", tmp_path)
+    for content in (None, None, b"", b"no table"):
+        for kept in tmp_path.iterdir() if content is not None else ():
+            kept.write_bytes(content or b"")
+        np.testing.assert_array_equal(starts(np.ones(3), 8)[1:], box[:7])
+        assert len(list(tmp_path.iterdir())) == 1
+    monkeypatch.setattr(jit, "CACHE", tmp_path / "gone")
+    np.testing.assert_array_equal(starts(np.ones(3), 8)[1:], box[:7])
 
 
 @settings(max_examples=10)

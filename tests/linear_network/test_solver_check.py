@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
+import textwrap
 from typing import Any
 
 import cvxpy as cp
@@ -45,3 +48,30 @@ def test_a_wrong_answer_is_said(monkeypatch: pytest.MonkeyPatch, wrong: float | 
     assert f"answers wrongly (optimal, {wrong}; right is 9)" in words
     assert "2x + 3z" in words
     assert "highspy>=1.15" in words
+
+
+def test_cvxpy_comes_without_statistics() -> None:
+    """Of SciPy's, which come once the atom that needs them has a value: relative entropy of two
+    matrices with the same eigenvectors is that of their eigenvalues."""
+    script = textwrap.dedent(
+        """
+        import sys
+        import numpy as np
+        from designer.linear_network.milp import import_cvxpy
+
+        import_cvxpy()
+        assert "scipy.stats" not in sys.modules
+        import cvxpy as cp
+
+        p, q = np.array([0.25, 0.75]), np.array([0.5, 0.5])
+        value = cp.quantum_rel_entr(np.diag(p), np.diag(q)).value
+        assert abs(value - (p * np.log(p / q)).sum()) < 1e-9, value
+        from scipy.stats import norm
+
+        assert norm.cdf(0.0) == 0.5
+        """
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

@@ -111,6 +111,17 @@ def test_finer_strobes_do_not_change_the_extremes(
     assert (found[:, 2] - plain[:, 2]).min() > -1e-6 * scale[2]
 
 
+def test_runs_together_have_the_extremes_of_each() -> None:
+    """A peak well inside that of a run before it is not refined, in whichever order they come."""
+    reduction = Reduction(circuit_of(EXACT), uneven())
+    runs = [*wanted(reduction, 1.55), *wanted(reduction, 0.85)]
+    each = np.array([figures(output_loads.over(reduction, [run])) for run in runs])
+    lowest, highest = each.min(axis=0), each.max(axis=0)
+    for some in (runs, runs[::-1]):
+        found = figures(output_loads.over(reduction, some))
+        np.testing.assert_array_equal(found, np.column_stack([lowest[:, 0], highest[:, 1:]]))
+
+
 def test_a_section_at_its_limit_shows_its_rail() -> None:
     board = uneven()
     reduction = Reduction(circuit_of(EXACT), board)
