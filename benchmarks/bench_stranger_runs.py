@@ -109,7 +109,8 @@ def _study(answer: Row) -> dict[str, Any]:
 
 
 def _yield(response: Row) -> dict[str, Any]:
-    names = ("model", "circuit", "ngspice", "engines_agree", "rate", "reasons", "agreement")
+    names = ["model", "circuit", "ngspice", "engines_agree", "rate", "reasons", "agreement"]
+    names += ["limited_by"] if "limited_by" in response else []
     trust = response.get("trust") or {}
     doubts = {part: said["reasons"] for part, said in trust.items() if not said["trusted"]}
     return {name: response.get(name) for name in names} | {"doubts": doubts}
@@ -206,6 +207,14 @@ def _reached(row: Row) -> bool:
     return "responses" in row and all((r["rate"] or 0) >= WANTED for r in row["responses"])
 
 
+def _limits(row: Row) -> Iterator[str]:
+    """What limits the responses that a search leaves below the wanted yield; warnings."""
+    for response in row.get("responses", ()):
+        if response.get("limited_by") and (response["rate"] or 0.0) < WANTED:
+            yield response["limited_by"]["line"]
+    yield from row.get("warnings", [row.get("said", "")])
+
+
 def _words(row: Row) -> str:
     rate = [r["rate"] for r in row.get("responses", ())]
     said = "; ".join(causes(row)) if "equations" in row else row.get("said", "")
@@ -285,9 +294,8 @@ def report(rows: Sequence[Row], searches: Sequence[Row], seed: int) -> str:
             f"time, and {f['reached']} reach a yield of {100 * WANTED:g} %."
         ),
         "",
-        *table([*columns, "warnings"],
-               [[*_cells(row), "; ".join(row.get("warnings", [row.get("said", "")]))]
-                for row in searches]),
+        *table([*columns, "what limits a yield below it, warnings"],
+               [[*_cells(row), "; ".join(_limits(row))] for row in searches]),
         ]  # fmt: skip
     return "\n".join(lines) + "\n"
 

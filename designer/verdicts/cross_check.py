@@ -3,8 +3,8 @@
 On a sample's *own* orbit of the exact circuit ngspice only has to stay there; from the *nominal*
 design's orbit it finds its way itself, which makes it a verdict of its own. Boards are independent
 draws from (seed, index), so the first `SUBSET` are a random subset, and the same one however many
-follow. Of it the first are asked, and every slow one, since these are few and differ most; so are
-the boards nearest to losing the response.
+follow. Of it the first are asked, and every slow one, since these are few and differ most, as long
+as their ways are not too long together; so are the boards nearest to losing the response.
 """
 
 from __future__ import annotations
@@ -34,6 +34,14 @@ SUBSET = 200
 more. Every slow one of it starts from the nominal orbit as well."""
 BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
+UNKNOWN_PERIODS = 20
+"""Drive periods for a sample without a period: 64 more follow, in which none must be found."""
+MOST_PERIODS, MOST_STEPS = 4000, 2_000_000
+"""Longest way to an attractor that ngspice is sent, in drive periods and in its own steps (a
+minute on a circuit of four masses); beyond either a sample is left out by name."""
+STEPS_EACH = 200_000
+"""Steps of a run from the nominal orbit, on average: where the ways of many boards are longer,
+fewer of the random subset are asked."""
 UNDECIDED = "undecided"
 """The answer where the last two step sizes give different responses: it is not resolved."""
 OR = " or "
@@ -192,6 +200,48 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
         elif a.sample < SUBSET and a.radius > SLOW:
             asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.SLOW))
     return asks
+
+
+def least_way(n: int, radius: float) -> float:
+    """Drive periods from the nominal orbit to an attractor of period n, at least: 5n/(1 - ρ),
+    rounded up; inf for an unstable one."""
+    if n == 0:
+        return UNKNOWN_PERIODS
+    return math.ceil(5.0 * n / (1.0 - radius)) if radius < 1.0 else math.inf
+
+
+def longest_way(question: Question) -> float:
+    """Drive periods of the longest way that ngspice is sent."""
+    return min(MOST_PERIODS, MOST_STEPS // max(question.steps, 1.0))
+
+
+def affordable(
+    asks: Iterable[Ask],
+    answers: Iterable[Answer],
+    questions: Sequence[Question],
+    boards: int = NOMINAL_SAMPLES,
+) -> list[Ask]:
+    """The first of these asks, by sample, whose runs from the nominal orbit take no more than
+    `STEPS_EACH` steps for each of so many boards of a question, about; all from their own orbit.
+
+    So slow boards whose ways are long stay a random part of the slow ones.
+    """
+    mine = {(a.sample, a.question): a for a in answers}
+    left = [float(STEPS_EACH * boards)] * len(questions)
+    kept = []
+    for ask in asks:
+        if ask.kind is StartKind.NOMINAL:
+            left[ask.question] -= _steps(mine[ask.sample, ask.question], questions[ask.question])
+        if ask.kind is StartKind.OWN or left[ask.question] >= 0.0:
+            kept.append(ask)
+    return kept
+
+
+def _steps(answer: Answer, question: Question) -> float:
+    """Steps of a board's run from the nominal orbit, at least; 0 where its way is too long."""
+    counts = read_counts(name_in_ngspice(answer.response))
+    way = least_way(0 if counts is None else counts.n, answer.radius)
+    return way * question.steps if way <= longest_way(question) else 0.0
 
 
 def ask_boundary(

@@ -32,25 +32,23 @@ from designer.spice.read_orbit import Read, name_in_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_circuit
 from designer.verdicts.cross_check import (
+    MOST_PERIODS,
     OR,
     UNDECIDED,
     Ask,
     CrossCheck,
     StartKind,
     is_answer,
+    least_way,
+    longest_way,
 )
 from designer.verdicts.verdict import StudyPlan
 
 T = TypeVar("T")
 
-UNKNOWN_PERIODS = 20
-"""Drive periods for a sample without a period: 64 more follow, in which none must be found."""
 REMAINDER = 5e-4
 """How near its attractor a trajectory has arrived, over the peak: a quarter of the strobe
 tolerance."""
-MOST_PERIODS = 4000
-"""Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
-out by name."""
 MOST_AGAIN = 4 * MOST_PERIODS
 """Longest run that is made again, in drive periods at the step of the first; a quarter of the step
 counts four times."""
@@ -205,8 +203,9 @@ def _queries(
         if ask.kind is StartKind.NOMINAL:
             flow = Flow(subject.system, subject.excitation.drive)
             way = periods_to_settle(flow, question.start.start, subject.orbit)
-            if way > MOST_PERIODS:
-                yield ask, _too_long(ask, way)
+            most = longest_way(question)
+            if way > most:
+                yield ask, _too_long(ask, way, most)
                 continue
             subject = replace(subject, start=question.start.start, discard=int(way))
             halvings = refinements
@@ -233,38 +232,32 @@ def _subjects(
 
 
 def way_to_fidelity(orbit: Orbit) -> int:
-    """Drive periods from the exact circuit's orbit to that of another fidelity: n·5/(1 - ρ)."""
-    if orbit.n == 0:
-        return UNKNOWN_PERIODS
-    way = orbit.n * 5.0 / (1.0 - orbit.radius) if orbit.radius < 1.0 else math.inf
-    return math.ceil(min(max(way, numerics_gate.DISCARD), numerics_gate.MOST_DISCARDED))
+    """Drive periods from the exact circuit's orbit to that of another fidelity."""
+    way = least_way(orbit.n, orbit.radius)
+    return int(min(max(way, numerics_gate.DISCARD), numerics_gate.MOST_DISCARDED))
 
 
-def _too_long(ask: Ask, way: float) -> CrossCheck:
+def _too_long(ask: Ask, way: float, most: float) -> CrossCheck:
     needed = f"{way:.0f} drive periods" if math.isfinite(way) else "more than can be said"
-    reason = f"too long a way from the nominal orbit: {needed}, at most {MOST_PERIODS} are run"
+    reason = f"too long a way from the nominal orbit: {needed}, at most {most:.0f} are run"
     return _row(ask, NgspiceAnswer("", reason), 0)
 
 
 def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
     """Drive periods from ``start`` (states,) to the attractor ``orbit``.
 
-    At least n · 5/(1 - ρ), rounded up, and until every later strobe of the exact trajectory is
+    At least ``least_way``, and until every later strobe of the exact trajectory is
     within `REMAINDER` of a strobe of the orbit; "later" ends when the trajectory has stayed there
     for that least number again, or for `STRETCH`. More than `MOST_PERIODS`, possibly inf, where the
     way is longer than that.
     """
-    if orbit.n == 0:
-        return UNKNOWN_PERIODS
-    if not orbit.radius < 1.0:
-        return math.inf
-    least = math.ceil(orbit.n * 5.0 / (1.0 - orbit.radius))
-    if least > MOST_PERIODS:
+    least = least_way(orbit.n, orbit.radius)
+    if orbit.n == 0 or least > MOST_PERIODS:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0
     peak = orbit.coarse_peaks
-    stay = max(STRETCH, least)
+    stay = max(STRETCH, int(least))
     while periods - arrived < stay:
         if arrived > MOST_PERIODS:
             return math.inf

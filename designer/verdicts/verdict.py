@@ -58,6 +58,13 @@ class Question:
         return self.spec.omega
 
     @property
+    def steps(self) -> float:
+        """Steps of ngspice a drive period; 0 where it is not asked."""
+        if self.settings is None:
+            return 0.0
+        return 1.0 / (self.excitation.frequency * self.settings.max_step)
+
+    @property
     def periodic(self) -> bool:
         """Whether an n-p-q is wanted: only such a response has an orbit that can be followed."""
         return self.wanted.periodic

@@ -21,7 +21,7 @@ from designer.base.arrays import Array, Index
 from designer.base.threads import parallel
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
-from designer.circuit.ensemble import Ensemble
+from designer.circuit.ensemble import BRIEF, Ensemble
 from designer.circuit.netlist import Circuit
 from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, functions
 from designer.dynamics.flow import Flow
@@ -267,6 +267,7 @@ def crossings(
 ) -> list[Crossing]:
     """The crossing of each of these (question, sample), along the attractor.
 
+    A share of the way is a trial: what it leads to, if not to the response, is not asked.
     progress : called ``ROUNDS`` times for each.
     """
     size = len(lost)
@@ -286,7 +287,7 @@ def crossings(
             (i, q, q.excitation, orbits[k].start)
             for i, (k, q) in enumerate(zip(going, questions_left, strict=True))
         ]
-        rows = settled(ensemble, cases, jobs, progress)
+        rows = settled(ensemble, cases, jobs, progress, within=BRIEF)
         for k, at, (orbit, verdict, _) in zip(going, share, rows, strict=True):
             if verdict is Verdict.OK:
                 inside[k], orbits[k] = at, orbit

@@ -20,7 +20,7 @@ RULES = {
     "tuned": 3,
     "reached": 3,
     "trimmed": 2,
-    "blame": 2,
+    "blame": 3,
     "maps": 1,
     "rare": 7,
     "checks": 2,
@@ -47,9 +47,10 @@ def study_hash(
         inputs["ngspice"] = {
             "refinements": [ngspice_runs.OWN_REFINEMENTS, ngspice_runs.NOMINAL_REFINEMENTS],
             "periods": [
-                ngspice_runs.UNKNOWN_PERIODS,
+                cross_check.UNKNOWN_PERIODS,
                 ngspice_runs.REMAINDER,
-                ngspice_runs.MOST_PERIODS,
+                cross_check.MOST_PERIODS,
+                cross_check.MOST_STEPS,
                 ngspice_runs.STRETCH,
                 ngspice_runs.LONG,
                 ngspice_runs.MOST_AGAIN,

@@ -482,7 +482,9 @@ class StudyWork:
     def _random(self, study: Study, nominal: int) -> list[Ask]:
         if self.engine == "ngspice":
             return cross_check.ask_all(study.answers)
-        return cross_check.ask_random(study.answers, nominal)
+        asks = cross_check.ask_random(study.answers, nominal)
+        questions = study.plan.questions
+        return cross_check.affordable(asks, study.answers, questions, nominal)
 
     def _with_all_checks(self, study: Study, nominal: int) -> Study:
         """The study with ngspice's answers about the boards at a boundary, which are known only

@@ -55,6 +55,12 @@ def test_what_is_wrong_is_listed_by_cause() -> None:
     assert (found["runs"], found["whole"], found["shown"], found["boards_routed"]) == (4, 2, 2, 2)
     assert found["yield_stated"] == 3
     assert (found["reached"], found["in_time"]) == (1, 1)
+    limit = {"limited_by": {"line": "grazing: contact 2"}}
+    below, above = {**SHOWN, **limit, "rate": 0.94}, {**SHOWN, **limit}
+    for response, said in ((below, True), (above, False)):
+        search = {**ROW, "responses": [response], "warnings": []}
+        text = bench_stranger_runs.report(rows, [search], 1)
+        assert ("grazing: contact 2" in text) is said
     text = bench_stranger_runs.report(rows, [], 1)
     assert "| no end within 900 s of CPU " in text
     assert "`search`" not in text.partition("## System by system")[2]

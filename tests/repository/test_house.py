@@ -76,16 +76,16 @@ REACH = {
     "new": 11_650,
     "simulate": 28_150,
     "bifurcation": 34_750,
-    "reproduce": 57_100,
+    "reproduce": 57_150,
     "rules": 53_850,
     "explore": 51_900,
-    "bench": 57_100,
-    "trade": 65_300,
+    "bench": 57_150,
+    "trade": 65_350,
     "export": 59_600,
     "synthesise": 55_800,
-    "run": 68_600,
-    "tolerance": 68_700,
-    "search": 73_800,
+    "run": 68_650,
+    "tolerance": 68_750,
+    "search": 73_850,
 }
 """Lines that each verb may import whenever it is called; fewer is better."""
 

@@ -24,8 +24,9 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed, SpiceJob
 from designer.spread.spread import draw
-from designer.verdicts import ngspice_runs
+from designer.verdicts import cross_check, ngspice_runs
 from designer.verdicts.cross_check import (
+    MOST_PERIODS,
     OR,
     UNDECIDED,
     Ask,
@@ -36,7 +37,6 @@ from designer.verdicts.cross_check import (
     is_answer,
 )
 from designer.verdicts.ngspice_runs import (
-    MOST_PERIODS,
     REMAINDER,
     NgspiceAnswer,
     Query,
@@ -344,7 +344,7 @@ def test_what_is_left_out_of_the_record_changes_nothing(pool: SpicePool) -> None
 def test_too_long_a_way_is_left_out_by_name(
     pool: SpicePool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ngspice_runs, "MOST_PERIODS", 3)
+    monkeypatch.setattr(cross_check, "MOST_PERIODS", 3)
     calls: list[int] = []
     p = asking()
     heard = cross_checks(p, both(range(1)), pool, 2, lambda: calls.append(1))

@@ -12,19 +12,23 @@ from designer.circuit.netlist import Excitation
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
+from designer.spice.deck import SolverSettings
 from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
+    STEPS_EACH,
     SUBSET,
     Ask,
     CrossCheck,
     StartKind,
     Why,
+    affordable,
     ask_all,
     ask_boundary,
     ask_differing,
     ask_random,
+    longest_way,
     margin_share,
 )
 from designer.verdicts.verdict import Answer, Question, Verdict
@@ -63,6 +67,27 @@ def test_the_random_subset_and_every_slow_one() -> None:
     }
     assert ask_random(answers[:60]) == [a for a in asks if a.sample < 60]
     assert ask_random([replace(BLANK, verdict=Verdict.FAILED)]) == []
+
+
+def test_where_ways_are_long_the_first_boards_are_asked() -> None:
+    """At 1000 steps a period 1 - ρ = 5/512 takes 512 000 steps: of 10 million 19 fit. Boards whose
+    way is too long are named at no cost; after the last that fits no quick one is asked."""
+    settings = SolverSettings("trap", 1.0 / (300.0 * 1000.0))
+    slow = replace(question(), settings=settings)
+    assert STEPS_EACH * NOMINAL_SAMPLES == 10_000_000
+    assert longest_way(slow) == pytest.approx(2000.0, abs=1.0)
+    radii = [1.0 - 5.0 / 4096.0] * 3 + [1.0 - 5.0 / 512.0] * 30 + [0.1] * 10
+    answers = [replace(BLANK, sample=i, radius=r) for i, r in enumerate(radii)]
+    asks = ask_random(answers)
+    kept = affordable(asks, answers, [slow])
+    nominal = [a.sample for a in kept if a.kind is StartKind.NOMINAL]
+    assert nominal == list(range(3 + 19))
+    assert [a for a in kept if a.kind is StartKind.OWN] == [
+        a for a in asks if a.kind is StartKind.OWN
+    ]
+    assert affordable(asks, answers, [question()]) == asks  # it is not asked at all
+    more = affordable(asks, answers, [slow], 2 * NOMINAL_SAMPLES)
+    assert len(more) > len(kept)
 
 
 def test_all_are_asked_where_all_are_wanted() -> None:

@@ -29,6 +29,7 @@ from designer.folders import model_source, study_json
 from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
+from designer.spice.deck import SolverSettings
 from designer.verdicts import exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
@@ -49,6 +50,7 @@ from tests.yields.test_loss_attribution import _Memory
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
 ROOT = Path(__file__).resolve().parents[2]
+SETTINGS = SolverSettings("trap", 1e-4)
 
 
 # ---------------------------------------------------------------------------------------------
@@ -140,7 +142,7 @@ def test_a_study_that_ngspice_keeps_wide_ends_and_says_so(monkeypatch: pytest.Mo
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
     p = plan(200)
-    one = replace(p.questions[0], settings=object())  # type: ignore[arg-type]
+    one = replace(p.questions[0], settings=SETTINGS)
     checked: Any = (None,)
     pool: Any = object()
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=0.04)
@@ -206,7 +208,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     p = plan(200)
     nominal = replace(p.questions[0].start, graze=np.ones((1, 2)))
     spec = replace(p.questions[0].spec, expect=None)
-    one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
+    one = replace(p.questions[0], spec=spec, start=nominal, settings=SETTINGS)
     pool: Any = object()
     work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
     checked: Any = (None,)
@@ -241,7 +243,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(60)
     spec = replace(p.questions[0].spec, expect=None)
-    questions = tuple(replace(p.questions[0], spec=spec, settings=object()) for _ in range(2))  # type: ignore[arg-type]
+    questions = tuple(replace(p.questions[0], spec=spec, settings=SETTINGS) for _ in range(2))
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
@@ -275,7 +277,7 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(200)
     questions = tuple(
-        replace(q, spec=replace(q.spec, expect=None), settings=object())  # type: ignore[arg-type]
+        replace(q, spec=replace(q.spec, expect=None), settings=SETTINGS)
         for q in (p.questions[0], p.questions[0])
     )
     pool: Any = object()
@@ -332,8 +334,7 @@ def test_only_runs_that_are_not_on_disk_are_announced(
 ) -> None:
     """60 runs a response: 10 from a board's own orbit, 50 from the nominal one."""
     p = plan(200)
-    setting: Any = object()
-    p = replace(p, questions=tuple(replace(q, settings=setting) for q in p.questions))
+    p = replace(p, questions=tuple(replace(q, settings=SETTINGS) for q in p.questions))
     store = BlockStore(
         tmp_path, NGSPICE, CrossCheck, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
     )
