@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import SAMPLES, StudyEngine
 from designer.base.design_folder import Folder
@@ -41,6 +41,9 @@ from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import LocalRunner
 from designer.yields.tolerance_study import check
 
+if TYPE_CHECKING:
+    from designer.answers.search_answer import SearchKeys
+
 CONFIRMATION = "confirmation.json"
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
@@ -67,11 +70,12 @@ def search_into(
     )
     confirmed, stood = _confirmed(final, out, options, progress)
     folder = Folder(out)
-    answer = RANDOM.answer(folder)
-    answer["search"] = {
-        k: v for k, v in folder.json(SEARCH).items() if k not in ("format", "provenance", "cost")
+    search = folder.json(SEARCH).items()
+    answer: SearchKeys = {
+        **RANDOM.answer(folder),
+        "search": {k: v for k, v in search if k not in ("format", "provenance", "cost")},
+        "confirmation": confirmed,
     }
-    answer["confirmation"] = confirmed
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
     satisfied = study.satisfied and all_confirmed(confirmed)

@@ -179,7 +179,7 @@ def _purpose(data: ReportData) -> str:
 def _not_good_enough(data: ReportData) -> PageSection:
     """What stands before everything else, where there is something."""
     heads = ("rule", "found", "limit", "what to do")
-    rows = ([rule[key] for key in ("id", "found", "limit", "do")] for rule in data.failed_rules)
+    rows = ([r["id"], r["found"], r["limit"], r["do"]] for r in data.failed_rules)
     failing = table(heads, rows)
     names = ", ".join(rule["id"] for rule in data.failed_rules)
     rules = PageSection("Design rules that fail", [failing], "", "", f"{names}.")

@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 from zlib import crc32
 
 import numpy as np
@@ -36,6 +36,9 @@ from designer.yields.loss_regions import (
 from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.worst_corner import LAST
 from designer.yields.yield_count import Yield
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import RareLossRow
 
 MOST_BOARDS = 40_000
 """Boards that the estimate may take, pilot rounds left out."""
@@ -158,9 +161,9 @@ class RareLosses:
         spread = (self.lost / self.low) ** (quantile / QUANTILE)
         return self.lost / spread, min(self.lost * spread, 1.0)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> RareLossRow:
         """Plain data for JSON; an undefined number is None."""
-        document: dict[str, Any] = plain({**asdict(self), "per_million": self.per_million})
+        document: RareLossRow = plain({**asdict(self), "per_million": self.per_million})
         return document
 
 

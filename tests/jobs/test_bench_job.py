@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -47,7 +48,8 @@ def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path)
     assert (
         json.loads((out / "bench.json").read_text("utf-8"))["records"] == (result.answer["records"])
     )
-    sure, open_ = result.answer["records"]
+    answer: Any = result.answer
+    sure, open_ = answer["records"]
     assert (sure["response"], sure["sure"], sure["wanted"]) == ("1-2-2", True, "1-2-2")
     assert sure["as_wanted"] is True
     assert sure["omega"] == pytest.approx(0.85, rel=3e-4)
@@ -145,7 +147,8 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
     first, second = result.answer["boards"]
     assert (first["board"], second["board"]) == ("A", "B")
     assert not first["doubtful"]
-    for board, record in zip((first, second), result.answer["records"], strict=True):
+    answer: Any = result.answer
+    for board, record in zip((first, second), answer["records"], strict=True):
         assert board["files"] == ["v1.csv"]
         assert record["fitted"] == board["figures"] != []
         for figure in board["figures"]:

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import pytest
 
+from designer.answers.cure_answer import CureAnswer, CuredResponse
 from designer.base.design_folder import MODEL
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
@@ -53,13 +54,13 @@ class Whole:
 
     design: Path
     repaired: Path
-    answer: dict[str, Any]
+    answer: CureAnswer
 
     @property
-    def told(self) -> dict[str, Any]:
+    def told(self) -> CuredResponse:
         """The one response, as the repair tells it."""
         (response,) = self.answer["responses"]
-        return cast(dict[str, Any], response)
+        return response
 
 
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
